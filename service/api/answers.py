@@ -1,4 +1,4 @@
-"""JSON answers: rendering in threads, entity tags (ETag), caches and headers."""
+"""JSON answers of the API: rendering in threads, entity tags (ETag), caches and headers."""
 
 import asyncio
 import re
@@ -35,12 +35,12 @@ def tag_of(*digests: bytes) -> str:
 
 
 def is_known(tag: str, if_none_match: str | None) -> bool:
-    """Whether a client has cached the answer with the entity tag `tag`.
+    """Whether an If-None-Match header contains an entity tag: the client has cached the answer.
 
     Parameters
     ----------
     if_none_match
-        Header If-None-Match: comma-separated entity tags, or ``*``.
+        Value of the header: comma-separated entity tags, or ``*``; None without the header.
     """
     if if_none_match is None:
         return False
@@ -59,7 +59,7 @@ async def in_thread(do: Callable[[], T]) -> T:
 
 
 async def rendered(make: Callable[[], BaseModel]) -> Response:
-    """Build a model in a thread; return it as a JSON response with an entity tag.
+    """Build an API model in a thread; return a JSON response with its entity tag.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ async def rendered(make: Callable[[], BaseModel]) -> Response:
 
 
 async def rendered_now(make: Callable[[], DatedAnswer]) -> Response:
-    """Build a model of the current state like `rendered`; its tag ignores the time of the answer.
+    """Build an API model in a thread; return a JSON response whose entity tag ignores `time`.
 
     Parameters
     ----------
@@ -81,12 +81,12 @@ async def rendered_now(make: Callable[[], DatedAnswer]) -> Response:
 
 
 class Renderings:
-    """LRU cache of large answers that seldom change.
+    """Cache of large JSON answers that seldom change, with eviction of the least recently used.
 
     Parameters
     ----------
     n_kept
-        Maximum number of cached answers; the least recently used answer is evicted first.
+        Maximum number of cached answers.
     """
 
     def __init__(self, n_kept: int = 16) -> None:
@@ -94,7 +94,15 @@ class Renderings:
         self._kept: dict[Hashable, tuple[object, bytes, str]] = {}
 
     async def of(self, key: Hashable, source: T, make: Callable[[T], BaseModel]) -> Response:
-        """Return the answer for a key; render it again if `source` is not the cached object."""
+        """Return the JSON response for a key, rendered again if `source` is a new object.
+
+        Parameters
+        ----------
+        source
+            Object from which the answer is made; compared by identity.
+        make
+            Function that builds the API model from `source` in a thread; may block.
+        """
         kept = self._kept.pop(key, None)
         if kept is None or kept[0] is not source:
             kept = (source, *await in_thread(lambda: _content(make(source))))
@@ -120,18 +128,18 @@ def _dated(model: DatedAnswer) -> Response:
 
 
 FRESH_S = 1.0
-"""Maximum age of an answer with unchanged revision, s: some states change with time alone."""
+"""Maximum age of a shared answer, s; some states change with time without a new revision."""
 
 
 class SharedAnswer:
-    """Newest answer of one route, shared by concurrent requests.
+    """Cached JSON answer of one route, shared by all requests.
 
     Parameters
     ----------
     make
-        Function that builds the model in a thread; may block.
+        Function that builds the API model in a thread; may block.
     revision
-        Function whose result changes with every state that must be shown immediately.
+        Function that returns a number; a new number makes the cached answer outdated.
     """
 
     def __init__(
@@ -141,7 +149,7 @@ class SharedAnswer:
         self._made: tuple[int, float, asyncio.Task[Response]] | None = None
 
     async def answer(self) -> Response:
-        """Return a copy of the shared answer, which is rendered first if it is outdated."""
+        """Return a response with the cached answer; render the answer first if it is outdated."""
         revision, now_s = self._revision(), self._clock.monotonic_s()
         if self._made is None or self._made[0] != revision or now_s - self._made[1] >= FRESH_S:
             making = asyncio.create_task(rendered_now(self._make), context=_shared_context())
@@ -152,27 +160,27 @@ class SharedAnswer:
 
 
 def _shared_context() -> Context:
-    """Return a context without the client, whose disconnection must not cancel shared reads."""
+    """Return a copy of the context variables without the client, which may disconnect."""
     context = copy_context()
     context.run(ASKER.set, None)
     return context
 
 
 TIME_HEADER = "Padwatch-Time"
-"""Header with the time of the answer; clients add the time since then to cached ages."""
+"""Name of the header with the time of the answer, for correcting ages in cached answers."""
 
 CACHE_CONTROL = "private, no-cache"
-"""Cache-Control header: private caches only, revalidation before each use."""
+"""Value of the header Cache-Control: private caches only, revalidation before each use."""
 
 
 class Revalidation:
-    """ASGI middleware that adds entity tags and answers 304; a route may set ``ETag`` itself."""
+    """ASGI middleware that adds missing entity tags, and answers 304 for a cached answer."""
 
     def __init__(self, app: ASGIApp, clock: Clock) -> None:
         self._app, self._clock = app, clock
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request; add headers and the entity tag to its answer."""
+        """Forward a request; add caching headers and the entity tag to its answer."""
         if scope["type"] != "http" or not scope["path"].startswith("/api/"):
             await self._app(scope, receive, send)
             return
@@ -181,7 +189,7 @@ class Revalidation:
 
 
 class _Answer:
-    """Buffer of the head of an answer until its body, which determines the tag, is complete."""
+    """Buffer for the head of an answer, which is sent when the body has determined the tag."""
 
     def __init__(self, send: Send, clock: Clock, scope: Scope) -> None:
         self._send, self._clock = send, clock
@@ -202,7 +210,7 @@ class _Answer:
         await self._send(message)
 
     def _judged(self, head: Message, body: Message) -> Message:
-        """Set the entity tag; answer with status 304 if the client has cached the body."""
+        """Complete `head`; return the body: empty, with status 304, if the client has cached it."""
         headers = MutableHeaders(scope=head)
         if "ETag" not in headers:
             headers["ETag"] = tag_of(digest_of(body.get("body", b"")))

@@ -1,4 +1,4 @@
-"""HTTP application: routers, middleware, and the OpenAPI document."""
+"""HTTP application of the service: routers, middleware, and the OpenAPI document."""
 
 import asyncio
 import json
@@ -50,7 +50,7 @@ class GuardedApi(FastAPI):
     Parameters
     ----------
     options
-        Options of FastAPI.
+        Keyword arguments of `FastAPI`.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -60,7 +60,7 @@ class GuardedApi(FastAPI):
         self._rendered: tuple[bytes, str] | None = None
 
     def setup(self) -> None:
-        """Add the route of the OpenAPI document; FastAPI would render it for each request."""
+        """Add the route of the OpenAPI document, which is rendered once, not for each request."""
         if self.openapi_url:
             self.add_route(self.openapi_url, self._published, include_in_schema=False)
 
@@ -69,7 +69,7 @@ class GuardedApi(FastAPI):
         self.add_middleware(Gate, declared=lambda: self.declared, authenticator=authenticator)
 
     def require_declarations(self) -> None:
-        """Collect the declarations of all routes; call this after the last route was added.
+        """Collect the declared permissions of all routes; call this after adding the last route.
 
         Raises
         ------
@@ -80,11 +80,11 @@ class GuardedApi(FastAPI):
 
     @property
     def declared(self) -> Mapping[str, Declared]:
-        """Operations with their requirements, by method and path."""
+        """Operations with their required permissions, by method and path such as ``GET /livez``."""
         return self._declared
 
     def openapi(self) -> dict[str, Any]:
-        """Return the OpenAPI document, which is built once, after all routes were added.
+        """Return the OpenAPI document, built at the first call, after all routes were added.
 
         Concurrent callers wait until the document is complete.
         """
@@ -97,7 +97,7 @@ class GuardedApi(FastAPI):
             return document
 
     def rendered(self) -> tuple[bytes, str]:
-        """Return the OpenAPI document as JSON, rendered once in about 0.3 s, and its entity tag."""
+        """Return the OpenAPI document as JSON, and its entity tag; the first call takes 0.3 s."""
         with self._rendering:
             if self._rendered is None:
                 document = _json(self.openapi())
@@ -126,7 +126,7 @@ Times are UTC, RFC 3339. Errors are problem documents (RFC 9457).
 
 
 def create_app(context: Context) -> GuardedApi:
-    """Build the application; the caller adds the routes of dashboard and evidence."""
+    """Return the application with all routes except those of dashboard and evidence reports."""
     app = GuardedApi(
         title="padwatch",
         version=version("padwatch"),

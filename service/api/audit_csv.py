@@ -11,11 +11,11 @@ from service.store.access.audit_entries import AuditEntry
 HEADER = ("time", *(field.name for field in fields(AuditEntry)))
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "|", "%", "'", "＝", "＋", "－", "＠")
-"""Prefixes of spreadsheet formulas, and the quote, so that the escaping is reversible."""
+"""First characters of spreadsheet formulas, and the single quote to make escaping reversible."""
 
 
 def write_csv(file: TextIO, entries: Iterable[AuditEntry]) -> int:
-    """Write one row per entry; return the number of rows.
+    """Write audit entries to a CSV file, one row per entry; return the number of entries.
 
     Text that a spreadsheet could interpret as a formula is prefixed with a single quote.
     """
@@ -29,7 +29,7 @@ def write_csv(file: TextIO, entries: Iterable[AuditEntry]) -> int:
 
 
 def harmless(text: str) -> str:
-    """Return text escaped against formula injection; invalid characters are replaced."""
+    """Return a text escaped against formula injection, with invalid characters replaced."""
     text = text.encode("utf-8", "replace").decode("utf-8").replace("\0", "\ufffd")
     is_formula = text.lstrip(" \u00a0\ufeff").startswith(FORMULA) or text.startswith(FORMULA)
     return f"'{text}" if is_formula else text

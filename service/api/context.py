@@ -1,4 +1,4 @@
-"""Parts of the running service that routes use."""
+"""Interfaces of the API to the running service, collected in `Context`."""
 
 import pathlib
 from collections.abc import Awaitable, Callable, Mapping, Sequence, Set
@@ -40,55 +40,58 @@ from service.store.store import Store
 
 
 class LiveState(Protocol):
-    """Live state of all units; see :class:`service.live.live_view.LiveView`."""
+    """Newest samples and results of all units; see :class:`service.live.live_view.LiveView`."""
 
     @property
     def revision(self) -> int:
-        """Number that changes with every link change and result."""
+        """Number that changes with every change of a link state and every result."""
 
     @property
     def store_error(self) -> str | None:
-        """Reason why results cannot be stored or read; None if they can."""
+        """Reason why results cannot be stored or read; None without a fault."""
 
     @property
     def n_unstored(self) -> int:
         """Number of results and events that are missing in the database."""
 
     def status(self, unit: str) -> UnitStatus:
-        """Return the state of the source of a unit."""
+        """Return the status of the data source of a unit."""
 
     def blocks(self, unit: str) -> Sequence[SampleBlock]:
-        """Return the newest blocks of a unit; raise `NotAvailableError` without blocks."""
+        """Return the buffered blocks of a unit, oldest first; replicas raise NotAvailableError."""
 
     def newest_block(self, unit: str) -> SampleBlock | None:
-        """Return the newest block of a unit; None without a block."""
+        """Return the newest sample block of a unit; None without a block."""
 
     def why_no_samples(self, unit: str) -> Reason | None:
         """Return the reason why the samples of a unit are not current; None if they are current."""
 
     def data_age_s(self, unit: str) -> float | None:
-        """Return the age of the newest block of a unit, s; None without a block."""
+        """Return the age of the newest sample block of a unit, s; None without a block."""
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
-        """Return the newest result with spectrum and orbit; raise errors as `blocks` does."""
+        """Return the newest result with spectrum and orbit; None before the first result.
+
+        Replicas raise `NotAvailableError`, since they have no spectra and orbits.
+        """
 
     def current(self, unit: str, bearing: str) -> CurrentBearing:
-        """Return the newest result of a bearing; outdated readings have no values."""
+        """Return the newest result of a bearing; its readings have no values if it is outdated."""
 
 
 class FilmState(Protocol):
-    """State of the films of all bearings; see :class:`service.measuring.films.FilmMonitor`."""
+    """State of the oil films of all bearings; see :class:`service.measuring.films.FilmMonitor`."""
 
     @property
     def unwatched(self) -> Mapping[str, str]:
-        """Reasons why the films of a unit are not watched, by unit."""
+        """Reason why the films of a unit are not watched, by identifier of the unit."""
 
     @property
     def settings(self) -> FilmAlarmSettings:
         """Settings of film monitoring."""
 
     def rules(self, unit: str) -> FilmRules | None:
-        """Return the film rules of a unit; None if its films are not watched."""
+        """Return the rules for judging the films of a unit; None if its films are not watched."""
 
     def place(self, unit: str, bearing: str) -> FilmPlace | None:
         """Return unit, bearing and estimator of a film; None if the film is not watched."""
@@ -97,7 +100,7 @@ class FilmState(Protocol):
         """Return the newest reading of a film with its findings; None without a reading."""
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
-        """Return the baseline in force of a bearing; None without such a baseline."""
+        """Return the baseline in force of a bearing; None if no baseline is in force."""
 
 
 class CaptureStatus(Protocol):
@@ -109,7 +112,7 @@ class CaptureStatus(Protocol):
 
     @property
     def trouble(self) -> str | None:
-        """Reason why samples cannot be recorded now; None if they can."""
+        """Reason why samples cannot be recorded now; None if recording is possible."""
 
     @property
     def n_running(self) -> int:
@@ -117,15 +120,15 @@ class CaptureStatus(Protocol):
 
     @property
     def n_written(self) -> int:
-        """Number of recordings finished since the start."""
+        """Number of recordings finished since the service started."""
 
     @property
     def being_made(self) -> Set[tuple[str, int]]:
-        """Alarm identifier and occurrence of each recording in progress."""
+        """Alarm identifier and occurrence number of each recording in progress."""
 
 
 class OperationService(Protocol):
-    """Operations on alarms and baselines, executed in the process that analyses the unit."""
+    """Executor of operations on alarms and baselines, in the process that analyses the unit."""
 
     async def operate(self, id_: str, action: Action) -> Alarm:
         """Execute an operation on an alarm; return the stored alarm.
@@ -141,7 +144,7 @@ class OperationService(Protocol):
         """
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
-        """Execute an action on the baselines of a bearing; the action is stored on return.
+        """Execute an action on the baselines of a bearing, and wait until it is stored.
 
         Raises
         ------
@@ -152,7 +155,7 @@ class OperationService(Protocol):
         """
 
     async def refer_to(self, reference: VectorReference) -> None:
-        """Apply a newly stored 1× reference."""
+        """Apply a newly stored 1× reference in the comparison of vibration vectors."""
 
 
 UnitId = Annotated[str, Path(description="Identifier of a unit.", examples=["U1"])]
@@ -168,8 +171,12 @@ class Context:
 
     Parameters
     ----------
+    units
+        Settings of all units, by identifier of the unit.
     refresh_s
-        Period of the results, s.
+        Time between successive results, s.
+    max_shelf_s
+        Maximum duration of shelving an alarm, s.
     receivers
         Function that returns the state of all receivers of alarm messages.
     evidence
@@ -179,11 +186,12 @@ class Context:
     metrics
         Function that collects the metrics for Prometheus; None without metrics.
     loops
-        Function that returns the fault of each loop of the program; None for an intact loop.
+        Function that returns the fault of each background loop, by name; None without a fault.
     stored_trouble
-        Function that returns known damage of stored data; None without damage.
+        Function that returns a description of damaged stored data; None without damage.
     checks
-        Function that returns further health checks by name; they do not affect readiness.
+        Function that returns results of further health checks, by name, which do not affect
+        readiness.
     access
         Authenticator; if None, local callers can read without a login.
     space
@@ -195,11 +203,11 @@ class Context:
     recordings
         Folders of recordings, the first for recordings around alarms; None without recordings.
     faults
-        Function that returns the faults of damaged recordings, by name of the recording.
+        Function that returns the fault of each damaged recording, by name of the recording.
     refusals
         Writer of audit entries for refused requests; if None, the application creates it.
     sources
-        Sources with timed polls, by unit.
+        Data sources with statistics of their polls, by identifier of the unit.
     """
 
     plant_name: str

@@ -1,14 +1,14 @@
-"""Streamed downloads, and a limit on concurrent expensive work for answers."""
+"""Streamed downloads with limits on concurrent downloads and on concurrent work in threads."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Generator
 from typing import TypeVar
 
 SLOTS = 2
-"""Maximum number of reports and download pieces that are produced concurrently."""
+"""Maximum number of evidence reports and download pieces that are produced concurrently."""
 
 MAX_DOWNLOADS = 16
-"""Maximum number of concurrent downloads; each uses a slot only to produce a piece."""
+"""Maximum number of concurrent downloads; a download uses a slot only to produce a piece."""
 
 T = TypeVar("T")
 
@@ -18,14 +18,14 @@ class TooManyDownloadsError(Exception):
 
 
 class Downloads:
-    """Streamed downloads; threads produce the pieces as fast as clients read them."""
+    """Streamed downloads whose pieces are produced in threads as fast as clients read them."""
 
     def __init__(self) -> None:
         self._slots = asyncio.Semaphore(SLOTS)
         self._n = 0
 
     async def worked(self, do: Callable[[], T]) -> T:
-        """Run a function in a thread as soon as a slot is free; return its result."""
+        """Run a function in a thread as soon as one of the `SLOTS` is free; return its result."""
         async with self._slots:
             return await asyncio.to_thread(do)
 
@@ -41,12 +41,17 @@ class Downloads:
             raise TooManyDownloadsError(f"{MAX_DOWNLOADS} downloads are in progress")
 
     async def download(self, pieces: Generator[bytes, None, None]) -> AsyncIterator[bytes]:
-        """Return an iterator over the pieces of a download.
+        """Return an iterator over the pieces of a download; the first piece is produced at once.
+
+        Parameters
+        ----------
+        pieces
+            Generator of the pieces; may block. Its errors for the first piece are raised here.
 
         Raises
         ------
         TooManyDownloadsError
-            If too many downloads are in progress. Errors of the first piece are raised too.
+            If `MAX_DOWNLOADS` downloads are in progress.
         """
         self.require_room()
         first = await self.worked(lambda: next(pieces, b""))  # the first piece opens all files

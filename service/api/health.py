@@ -1,4 +1,4 @@
-"""Routes for liveness, readiness and metrics."""
+"""Routes for liveness, readiness and metrics of the service."""
 
 from collections.abc import Awaitable, Callable
 from typing import Annotated, Literal
@@ -17,10 +17,10 @@ class HealthModel(ApiModel):
     """Result of the health checks of the service."""
 
     status: Literal["ok", "not ready"]
-    """Overall result."""
+    """Overall result of the checks."""
 
     checks: dict[str, str]
-    """Result of each check, by name of the check."""
+    """Result of each check in words, by name of the check."""
 
 
 def health_router(context: Context) -> APIRouter:
@@ -29,7 +29,7 @@ def health_router(context: Context) -> APIRouter:
 
     @router.get("/livez", summary="Is the process alive?")
     async def livez() -> HealthModel:
-        """Answer 200 while the event loop runs, independent of the state of DAQ and disk."""
+        """Answer 200 while the event loop runs, independent of data acquisition and disk."""
         return HealthModel(status="ok", checks={"event_loop": "turning"})
 
     @router.get(
@@ -38,9 +38,9 @@ def health_router(context: Context) -> APIRouter:
         responses={503: {"model": HealthModel, "description": "Something does not work"}},
     )
     async def readyz(response: Response) -> HealthModel:
-        """Answer 200 if results can be stored and every loop of the program is alive, else 503.
+        """Answer 200 if results can be stored and every background loop runs, else 503.
 
-        A lost DAQ is reported but does not make the service unready.
+        Lost links to data acquisition devices are reported, but the service remains ready.
         """
         checks = {f"unit {unit}": context.live.status(unit).state.value for unit in context.units}
         checks["store"] = context.live.store_error or "ok"
@@ -94,7 +94,7 @@ def metrics_router(look: Callable[[], Awaitable[Collector]]) -> APIRouter:
             str, Header(description="Accepted formats.", examples=["text/plain"])
         ] = "text/plain",
     ) -> Response:
-        """Return counters and gauges of samples, links, results, alarms, store and deliveries."""
+        """Return metrics of samples, links, results, alarms, store and deliveries."""
         body, kind = rendered(await look(), accept)
         return Response(body, headers={"content-type": kind, "cache-control": "no-store"})
 

@@ -1,4 +1,4 @@
-"""Load shedding: requests are refused under overload; samples and alarms have priority."""
+"""Load shedding: refusal of requests under overload, so that samples and alarms have priority."""
 
 import re
 from collections import Counter, deque
@@ -17,13 +17,13 @@ from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.metrics import counter, gauge
 
 RELIEF_SHARE = 0.5
-"""Fraction of a limit below which the load must stay for `RELIEF_S` to lower the refusal level."""
+"""Fraction of the limit of a level; the load must stay below it for `RELIEF_S` to end the level."""
 
 RELIEF_S = 5.0
 
 
 class Refused(IntEnum):
-    """Level of refusal; a higher level refuses additional kinds of requests."""
+    """Level of refusal: no requests, requests for past values, or also for live values."""
 
     NOTHING = 0
     HISTORY = 1
@@ -31,9 +31,9 @@ class Refused(IntEnum):
 
 
 MAX_DELAY_S, MAX_WAITING_SHARE, MAX_LAG_S = 2.0, 0.2, 1.0
-"""Limits of the waiting time of the oldest block, of the fill level of the queue to the analysis,
-and of the delay of the event loop. At a limit, requests for past values are refused; at twice a
-limit, also requests for live values.
+"""Limits of the load: waiting time of the oldest block in the queue to the analysis, s; fraction of
+this queue in use; delay of the event loop, s. At a limit, requests for past values are refused; at
+twice a limit, also requests for live values.
 
 Between these levels, continuous recording stops (`service.recordings.continuous_recorder`)."""
 
@@ -44,8 +44,10 @@ class RefusalState:
 
     Parameters
     ----------
+    refused
+        Level of refusal in force.
     relieved_s
-        Monotonic time since which a lower level is sufficient; None if the level is needed.
+        Monotonic time since which a lower level is sufficient, s; None if it is not sufficient.
     """
 
     refused: Refused = Refused.NOTHING
@@ -53,7 +55,15 @@ class RefusalState:
 
 
 def advance(state: RefusalState, over: float, now_s: float) -> RefusalState:
-    """Return the next state: raise the level at once, lower it by one after `RELIEF_S`."""
+    """Return the next state: the level rises at once, and falls by one after `RELIEF_S`.
+
+    Parameters
+    ----------
+    over
+        Load divided by its limit.
+    now_s
+        Monotonic time, s.
+    """
     wanted = Refused(min(int(over), Refused.VIEWS))
     if wanted >= state.refused or over > RELIEF_SHARE * state.refused:
         return RefusalState(max(wanted, state.refused))
@@ -68,7 +78,7 @@ log = structlog.get_logger()
 CHECK_PERIOD_S = 0.25
 
 N_CHECKS = 4
-"""Number of consecutive checks above a limit that count as overload."""
+"""Number of consecutive checks above a limit that are required for overload."""
 
 
 WORDS = {
@@ -78,7 +88,7 @@ WORDS = {
 
 
 class LoadWatch:
-    """Monitor of the load of queue and event loop, with counts of refused requests.
+    """Load monitor of analysis queue and event loop, which sets the level of refusal.
 
     Parameters
     ----------
@@ -109,7 +119,7 @@ class LoadWatch:
         return min(self._lags)
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Check the load periodically."""
+        """Check the load every `CHECK_PERIOD_S` until cancelled."""
         while True:
             pulse.beat(CHECK_PERIOD_S)
             due_s = self._clock.monotonic_s() + CHECK_PERIOD_S
@@ -122,7 +132,7 @@ class LoadWatch:
         Parameters
         ----------
         late_s
-            Delay of the event loop, s.
+            Delay of the event loop since the last check, s.
         """
         self._lags.append(max(0.0, late_s))
         delay_s, waiting_share = self._bus.oldest_wait_s, self._bus.depth / self._bus.capacity
@@ -141,7 +151,7 @@ class LoadWatch:
             )
 
     def refuses(self, refused_from: Refused) -> bool:
-        """Whether a request is refused at the current level; count it if it is refused."""
+        """Whether requests that are refused from a level are refused now; refusals are counted."""
         if refused_from is Refused.NOTHING or refused_from > self.refused:
             return False
         self.n_refused[refused_from] += 1
@@ -154,7 +164,7 @@ VITAL = re.compile(
     r"|/api/v1/session"
     r"|/(?!api/).*"  # the pages, which show the alarms
 )
-"""Paths that are never refused; requests that change state are never refused either."""
+"""Pattern of paths that are never refused; requests that change state are not refused either."""
 
 VIEWS = re.compile(
     r"/api/v1/overview"
@@ -162,13 +172,13 @@ VIEWS = re.compile(
     r"|/api/v1/units(/[^/]+(/channels)?)?"
     r"|/api/v1/units/[^/]+/bearings(/[^/]+(/latest|/orbit|/budgets/[^/]+)?)?"
 )
-"""Paths of live values, which are answered from memory."""
+"""Pattern of paths with live values, which are answered from memory."""
 
 READING = ("GET", "HEAD")
 
 
 def refused_from(method: str, path: str) -> Refused:
-    """Return the lowest level that refuses a request; `Refused.NOTHING` if it is never refused."""
+    """Return the lowest level at which a request is refused; `Refused.NOTHING` if it never is."""
     if method not in READING or (VITAL.fullmatch(path) and path != "/api/v1/alarms/rates"):
         return Refused.NOTHING
     return Refused.VIEWS if VIEWS.fullmatch(path) else Refused.HISTORY
@@ -189,7 +199,7 @@ class LoadShedder:
         self._app, self._load = app, load
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request, or refuse it under overload."""
+        """Forward a request, or refuse it with status 503 under overload."""
         if scope["type"] == "http" and self._load.refuses(
             refused_from(scope["method"], scope["path"])
         ):
@@ -202,7 +212,7 @@ KINDS = (Refused.HISTORY, Refused.VIEWS)
 
 
 def load_metrics(load: LoadWatch | None) -> Iterator[Metric]:
-    """Yield metrics of refused requests and event loop; no metrics without a load monitor."""
+    """Yield metrics of refused requests and of the event loop; nothing if `load` is None."""
     if load is None:
         return
     yield counter(
@@ -231,9 +241,9 @@ class TokenBucket:
     Parameters
     ----------
     n_at_once
-        Capacity of the bucket, tokens; it is full at first.
+        Capacity of the bucket, tokens; the bucket is full at the start.
     seconds_each
-        Time in which one token is added, s.
+        Time after which a token is added, s.
     now_s
         Monotonic time of the start, s.
     """
@@ -243,7 +253,7 @@ class TokenBucket:
         self._n_free, self._seen_s = self._n_at_once, now_s
 
     def take(self, now_s: float) -> bool:
-        """Take a token; return False if the bucket is empty."""
+        """Take a token; return whether one was available at the monotonic time `now_s`."""
         self._n_free += (now_s - self._seen_s) / self._seconds_each
         self._n_free, self._seen_s = min(self._n_free, self._n_at_once), now_s
         if self._n_free < 1.0:

@@ -1,4 +1,4 @@
-"""Additions to the OpenAPI document: names, headers, examples and access of operations."""
+"""Additions to the OpenAPI document: operation ids, headers, examples, required permissions."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -128,19 +128,19 @@ class Examples:
     Parameters
     ----------
     schemas
-        Schemas by name, for resolving references.
+        Schemas of the document by name, to which other schemas refer.
     """
 
     def __init__(self, schemas: Mapping[str, Any]) -> None:
         self._schemas = schemas
 
     def of(self, schema: Mapping[str, Any], model: str = "", field: str = "") -> Any:
-        """Return an example for a schema.
+        """Return an example value for a schema.
 
         Parameters
         ----------
         model, field
-            Names of the model and of the field that has the schema.
+            Names of the model and of its field with this schema; empty if unknown.
         """
         if (model, field) in CHOSEN:
             return CHOSEN[model, field]
@@ -157,7 +157,7 @@ class Examples:
         return self._of_type(schema, model, field)
 
     def _one_of(self, choices: list[Mapping[str, Any]], model: str, field: str) -> Any:
-        """Return an example of the first non-null type; None for text without an example."""
+        """Return an example of the first non-null type; None for nullable text without example."""
         may_be_null = any(choice.get("type") == "null" for choice in choices)
         some = [choice for choice in choices if choice.get("type") != "null"]
         is_word = some[0].get("type") == "string" and not some[0].get("examples")
@@ -233,7 +233,7 @@ HEADERS = {
         "example": "1.0.0-1f2e3d4c",
     },
 }
-"""OpenAPI entries for the headers of successful answers."""
+"""OpenAPI entries for the headers of successful answers, by name of the header."""
 
 PROBLEM_HEADERS: dict[str, dict[str, Any]] = {
     "401": {
@@ -275,7 +275,7 @@ def describe_answers(document: dict[str, Any]) -> None:
 
 
 def operation_id(method: str, path: str) -> str:
-    """Return the id of an operation, such as ``get_units_unit_bearings``."""
+    """Return the operation id of a method and path, such as ``get_units_unit_bearings``."""
     words = path.removeprefix("/api/v1/").strip("/").translate(str.maketrans("/-.", "___", "{}"))
     return f"{method}_{words}"
 
@@ -320,7 +320,7 @@ SCHEMES = {
 }
 
 NEEDED = "x-padwatch-needs"
-"""Extension key for the permission that an operation requires; null for open operations."""
+"""OpenAPI extension with the permission that an operation requires; null if it is open."""
 
 REFUSALS = {
     401: "Not authenticated",
@@ -329,7 +329,7 @@ REFUSALS = {
 
 
 def describe_access(document: dict[str, Any], operations: Mapping[str, Declared]) -> None:
-    """Add security schemes and the required permission of each operation."""
+    """Add security schemes and required permissions of operations to an OpenAPI document."""
     document.setdefault("components", {})["securitySchemes"] = SCHEMES
     for path, methods in document["paths"].items():
         for method, operation in methods.items():

@@ -1,4 +1,4 @@
-"""Query parameters shared by routes: times, ranges of values, operating states."""
+"""Query parameters of several routes: times, ranges of values, operating states."""
 
 from datetime import UTC, datetime
 from typing import Annotated, Any
@@ -16,7 +16,7 @@ FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
 
 
 def written_as_date(text: object) -> object:
-    """Return the text of a time; reject a number, which could be a year or seconds since 1970.
+    """Return the argument unchanged; reject a bare number, which is ambiguous as a time.
 
     Raises
     ------
@@ -29,7 +29,12 @@ def written_as_date(text: object) -> object:
 
 
 def ns_from_datetime(moment: datetime, parameter: str) -> int:
-    """Return a time in nanoseconds since 1970, clipped to the years 1 to 9999.
+    """Return a time in nanoseconds since 1970 UTC, clipped to the years 1 to 9999.
+
+    Parameters
+    ----------
+    parameter
+        Name of the request parameter with the time, for the error.
 
     Raises
     ------
@@ -44,7 +49,7 @@ def ns_from_datetime(moment: datetime, parameter: str) -> int:
 
 
 def require_order(start_ns: int, end_ns: int) -> None:
-    """Reject an empty time range.
+    """Require that the start of a time range is before its end.
 
     Raises
     ------
@@ -60,7 +65,7 @@ Moment = Annotated[datetime, BeforeValidator(written_as_date)]
 
 
 def time_query(description: str, example: str) -> Any:
-    """Declare a query parameter for a time."""
+    """Return the declaration of a query parameter for a time."""
     return Query(description=description, examples=[example])
 
 
@@ -73,14 +78,14 @@ def _bound(description: str, example: float) -> Any:
 
 
 def duration(longest_s: float, description: str, **options: Any) -> Any:
-    """Declare a query parameter for a duration in seconds."""
+    """Return the declaration of a query parameter for a duration of at most `longest_s` seconds."""
     return Query(gt=0.0, le=longest_s, allow_inf_nan=False, description=description, **options)
 
 
 async def time_range(
     start: Annotated[Moment, _START], end: Annotated[Moment, _END]
 ) -> tuple[int, int]:
-    """Return the requested time range in nanoseconds since 1970."""
+    """Return start and end of the requested time range, nanoseconds since 1970 UTC."""
     start_ns, end_ns = ns_from_datetime(start, "start"), ns_from_datetime(end, "end")
     require_order(start_ns, end_ns)
     return start_ns, end_ns
@@ -89,7 +94,7 @@ async def time_range(
 async def optional_time_range(
     start: Annotated[Moment | None, _START] = None, end: Annotated[Moment | None, _END] = None
 ) -> tuple[int, int]:
-    """Return the requested time range in ns since 1970; without start or end it is unlimited."""
+    """Return start and end of the requested time range, ns since 1970 UTC; unlimited by default."""
     start_ns = ns_from_datetime(start, "start") if start else -(2**63)
     end_ns = ns_from_datetime(end, "end") if end else 2**63 - 1
     require_order(start_ns, end_ns)
@@ -100,7 +105,7 @@ async def eccentricity_range(
     eccentricity_min: Annotated[float | None, _bound("Lowest eccentricity ratio.", 0.2)] = None,
     eccentricity_max: Annotated[float | None, _bound("Highest eccentricity ratio.", 0.4)] = None,
 ) -> ValueRange:
-    """Return the requested range of eccentricity ratios."""
+    """Return the requested range of eccentricity ratios; unlimited by default."""
     return _ordered(eccentricity_min, eccentricity_max, "eccentricity_min")
 
 
@@ -108,7 +113,7 @@ async def oil_temperature_range(
     oil_temperature_min: Annotated[float | None, _bound("Lowest, °C.", 40.0)] = None,
     oil_temperature_max: Annotated[float | None, _bound("Highest, °C.", 50.0)] = None,
 ) -> ValueRange:
-    """Return the requested range of oil temperatures, °C."""
+    """Return the requested range of oil temperatures, °C; unlimited by default."""
     return _ordered(oil_temperature_min, oil_temperature_max, "oil_temperature_min")
 
 
@@ -116,7 +121,7 @@ async def attitude_range(
     attitude_min: Annotated[float | None, _bound("Lowest attitude angle, degrees.", 40.0)] = None,
     attitude_max: Annotated[float | None, _bound("Highest, degrees.", 50.0)] = None,
 ) -> ValueRange:
-    """Return the requested range of attitude angles, degrees."""
+    """Return the requested range of attitude angles, degrees; unlimited by default."""
     return _ordered(attitude_min, attitude_max, "attitude_min")
 
 
@@ -145,10 +150,10 @@ OnlyUnit = Annotated[
 
 
 def only(description: str, example: str, max_length: int | None = None) -> Any:
-    """Declare a query parameter that selects the entries with a given text."""
+    """Return the declaration of a query parameter that selects entries with a given text."""
     return Query(max_length=max_length, description=f"Only this {description}.", examples=[example])
 
 
 def before_number(description: str) -> Any:
-    """Declare a query parameter for pages: only entries with smaller numbers are returned."""
+    """Return the declaration of a paging parameter that selects entries with smaller numbers."""
     return Query(ge=1, le=10**15, description=description, examples=[117])

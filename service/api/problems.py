@@ -1,4 +1,4 @@
-"""Errors as problem documents (RFC 9457)."""
+"""Error answers of the API: problem documents (RFC 9457)."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -18,10 +18,10 @@ from service.store.port import QueryTooLargeError, StoreError
 MEDIA_TYPE = "application/problem+json"
 
 MAX_BYTES = 2048
-"""Maximum size of a problem document, bytes; large wrong requests cause no large answers."""
+"""Maximum size of a problem document, bytes, so that wrong requests cause no large answers."""
 
 MAX_MISTAKES = 8
-"""Maximum number of wrong parameters reported."""
+"""Maximum number of wrong parameters in a problem document."""
 
 SCHEMAS = "#/components/schemas/"
 
@@ -39,7 +39,7 @@ log = structlog.get_logger()
 
 
 class Mistake(BaseModel):
-    """Wrong parameter of a request."""
+    """Description of a wrong parameter of a request."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -65,7 +65,17 @@ class Problem(BaseModel):
 
 
 class ProblemError(Exception):
-    """Error that ends a request with a problem document."""
+    """Error that is answered with a problem document.
+
+    Parameters
+    ----------
+    status
+        HTTP status of the answer.
+    parameter
+        Name of the wrong parameter; None if no single parameter is wrong.
+    headers
+        Additional headers of the answer.
+    """
 
     def __init__(
         self,
@@ -89,25 +99,27 @@ EVERY_OPERATION: dict[int | str, dict[str, Any]] = {
     422: _documented(WORDS[422]),
     "default": _documented("Any other problem"),
 }
-"""OpenAPI entries for the problems that every operation may return."""
+"""OpenAPI entries for problems that every operation may return, by status."""
 
 
 def problem_responses(
     *statuses: int, own: Mapping[int, str] | None = None
 ) -> dict[int | str, dict[str, Any]]:
-    """Return OpenAPI entries for the problems of an operation.
+    """Return OpenAPI entries for the problems that an operation may return, by status.
 
     Parameters
     ----------
+    statuses
+        HTTP statuses with the default descriptions in `WORDS`.
     own
-        Descriptions of further statuses, in place of those in `WORDS`.
+        Further statuses with their own descriptions.
     """
     words = {status: WORDS[status] for status in statuses} | dict(own or {})
     return {status: _documented(text) for status, text in words.items()}
 
 
 async def refuse_unknown_parameters(request: Request) -> None:
-    """Reject unknown query parameters, which would otherwise be ignored silently.
+    """Reject a request with an unknown query parameter, which FastAPI would ignore.
 
     Raises
     ------
@@ -123,7 +135,7 @@ async def refuse_unknown_parameters(request: Request) -> None:
 
 
 def problem_schemas() -> dict[str, Any]:
-    """Return the JSON schemas that the OpenAPI entries refer to, by name."""
+    """Return the JSON schemas of problem documents, by name."""
     schema = Problem.model_json_schema(ref_template=f"{SCHEMAS}{{model}}")
     return {**schema.pop("$defs"), "Problem": schema}
 
@@ -176,12 +188,12 @@ def install_problem_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(Exception)
     async def _bug(request: Request, _: Exception) -> Response:
-        """Return a problem without details of the bug; the server logs its traceback."""
+        """Return a problem of status 500 without details; the server logs the traceback."""
         return _render(request, 500, "Fault in padwatch", "a fault of the program; see its log")
 
 
 def problem_answer(request: Request, error: ProblemError) -> Response:
-    """Return a response with the problem document of an error."""
+    """Return the response to a request with the problem document of an error."""
     words = (error.status, error.title, error.detail)
     return _render(request, *words, error.errors, error.headers)
 
@@ -215,7 +227,7 @@ def _render(
 
 
 def _bounded(problem: Problem) -> bytes:
-    """Return a problem as JSON; texts are truncated to keep it within `MAX_BYTES`."""
+    """Return a problem document as JSON, with texts truncated to stay within `MAX_BYTES`."""
     n_characters = MAX_BYTES // 2
     while len(document := _json(problem)) > MAX_BYTES:
         problem = Problem(

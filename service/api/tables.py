@@ -1,4 +1,4 @@
-"""Tabular answers as CSV or Parquet files, generated in threads."""
+"""Tables as answers: CSV and Parquet files."""
 
 import csv
 from collections.abc import Iterator, Sequence
@@ -51,7 +51,7 @@ COLUMN_KINDS: dict[type, ColumnKind] = {bool: "flag", int: "count", float: "numb
 
 
 def kind_of(annotation: Any) -> ColumnKind:
-    """Return the column kind for a type of values or for a list type, such as `list[int]`."""
+    """Return the column kind for the type annotation of a value, or of a list of values."""
     inner = [each for each in get_args(annotation) if each is not NoneType]
     is_leaf = not inner or isinstance(inner[0], str)  # text is a member of a Literal
     return COLUMN_KINDS.get(annotation, "text") if is_leaf else kind_of(inner[0])
@@ -64,9 +64,9 @@ class Column:
     Parameters
     ----------
     values
-        Value or None for each row; times are in nanoseconds since 1970.
+        Value or None for each row; times are in nanoseconds since 1970 UTC.
     unit
-        Unit and detector of the values; None if the values have no unit.
+        Unit of the values, for an amplitude also the detector; None if the values have no unit.
     """
 
     name: str
@@ -90,7 +90,7 @@ async def wanted_format(
         ),
     ] = None,
 ) -> FormatName:
-    """Return the format requested by the query or by the header Accept; default: JSON."""
+    """Return the format requested by the query, else by the header Accept, else JSON."""
     if format is not None:
         return format
     accepted = request.headers.get("accept", "").split(",")
@@ -102,7 +102,13 @@ Format = Annotated[FormatName, Depends(wanted_format)]
 
 
 def table_content(words: str) -> dict[int | str, dict[str, Any]]:
-    """Return the OpenAPI entry of an answer that is also available as a table."""
+    """Return the OpenAPI entry of an answer that is also available as CSV and Parquet.
+
+    Parameters
+    ----------
+    words
+        Description of the answer.
+    """
     binary = {"schema": {"type": "string", "format": "binary"}}
     text = {"schema": {"type": "string"}, "example": CSV_EXAMPLE}
     content = {TYPE_OF["csv"]: text, TYPE_OF["parquet"]: binary}
@@ -133,7 +139,7 @@ def table_response(
 
 
 def csv_pieces(columns: Sequence[Column]) -> Iterator[bytes]:
-    """Yield the pieces of a CSV file (RFC 4180); text is escaped against formula injection."""
+    """Yield the pieces of a CSV file (RFC 4180), with text escaped against formula injection."""
     sink = StringIO(newline="")
     writer = csv.writer(sink)
     writer.writerow([column.heading for column in columns])

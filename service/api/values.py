@@ -1,4 +1,4 @@
-"""API models for several subjects: quality, reading, uncertainty, window, condition."""
+"""API models used by several routes: quality, reading, uncertainty, window, condition."""
 
 import math
 from collections.abc import Iterable
@@ -30,7 +30,9 @@ from service.runtime.times import rfc3339
 
 
 class ApiModel(BaseModel):
-    """Base class of answers, without NaN or infinity; OpenAPI shows the docstrings of its fields.
+    """Base class of API models, which reject NaN and infinity.
+
+    OpenAPI shows the docstrings of the fields as their descriptions.
 
     A model can be built from the attributes of an object: a field is read from the attribute with
     its name, or for times from the attribute with its name and the suffix ``_ns``.
@@ -47,12 +49,12 @@ class ApiModel(BaseModel):
 
     @classmethod
     def of(cls, *sources: object, **values: object) -> Self:
-        """Return a model from keyword values and, for other fields, attributes of `sources`."""
+        """Return a model with fields from keyword values, else from attributes of `sources`."""
         return cls.model_validate(_Merged(SimpleNamespace(**values), *sources))
 
 
 class _Merged:
-    """Merged view of the attributes of several objects; earlier objects take precedence."""
+    """Object with the attributes of several objects; the first object with an attribute decides."""
 
     def __init__(self, *sources: object) -> None:
         self._sources = sources
@@ -65,18 +67,18 @@ class _Merged:
 
 
 MAX_UNKNOWN = 8
-"""Maximum number of unknown members that are reported individually."""
+"""Maximum number of unknown members of a request body that are reported individually."""
 
 
 class RequestModel(ApiModel):
-    """Base class of request bodies, without unknown members or type conversions."""
+    """Base class of request bodies, which reject unknown members and convert no types."""
 
     model_config = ConfigDict(strict=True, alias_generator=None, from_attributes=False)
 
     @model_validator(mode="before")
     @classmethod
     def _reject_many_members(cls, body: Any) -> Any:
-        """Reject too many members with one error; one error per member would take 10 µs each."""
+        """Reject a body with too many members; an error for each member would take 10 µs."""
         if isinstance(body, dict) and len(body) > len(cls.model_fields) + MAX_UNKNOWN:
             known = ", ".join(cls.model_fields)
             raise ValueError(f"{len(body)} members are too many; known: {known}")
@@ -112,10 +114,10 @@ NoteText = Annotated[
 
 
 class ActorModel(RequestModel):
-    """Base class of requests with the name of the acting person."""
+    """Base class of request bodies with the name of the acting person."""
 
     actor: ActorName | None = None
-    """Acting person, 1 to 80 printable characters; ignored if the request is authenticated."""
+    """Name of the acting person, 1 to 80 printable characters; ignored with a login or key."""
 
 
 LevelName = Literal["good", "uncertain", "bad"]
@@ -138,21 +140,21 @@ def _name(value: object) -> object:
 
 
 Time = Annotated[str, BeforeValidator(_time), Field(examples=["2026-11-21T09:03:12.400Z"])]
-"""Time, RFC 3339; given as text or in nanoseconds since 1970."""
+"""Type of a time in RFC 3339; nanoseconds since 1970 UTC are converted."""
 
 ByName = BeforeValidator(_name)
-"""Validator that replaces a member of an enumeration by its name in lower case."""
+"""Validator that converts a member of an enumeration to its name in lower case."""
 
 
 class DatedAnswer(ApiModel):
-    """Answer that contains the current time; its entity tag ignores this time."""
+    """Base class of answers with the current time, which their entity tags ignore."""
 
     time: Time
     """Current time."""
 
 
 class BearingAnswer(ApiModel):
-    """Answer about one bearing."""
+    """Base class of answers about one bearing."""
 
     unit: str
     """Identifier of the unit."""
@@ -162,7 +164,7 @@ class BearingAnswer(ApiModel):
 
 
 class BearingHistory(BearingAnswer):
-    """Answer about one bearing in a time range."""
+    """Base class of answers about one bearing in a time range."""
 
     start: Time
     """Start of the requested range."""
@@ -172,7 +174,7 @@ class BearingHistory(BearingAnswer):
 
 
 class SampleRange(ApiModel):
-    """Range of consecutive samples of a unit."""
+    """Base class of answers with consecutive samples of a unit."""
 
     epoch: int
     """Epoch of the sample index; it changes when the device restarts its count."""
@@ -185,23 +187,23 @@ class SampleRange(ApiModel):
 
 
 class QualityModel(ApiModel):
-    """Quality of a value."""
+    """Data quality of a value."""
 
     level: Annotated[LevelName, ByName]
     """Quality level: the worst level of all readings that the value is derived from."""
 
     reason: Annotated[str, Field(examples=["insufficient_excitation"])]
-    """Reason of the level; "ok" if it is good."""
+    """Reason for the quality level; "ok" if the level is good."""
 
 
 class UncertaintyModel(ApiModel):
-    """Standard uncertainties (GUM), in the unit of the value."""
+    """Uncertainty of a value according to the GUM, in the unit of the value."""
 
     random: float | None
-    """Random component; null if unknown."""
+    """Random component of the standard uncertainty; null if unknown."""
 
     systematic: float | None
-    """Systematic component, from transducers and bracket; null if unknown."""
+    """Systematic component of the standard uncertainty, due to transducers and bracket; or null."""
 
     low_95: float
     """Lower end of the 95 % coverage interval."""
@@ -211,10 +213,10 @@ class UncertaintyModel(ApiModel):
 
 
 class ReadingModel(ApiModel):
-    """Reading of one quantity, with its quality."""
+    """Reading of one quantity: value, data quality and uncertainty."""
 
     value: Annotated[float | None, Field(examples=[0.6914e9])]
-    """Value of the reading; null if and only if the level is bad."""
+    """Value of the reading; null if and only if the quality level is bad."""
 
     unit: Annotated[str, Field(examples=["N/m"])]
     """Unit of the value; for an amplitude, also the detector."""
@@ -223,17 +225,17 @@ class ReadingModel(ApiModel):
     """Description of the quantity in words."""
 
     level: LevelName
-    """Quality level."""
+    """Quality level of the reading."""
 
     reason: Annotated[str, Field(examples=["ok"])]
-    """Reason of the level."""
+    """Reason for the quality level; "ok" if the level is good."""
 
     uncertainty: UncertaintyModel | None
     """Uncertainty of a stiffness or damping; null for other quantities and if unknown."""
 
 
 class WindowModel(ApiModel):
-    """Averaging window of a result: range of samples and segments."""
+    """Averaging window of a result: range of samples and number of segments."""
 
     epoch: int
     """Epoch of the sample index; it changes when the device restarts its count."""
@@ -245,16 +247,16 @@ class WindowModel(ApiModel):
     """Index of the last sample."""
 
     n_segments: int
-    """Number of segments in the average; all four channels are usable in each of them."""
+    """Number of averaged segments; all four channels are usable in every averaged segment."""
 
     n_segments_wanted: int
     """Number of segments of a full average."""
 
     n_voided: int
-    """Number of segments discarded because of gaps since the service started."""
+    """Number of segments discarded because of gaps in the samples since the service started."""
 
     coverage: float
-    """Fraction of the possible segments that are in the average."""
+    """Fraction of the segments in the window that are averaged, 0 to 1."""
 
     duration_s: float
     """Time from the first to the last sample, s."""
@@ -266,7 +268,7 @@ OperatingStateName = Literal[
 
 
 class CellModel(ApiModel):
-    """Cell of the grid of operating conditions; readings in one cell are comparable."""
+    """Cell of the grid of operating conditions; film readings in one cell are comparable."""
 
     eccentricity_low: Annotated[float, Field(examples=[0.35])]
     """Lower bound of the eccentricity ratio."""
@@ -281,26 +283,26 @@ class CellModel(ApiModel):
     """Upper bound of the oil temperature, °C."""
 
     attitude_low_deg: float | None
-    """Lower bound of the attitude angle; null if cells do not depend on the attitude angle."""
+    """Lower bound of the attitude angle, degrees; null if cells do not depend on this angle."""
 
     attitude_high_deg: float | None
-    """Upper bound of the attitude angle; null if cells do not depend on the attitude angle."""
+    """Upper bound of the attitude angle, degrees; null if cells do not depend on this angle."""
 
 
 class FilmConditionModel(ApiModel):
     """Operating condition of a bearing."""
 
     time: Time
-    """Time of the operating condition."""
+    """Time to which the operating condition refers."""
 
     operating_state: Annotated[OperatingStateName, ByName]
     """Operating state of the unit."""
 
     is_settled: bool
-    """Whether the state has lasted long enough, after the warm-up, for a comparison of films."""
+    """Whether the state, and with it the warm-up, has lasted long enough to judge the film."""
 
     cell: CellModel | None
-    """Cell of the condition; null if eccentricity or oil temperature is unknown."""
+    """Cell of the grid that contains the condition; null if a coordinate is unknown."""
 
 
 PlaceName = Literal["shaft_x", "shaft_y", "bearing_x", "bearing_y"]
@@ -314,7 +316,7 @@ LEVEL_NAMES: dict[Level, LevelName] = {
 
 
 def level_names(levels: Iterable[Level | None]) -> list[LevelName | None]:
-    """Return the names of quality levels; None remains None."""
+    """Return the names of quality levels in the API; None for None."""
     return [None if level is None else LEVEL_NAMES[level] for level in levels]
 
 
@@ -374,7 +376,7 @@ def condition_model(
 
 
 def cell_of(point: OperatingPoint, grid: CellGrid) -> CellModel | None:
-    """Return the cell of an operating point; None if a coordinate of the point is unknown."""
+    """Return the API model of the cell of an operating point; None if a coordinate is unknown."""
     axes = (point.eccentricity_ratio, point.oil_temperature_c, point.attitude_deg)
     here = FilmConditions.one(*(math.nan if value is None else value for value in axes))
     if not grid.is_known(here)[0]:
@@ -383,7 +385,7 @@ def cell_of(point: OperatingPoint, grid: CellGrid) -> CellModel | None:
 
 
 def cell_model(cell: Cell, grid: CellGrid) -> CellModel:
-    """Return the API model of a cell: the bounds on each axis."""
+    """Return the API model of a cell: its bounds in each quantity of the grid."""
     eccentricity, temperature, *attitude = cell
     low_e, high_e = bounds(eccentricity, grid.eccentricity_width)
     low_c, high_c = bounds(temperature, grid.temperature_width_c)
@@ -400,7 +402,7 @@ def cell_model(cell: Cell, grid: CellGrid) -> CellModel:
 
 
 def bounds(number: int, width: float) -> tuple[float, float]:
-    """Return the lower and upper bound of a bin, rounded to 9 decimals."""
+    """Return the lower and upper bound of the bin `number` of a width, rounded to 9 decimals."""
     return round(number * width, 9), round((number + 1) * width, 9)
 
 

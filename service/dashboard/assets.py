@@ -1,4 +1,4 @@
-"""Files of the dashboard in memory, with media types, entity tags and a common edition."""
+"""Files of the dashboard in memory, with media types, entity tags and a version identifier."""
 
 import gzip
 import hashlib
@@ -34,7 +34,7 @@ class Asset:
 
     @cached_property
     def gzipped(self) -> bytes:
-        """Content compressed by gzip."""
+        """Content of the file, compressed by gzip."""
         return gzip.compress(self.body, mtime=0)
 
 
@@ -53,16 +53,16 @@ def pages() -> dict[str, Asset]:
 
 @cache
 def plotly() -> Asset:
-    """Read the chart library of the installed plotly package."""
+    """Return the JavaScript chart library of the installed plotly package."""
     script = files("plotly") / "package_data" / "plotly.min.js"
     return Asset(script.read_bytes(), MEDIA_TYPES["js"])
 
 
 @cache
 def edition() -> str:
-    """Return the program version and a hash of all files, such as ``0.6.0-1f2e3d4c``.
+    """Return the edition of the dashboard: program version and hash, such as ``0.6.0-1f2e3d4c``.
 
-    An open page compares its edition with that of new answers and so detects an upgrade.
+    An open page detects an upgrade by comparing its edition with the edition in later answers.
     """
     tags = "".join(f"{path} {asset.etag}" for path, asset in sorted(pages().items()))
     tags += version("plotly")
@@ -70,7 +70,7 @@ def edition() -> str:
 
 
 def _alarm_kinds() -> str:
-    """Return the source of a JavaScript module with the table of alarm kinds by name."""
+    """Return the source of a JavaScript module with the properties of all alarm kinds, by name."""
     table = {
         name: {key: getattr(kind, key) for key in ("label", "subject", "rule", "advice")}
         for name, kind in ALARM_KINDS.items()

@@ -18,10 +18,10 @@ SECURITY_HEADERS = {
 """Security headers: scripts from this server only; inline styles, because plotly adds them."""
 
 REVALIDATE = "no-cache"
-"""Cache-Control header of the page; the page links to the files of the running edition."""
+"""Cache-Control header of the page: browsers must revalidate it, since its links may change."""
 
 KEEP = "public, max-age=31536000, immutable"
-"""Cache-Control header of the files; their paths contain the edition."""
+"""Cache-Control header of the files: they never change, since their paths contain the edition."""
 
 
 def files() -> str:
@@ -54,7 +54,7 @@ async def _index(request: Request) -> Response:
 
 
 def _plotly(request: Request) -> Response:
-    """Return the chart library, from a thread, because the first call compresses 5 MB."""
+    """Return the chart library. FastAPI runs this in a thread: the first call compresses 5 MB."""
     return _sent(plotly(), request, KEEP)
 
 

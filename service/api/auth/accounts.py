@@ -1,4 +1,4 @@
-"""Routes for admins: accounts of people and API keys of machines."""
+"""Routes for administrators: accounts of persons and API keys of machines."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -46,7 +46,7 @@ class AccountModel(ApiModel):
     """Login name."""
 
     role: Annotated[RoleName, Field(examples=["operator"])]
-    """Role of the account."""
+    """Role of the person, which determines the permissions."""
 
     created: Time
     """Time of creation of the account."""
@@ -56,40 +56,40 @@ class AccountModel(ApiModel):
 
 
 class NewAccountModel(RequestModel):
-    """Request to add an account."""
+    """Request to add an account of a person."""
 
     name: LoginName
-    """Name of the account: a-z 0-9 . _ @ -."""
+    """Login name, of the characters a-z 0-9 . _ @ -."""
 
     role: Annotated[RoleName, Field(examples=["operator"])]
-    """Role of the account."""
+    """Role of the person, which determines the permissions."""
 
     password: Password
-    """First password of the account: 12 to 256 characters, at least 6 different characters."""
+    """Initial password: 12 to 256 characters, at least 6 of them different."""
 
 
 class SetRoleModel(RequestModel):
-    """Request to change a role."""
+    """Request to change the role of an account."""
 
     role: Annotated[RoleName, Field(examples=["engineer"])]
     """New role, effective from the next request of the account."""
 
 
 class SetPasswordModel(RequestModel):
-    """Request to set a password."""
+    """Request to set the password of an account."""
 
     password: Password
-    """New password: 12 to 256 characters, at least 6 different characters."""
+    """New password: 12 to 256 characters, at least 6 of them different."""
 
 
 class KeyModel(ApiModel):
     """API key of a machine, without its secret."""
 
     id: Annotated[str, Field(examples=["5f0c6f3a9b1e"])]
-    """Public part of the key."""
+    """Public part of the key, which identifies it."""
 
     name: Annotated[str, Field(examples=["historian"])]
-    """Name of the key."""
+    """Name of the key, such as that of the machine."""
 
     role: Annotated[RoleName, Field(examples=["viewer"])]
     """Role of the machine that uses the key."""
@@ -101,10 +101,10 @@ class KeyModel(ApiModel):
     """State of the key."""
 
     created: Time
-    """Time of creation."""
+    """Time of creation of the key."""
 
     expires: Time
-    """Time of expiry."""
+    """Time of expiry of the key."""
 
     used: Time | None
     """Time of last use, accurate to a minute; null if the key was never used."""
@@ -114,10 +114,10 @@ class KeyModel(ApiModel):
 
 
 class NewKeyModel(RequestModel):
-    """Request to create a key."""
+    """Request to create an API key for a machine."""
 
     name: LoginName
-    """Name of the key: a-z 0-9 . _ @ -."""
+    """Name of the key, of the characters a-z 0-9 . _ @ -."""
 
     role: Annotated[RoleName, Field(examples=["viewer"])]
     """Role of the machine that uses the key."""
@@ -126,14 +126,14 @@ class NewKeyModel(RequestModel):
     """Units for which the key is valid; empty if it is valid for all units."""
 
     days: Annotated[int, Field(ge=1, le=MAX_DAYS, examples=[365])] = 365
-    """Validity in days."""
+    """Validity period from creation, days."""
 
 
 class CreatedKeyModel(KeyModel):
     """New API key, with its secret."""
 
     key: Annotated[str, Field(examples=["pw_5f0c6f3a9b1e_…"])]
-    """Complete key with its secret, contained in this answer only and not stored."""
+    """Complete key with its secret, which is not stored and cannot be read again."""
 
 
 def account_model(account: Account) -> AccountModel:
@@ -143,12 +143,12 @@ def account_model(account: Account) -> AccountModel:
 
 @contextmanager
 def refusals_as_problems(password: str = "password") -> Iterator[None]:  # noqa: S107
-    """Convert errors of names, passwords, accounts and keys to `ProblemError`.
+    """Return a context that converts errors of names, passwords and keys to `ProblemError`.
 
     Parameters
     ----------
     password
-        Name of the request parameter that contains the new password.
+        Name of the request parameter with the new password, for the error.
     """
     try:
         yield
@@ -204,7 +204,7 @@ def account_router(authenticator: Authenticator) -> APIRouter:
 
     @router.put("/{name}/role", summary="Change a role", responses=CHANGE_PROBLEMS)
     async def set_role(name: AccountName, asked: SetRoleModel) -> AccountModel:
-        """Change the role of an account, effective from its next request."""
+        """Change the role of an account, effective from the next request of the person."""
         await _one(authenticator, name)
         with refusals_as_problems():
             await work.run(lambda: stored.set_role(name, Role(asked.role), now_ns()))
@@ -214,7 +214,7 @@ def account_router(authenticator: Authenticator) -> APIRouter:
     async def set_password(
         request: Request, name: AccountName, asked: SetPasswordModel
     ) -> AccountModel:
-        """Set the password of another account and end its sessions.
+        """Set the password of another person's account, and end the sessions of the account.
 
         The person must change this password at the next login.
         """
@@ -231,7 +231,7 @@ def account_router(authenticator: Authenticator) -> APIRouter:
         "/{name}", summary="Remove an account", status_code=204, responses=CHANGE_PROBLEMS
     )
     async def remove(request: Request, name: AccountName) -> None:
-        """Remove an account and end its sessions; callers cannot remove their own account."""
+        """Remove the account of another person, and end the sessions of the account."""
         if _is_own(request, name):
             raise ProblemError(409, "Does not fit", "you cannot remove your own account")
         await _one(authenticator, name)
@@ -242,7 +242,7 @@ def account_router(authenticator: Authenticator) -> APIRouter:
 
 
 def _is_own(request: Request, name: str) -> bool:
-    """Whether the caller has logged in with an account of this name."""
+    """Whether the caller has logged in with the account `name`."""
     identity = identity_of(request)
     return identity.means is Means.SESSION and identity.name == name
 
@@ -267,13 +267,13 @@ def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
 
     @router.get("", summary="Keys", responses=problem_responses(503))
     async def keys() -> list[KeyModel]:
-        """List all keys, also expired and revoked keys, oldest first, without their secrets."""
+        """List all API keys, also expired and revoked keys, oldest first, without their secrets."""
         keys, now_ns = await work.run(stored.all), clock.now_ns()
         return [KeyModel.of(key, state=key.state(now_ns)) for key in keys]
 
     @router.post("", summary="Create a key", status_code=201, responses=CHANGE_PROBLEMS)
     async def create(asked: NewKeyModel) -> CreatedKeyModel:
-        """Create a key for a machine; its secret is contained in this answer only."""
+        """Create an API key for a machine; only this answer contains the secret of the key."""
         for unit in asked.units:
             if unit not in context.units:
                 detail = "there is no such unit in this plant"
@@ -285,7 +285,7 @@ def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
 
     @router.delete("/{key}", summary="Revoke a key", status_code=204, responses=CHANGE_PROBLEMS)
     async def revoke(key: KeyId) -> None:
-        """Revoke a key permanently; the request is idempotent."""
+        """Revoke an API key permanently; the request is idempotent."""
         if await work.run(lambda: stored.get(key)) is None:
             raise ProblemError(404, "Unknown key", "the key does not exist")
         await work.run(lambda: stored.revoke(key, clock.now_ns()))

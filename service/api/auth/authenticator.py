@@ -33,7 +33,7 @@ from service.store.access.tables import AccessStore, Account
 
 
 def immediately(note: Callable[[], None]) -> None:
-    """Call a function immediately."""
+    """Call a function at once; default for the parameter `note` of `CredentialChecker`."""
     note()
 
 
@@ -44,7 +44,9 @@ class LoggedIn:
     Parameters
     ----------
     token
-        Token of the session; only its digest is stored.
+        Token of the session, for the cookie; only the digest of the token is stored.
+    identity
+        Identity of the person who logged in.
     """
 
     token: str = field(repr=False)
@@ -53,26 +55,28 @@ class LoggedIn:
 
 @dataclass(frozen=True)
 class NotLoggedIn:
-    """Result of a failed login; wrong names and wrong passwords are not distinguished.
+    """Result of a failed login, the same for a wrong name and a wrong password.
 
     Parameters
     ----------
     wait_s
-        Time until a login may be tried again, s; 0 if this attempt was checked.
+        Time until the next attempt is allowed, s, if this attempt came too early; otherwise 0.
     """
 
     wait_s: float = 0.0
 
 
 class CredentialChecker:
-    """Checker of passwords, sessions and keys. Its methods block: call them from a thread.
+    """Checker of passwords, session tokens and API keys; its methods block.
 
     Parameters
     ----------
     store
-        Accounts, sessions and keys.
+        Database of accounts, sessions and keys.
+    limits
+        Maximum durations of sessions; default values if None.
     note
-        Runs writes of last-use times and of expired sessions; by default immediately.
+        Function that calls its argument, a write of minor importance, at once or later.
     """
 
     def __init__(
@@ -95,9 +99,9 @@ class CredentialChecker:
         Parameters
         ----------
         peer
-            Address of the client.
+            Network address of the client.
         now_ns
-            Time by the host's clock, ns since 1970.
+            Time by the host clock, ns since 1970 UTC.
         ticks_ns
             Monotonic time, ns.
         """
@@ -119,7 +123,7 @@ class CredentialChecker:
             self._store.sessions.end(digest(token))
 
     def person(self, token: str, now_ns: int) -> Identity | None:
-        """Return the identity of a session token; None if the session is unknown or expired."""
+        """Return the identity of a person by session token; None if it is unknown or expired."""
         found = self._store.sessions.get(digest(token)) if is_token(token) else None
         if found is None:
             return None
@@ -132,7 +136,7 @@ class CredentialChecker:
         return _person(account)
 
     def machine(self, key: str, now_ns: int) -> Identity | None:
-        """Return the identity of an API key; None if the key is unknown, expired or revoked."""
+        """Return the identity of a machine by API key; None if unknown, expired or revoked."""
         id_ = key_id(key)
         stored = None if id_ is None else self._store.keys.get(id_)
         if stored is None or not is_token_of(key, stored.digest):
@@ -156,7 +160,7 @@ class CredentialChecker:
 
 
 def tidy_name(name: str) -> str:
-    """Return the normalised name of an account; "?" for an invalid name."""
+    """Return a login name in normalised form; "?" for an invalid name."""
     try:
         return account_name(name)
     except NameRefusedError:
@@ -173,7 +177,7 @@ COOKIE = "__Host-padwatch"
 """Name of the session cookie over HTTPS; ``__Host-`` restricts it to one host and to HTTPS."""
 
 PLAIN_COOKIE = "padwatch"
-"""Name of the session cookie over HTTP: some browsers reject secure cookies from loopback."""
+"""Name of the session cookie over HTTP, since some browsers reject secure cookies over HTTP."""
 
 BEARER = "bearer"
 
@@ -193,7 +197,13 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Credentials:
-    """Credentials of a request; a key takes precedence over a cookie."""
+    """Credentials of a request: session token or API key, not yet checked.
+
+    Parameters
+    ----------
+    secret
+        Session token or API key; empty for other kinds.
+    """
 
     kind: Kind
     secret: str = field(default="", repr=False)
@@ -203,7 +213,7 @@ NOTHING, WRONG = Credentials(Kind.NOTHING), Credentials(Kind.WRONG)
 
 
 def credentials_of(headers: Headers, scheme: str) -> Credentials:
-    """Return the credentials in the headers of a request."""
+    """Return the credentials in the headers of a request; a key takes precedence over a cookie."""
     found = list(headers)
     keys = list(_keys(value.decode("latin-1") for name, value in found if name == b"authorization"))
     if len(keys) > 1:
@@ -220,7 +230,7 @@ def credentials_of(headers: Headers, scheme: str) -> Credentials:
 
 
 def _keys(values: Iterable[str]) -> Iterator[str]:
-    """Yield the bearer keys of Authorization headers; other schemes are for a proxy's login."""
+    """Yield the bearer tokens in Authorization headers; other schemes, for proxies, are ignored."""
     for value in values:
         scheme, _, key = value.partition(" ")
         if scheme.lower() == BEARER:
@@ -233,11 +243,11 @@ def _cookies(values: Iterable[str], wanted: str) -> list[str]:
 
 
 PASSED_ON = (b"forwarded", b"x-forwarded-for", b"x-real-ip", b"via")
-"""Headers added by proxies; a forwarded request may come from any computer."""
+"""Names of headers that proxies add; a request with such a header may come from any computer."""
 
 
 def is_from_here(scope: Scope) -> bool:
-    """Whether a request comes from this computer and not through a proxy."""
+    """Whether a request comes directly from this computer, not through a proxy."""
     client = scope.get("client")
     if client is None or not is_loopback(str(client[0])):
         return False
@@ -251,11 +261,11 @@ class Caller:
     Parameters
     ----------
     identity
-        Identity of the caller; None if unauthenticated.
+        Identity of the caller; None without valid credentials if a login is required.
     shown
         Credentials in the request, valid or not.
     must_log_in
-        Whether requests from the caller's address require a login.
+        Whether requests from the caller's address require a login or key.
     """
 
     identity: Identity | None
@@ -264,16 +274,18 @@ class Caller:
 
 
 class Authenticator:
-    """Asynchronous authentication of callers; blocking operations run in threads.
+    """Authenticator of callers, with coroutines that run blocking operations in threads.
 
     Parameters
     ----------
     store
-        Accounts, sessions and keys.
+        Database of accounts, sessions and keys.
     local_role
-        Role of callers on this computer without credentials; None if they must log in.
+        Role of callers on this computer without credentials; None if these callers must log in.
     hashing
         Password hasher; default: argon2id with the current parameters.
+    limits
+        Maximum durations of sessions; default values if None.
     """
 
     def __init__(
@@ -289,7 +301,7 @@ class Authenticator:
         self.people, self.work = AccountService(store, self._hashing), AccessThreads()
 
     async def caller(self, scope: Scope) -> Caller:
-        """Identify the sender of a request.
+        """Return the caller of a request, identified by credentials or address.
 
         Raises
         ------
@@ -324,7 +336,7 @@ class Authenticator:
         await self.work.run(lambda: self._checker.log_out(token))
 
     async def set_up(self, token: str, name: str, password: str) -> bool:
-        """Create the first account, an admin; return whether the token was valid.
+        """Create the first account, an administrator; return False if the token is invalid.
 
         Raises
         ------
@@ -337,7 +349,7 @@ class Authenticator:
         )
 
     async def offer_set_up(self) -> str | None:
-        """Return a set-up token for the first account; None if no set-up is needed."""
+        """Return a token for creating the first account; None if no account needs to be created."""
         if self.local_role is Role.ADMIN:
             return None
         now_ns = self.clock.now_ns()

@@ -9,17 +9,17 @@ from threading import Lock
 NS_PER_S = 1_000_000_000
 MAX_REMEMBERED = 4096
 IPV6_NETWORK_BITS = 64
-"""Length of the IPv6 prefix that identifies one client, bits."""
+"""Length of the IPv6 address prefix that counts as one client, bits."""
 
 
 @dataclass(frozen=True)
 class WaitRule:
-    """Parameters of an exponential backoff.
+    """Rule of an exponential backoff: wait after a number of failures.
 
     Parameters
     ----------
     n_free
-        Number of attempts without a wait; then the wait is 1 s and doubles with each failure.
+        Number of failures from which there is a wait: 1 s at first, doubled by each failure.
     longest_s
         Maximum wait, s.
     forget_s
@@ -31,7 +31,7 @@ class WaitRule:
     forget_s: float = 3600.0
 
     def wait_ns(self, n_failures: int) -> int:
-        """Return the wait after a number of consecutive failures, ns."""
+        """Return the wait until the next attempt after a number of consecutive failures, ns."""
         if n_failures < self.n_free:
             return 0
         doubled_s = 2.0 ** min(n_failures - self.n_free, 30)
@@ -39,27 +39,30 @@ class WaitRule:
 
 
 ACCOUNT_RULE = WaitRule(n_free=5, longest_s=60.0)
-"""Backoff of an account; short, so that failures of attackers do not lock out its owner."""
+"""Backoff for an account; waits are short, so that attackers do not lock out the owner."""
 
 PEER_RULE = WaitRule(n_free=10, longest_s=900.0)
-"""Backoff of an address; it tolerates more failures, since a control room may share one address."""
+"""Backoff for an address; more failures are free, since a control room may share one address."""
 
 
 @dataclass(frozen=True)
 class Failures:
-    """Number of consecutive failures, and time of the newest failure."""
+    """Number of consecutive failed logins, and monotonic time of the newest one, ns."""
 
     number: int
     newest_ns: int
 
 
 class Backoff:
-    """Thread-safe backoff of logins, with a limited number of remembered failures.
+    """Thread-safe backoff of logins by account and by client address; all times are monotonic.
 
-    Failures at other addresses do not delay an account at an address from which it has logged in
-    since the service started.
+    If an account has logged in from an address since the service started, failures at other
+    addresses do not delay its next login from this address.
 
-    All times are monotonic.
+    Parameters
+    ----------
+    max_remembered
+        Maximum number of accounts, and of addresses, whose failures are stored.
     """
 
     def __init__(
@@ -75,11 +78,10 @@ class Backoff:
         self._max_remembered = max_remembered
 
     def attempt(self, name: str, peer: str, now_ns: int) -> float:
-        """Return the wait before a login may be tried, s; 0 if it may be tried now.
+        """Return the time until a login may be attempted, s; if it is 0, count the attempt.
 
         An attempt counts as a failure until it succeeds, so that concurrent attempts all count.
-        Unknown names count too, so that waits do not reveal which accounts exist. An attempt that
-        must wait does not count.
+        Unknown names count too, so that waits do not reveal which accounts exist.
         """
         place = client_of(peer)
         with self._lock:
@@ -115,7 +117,7 @@ class Backoff:
 
 
 class FailureCounts:
-    """Failures by account or by address; the entry that is unchanged longest is evicted first."""
+    """Numbers of failures by account or by address; the least recently changed is evicted first."""
 
     def __init__(self, rule: WaitRule, max_remembered: int) -> None:
         self._rule, self._max_remembered = rule, max_remembered
@@ -125,7 +127,7 @@ class FailureCounts:
         return len(self._failures)
 
     def wait(self, key: Hashable, now_ns: int) -> int:
-        """Return the time until the next attempt is allowed, ns; 0 if it is allowed now."""
+        """Return the time until an attempt by an account or address is allowed, ns; 0 if now."""
         found = self._recent(key, now_ns)
         if found is None:
             return 0
@@ -157,7 +159,7 @@ class FailureCounts:
 
 
 def client_of(peer: str) -> str:
-    """Return the client of a peer address: IPv4 address, IPv6 network, or the text itself."""
+    """Return the client of a network address: IPv4 address, IPv6 network, or the text itself."""
     try:
         address = ip_address(peer.partition("%")[0])
     except ValueError:

@@ -1,4 +1,4 @@
-"""Permissions that routes declare; a missing declaration prevents the start of the service."""
+"""Declaration of the permission that a route requires; a route without one is an error."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from service.store.access.identities import Permission
 
 
 class Reach(StrEnum):
-    """Units that a route concerns if its path contains no unit."""
+    """Units that a route concerns, if the path of the route contains no unit."""
 
     PLANT = "plant"
-    """All units; a key that is limited to some units is refused."""
+    """All units; an API key that is limited to some units is refused."""
 
     NO_UNIT = "no_unit"
-    """No unit; a key that is limited to some units can only read."""
+    """No unit; an API key that is limited to some units can only read."""
 
     ASKED = "asked"
     """Unit of the query parameter ``unit``; all units if the parameter is absent."""
@@ -29,38 +29,44 @@ class Reach(StrEnum):
 
 @dataclass(frozen=True)
 class Needs:
-    """Permission and reach that a route requires; the permission of an open route is None."""
+    """Requirements of a route: permission, and units for which the permission must be valid.
+
+    Parameters
+    ----------
+    permission
+        Required permission; None for an open route, which requires no login.
+    """
 
     permission: Permission | None
     reach: Reach = Reach.PLANT
 
     async def __call__(self) -> None:
-        """Do nothing; `service.api.auth.gate` enforces the declaration."""
+        """Do nothing as a dependency; `service.api.auth.gate` checks the permission."""
 
 
 def needs(permission: Permission, reach: Reach = Reach.PLANT) -> Any:
-    """Return a dependency that declares the permission of a route or of all routes of a router."""
+    """Return a dependency that declares the permission for a route or a whole router."""
     return Depends(Needs(permission, reach))
 
 
 OPEN: Any = Depends(Needs(None, Reach.NO_UNIT))
-"""Dependency that declares an open route."""
+"""Dependency that declares an open route, which requires no login."""
 
 
 def subject_router(
     path: str, tag: str, permission: Permission = Permission.READ, reach: Reach = Reach.PLANT
 ) -> APIRouter:
-    """Return a router for one subject; its routes may override the declared permission."""
+    """Return a router for paths below ``/api/v1`` with a permission, which routes may override."""
     return APIRouter(prefix=f"/api/v1{path}", tags=[tag], dependencies=[needs(permission, reach)])
 
 
 class UndeclaredRouteError(Exception):
-    """Raised if a route has no declaration or occurs twice; the message names the route."""
+    """Raised if a route declares no permission or occurs twice; the message names the route."""
 
 
 @dataclass(frozen=True)
 class Declared:
-    """Operation of the API: method, path, route and requirements."""
+    """Operation of the API: HTTP method, path template, route and requirements."""
 
     method: str
     path: str
@@ -69,7 +75,7 @@ class Declared:
 
     @property
     def operation(self) -> str:
-        """Name of the operation: method and path."""
+        """Name of the operation: method and path template, such as ``GET /livez``."""
         return f"{self.method} {self.path}"
 
     @property
@@ -90,7 +96,7 @@ class Declared:
 
 
 def declared(app: FastAPI) -> Mapping[str, Declared]:
-    """Return the operations of an application with their requirements, by method and path.
+    """Return the operations of an application, by name (method and path template).
 
     The declaration of a route overrides the declaration of its router.
 
@@ -111,7 +117,7 @@ def allowed_methods(operations: Iterable[Declared], path: str) -> list[str]:
     """Return the allowed HTTP methods of a path; an empty list for an unknown path.
 
     If several path templates match, such as `/x/{version}` and `/x/freeze`, the template with
-    fewest parameters applies.
+    the fewest parameters applies.
     """
     fitting = [operation for operation in operations if operation.matches(path)]
     n_parameters = min((operation.path.count("{") for operation in fitting), default=0)

@@ -1,4 +1,4 @@
-"""Middleware that authenticates callers, and the check of their permissions by route."""
+"""Authentication of callers by middleware, and check of the permission for each route."""
 
 from collections.abc import Callable, Iterable, Mapping
 from urllib.parse import urlsplit
@@ -17,7 +17,7 @@ SAFE = ("GET", "HEAD", "OPTIONS")
 """Safe HTTP methods, which change no state."""
 
 OWN_SITES = (b"same-origin", b"none")
-"""Values of `Sec-Fetch-Site` in requests of dashboard pages and of typed addresses."""
+"""Accepted values of the header `Sec-Fetch-Site`: own pages, and addresses typed by the user."""
 
 
 def is_foreign(scheme: str, headers: Iterable[tuple[bytes, bytes]], requires_origin: bool) -> bool:
@@ -28,7 +28,7 @@ def is_foreign(scheme: str, headers: Iterable[tuple[bytes, bytes]], requires_ori
     Parameters
     ----------
     scheme
-        Scheme of the request.
+        Scheme of the request, "http" or "https".
     requires_origin
         Whether a request without headers ``Origin`` and ``Sec-Fetch-Site`` counts as foreign.
     """
@@ -57,17 +57,17 @@ def _is_own(origin: bytes, scheme: str, hosts: list[bytes]) -> bool:
 
 
 BEARER_ONLY = {"WWW-Authenticate": 'Bearer realm="padwatch"'}
-"""Header of answers with status 401; browsers open no login dialog for the scheme Bearer."""
+"""Header of answers with status 401; the scheme Bearer opens no login dialog in browsers."""
 
 
 def not_logged_in() -> ProblemError:
-    """Return the error for an unauthenticated request, status 401."""
+    """Return the error with status 401 for an unauthenticated request."""
     detail = "log in, or send a key that is valid"
     return ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
 
 
 def not_this_unit() -> ProblemError:
-    """Return the error for a key that is not valid for the requested unit, status 403."""
+    """Return the error with status 403 for an API key that is not valid for the requested unit."""
     detail = "this key is valid for some units only; request one of them"
     return ProblemError(403, "Not allowed", detail)
 
@@ -75,16 +75,16 @@ def not_this_unit() -> ProblemError:
 CHANGE_PASSWORD = "POST /api/v1/session/password"  # noqa: S105  an operation
 
 CALLER = "caller"
-"""Key of the caller in the ``state`` of a request scope."""
+"""Key under which the ``state`` of an ASGI scope contains the caller."""
 
 
 class Gate:
-    """ASGI middleware that authenticates callers; unauthenticated callers reach only open routes.
+    """ASGI middleware that authenticates callers, and protects routes that are not open.
 
     Parameters
     ----------
     declared
-        Function that returns the operations of the application with their requirements.
+        Function that returns the operations of the application, with their requirements, by name.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Gate:
         self._app, self._declared, self._desk = app, declared, authenticator
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request, or answer with a problem if the caller is not admitted."""
+        """Forward a request, or answer with a problem document if the caller is not admitted."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -128,7 +128,7 @@ class Gate:
 
 
 def _require_own_page(scope: Scope, caller: Caller) -> None:
-    """Raise an error if a page of another origin requests a change."""
+    """Raise a problem of status 403 if a page of another origin requests a change."""
     if scope["method"] in SAFE or caller.shown.kind is Kind.KEY:
         return
     requires_origin = caller.shown.kind is not Kind.NOTHING
@@ -138,18 +138,19 @@ def _require_own_page(scope: Scope, caller: Caller) -> None:
 
 
 def caller_of(request: Request) -> Caller:
-    """Return the caller of a request."""
+    """Return the caller of a request, as identified by `Gate`."""
     caller: Caller = request.scope["state"][CALLER]
     return caller
 
 
 async def require_declared(request: Request) -> None:
-    """Check the permission that a route declares; a dependency of all routes.
+    """Check that the caller has the permission that the route declares; dependency of all routes.
 
     Raises
     ------
     ProblemError
-        If the caller is not authenticated, or its role or units are insufficient.
+        With status 401 if the caller is not authenticated; 403 if the role or units of the caller
+        are not sufficient.
     """
     operation = f"{request.method} {request.scope['route'].path}"
     needed = request.app.declared[operation].needs
@@ -175,7 +176,7 @@ async def require_declared(request: Request) -> None:
 
 
 def identity_of(request: Request) -> Identity:
-    """Return the identity of an authenticated caller; otherwise raise an error."""
+    """Return the identity of the caller; raise a problem of status 401 without an identity."""
     identity = caller_of(request).identity
     if identity is None:
         raise not_logged_in()
@@ -183,7 +184,7 @@ def identity_of(request: Request) -> Identity:
 
 
 def _unit_of(parameters: Mapping[str, str]) -> str | None:
-    """Return the unit in the path, also as a part of an alarm identifier; None without a unit."""
+    """Return the unit in the path, or in an alarm identifier in the path; None without a unit."""
     if "unit" in parameters:
         return parameters["unit"]
     if "alarm" in parameters:
@@ -192,19 +193,19 @@ def _unit_of(parameters: Mapping[str, str]) -> str | None:
 
 
 def _unit_asked(request: Request) -> str | None:
-    """Return the unit in the query; None if the query contains no unit or several units."""
+    """Return the unit in the query parameter ``unit``; None without it, and for several values."""
     units = request.query_params.getlist("unit")
     return units[0] if len(units) == 1 else None
 
 
 def actor_or(given: str | None) -> str:
-    """Return the name of the actor: authenticated name, else given name, else `LOCAL`."""
+    """Return the name of the actor: authenticated name, else the name `given`, else `LOCAL`."""
     return acting().actor or given or LOCAL
 
 
 async def name_caller(request: Request) -> None:
-    """Set the caller as the actor of audit entries, also for callers without a login.
+    """Record the caller as the actor of the following audit entries, also without a login.
 
-    The function is a coroutine, since a plain dependency runs in a thread with a separate context.
+    This is a coroutine, since FastAPI runs plain functions in threads with separate contexts.
     """
     name_actor(identity_of(request).actor)

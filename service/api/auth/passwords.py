@@ -25,7 +25,7 @@ PARALLELISM = 4
 """Argon2id parameters, second recommendation of RFC 9106, section 4: 3 passes, 64 MiB, 4 lanes."""
 
 MAX_AT_ONCE = 2
-"""Maximum number of hashes computed concurrently; it limits the use of memory and cores."""
+"""Maximum number of concurrently computed hashes, which limits the use of memory and cores."""
 
 NO_ACCOUNT = "no account has this password"
 
@@ -40,14 +40,15 @@ def plant_hasher() -> PasswordHasher:
 
 
 def new_password(written: str, name: str) -> str:
-    """Check a new password of an account; return it in Unicode normal form.
+    """Check a new password of an account; return the password in Unicode normal form NFKC.
 
     The rules require length, but no classes of characters and no expiry (NIST SP 800-63B, 3.1.1).
 
     Raises
     ------
     PasswordRefusedError
-        If it is too short or too long, has too few different characters, or contains the name.
+        If the password is too short or too long, has too few different characters, or contains the
+        name of the account.
     """
     password = _normal(written)
     if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
@@ -62,7 +63,7 @@ def new_password(written: str, name: str) -> str:
 
 
 class Hashing:
-    """Password hasher that limits the number of concurrent computations.
+    """Password hasher with a limit on the number of concurrent computations.
 
     Parameters
     ----------
@@ -75,18 +76,19 @@ class Hashing:
         self._places = BoundedSemaphore(MAX_AT_ONCE)
 
     def prepare(self) -> None:
-        """Compute the dummy hash for unknown accounts, so that the first refusal is not slower."""
+        """Compute in advance the hash that `verify` uses for unknown accounts."""
         _ = self._unused_hash
 
     def hash(self, password: str) -> str:
-        """Return a salted hash of a password."""
+        """Return a salted argon2id hash of a password."""
         with self._places:
             return self._hasher.hash(_bytes(password))
 
     def verify(self, stored: str | None, password: str) -> bool:
-        """Whether a password matches a stored hash; False after the same time if the hash is None.
+        """Whether a password matches a stored hash.
 
-        A password above the maximum length is truncated before hashing and does not match.
+        Without a hash, the answer is False after the same computing time. A password above the
+        maximum length never matches.
         """
         # normalise before truncation: one character may have several encodings
         tried = _bytes(_normal(password)[: MAX_LENGTH + 1])
@@ -112,17 +114,17 @@ def _normal(password: str) -> str:
 
 
 def _bytes(password: str) -> bytes:
-    """Return the bytes of a password for hashing; lone surrogates, valid in JSON, are allowed."""
+    """Return the bytes of a password for hashing, also with lone surrogates, as JSON allows."""
     return _normal(password).encode("utf-8", "surrogatepass")
 
 
 log = structlog.get_logger()
 
 MAX_WAITING = 16
-"""Maximum number of running and queued hashes; each takes about a third of a second."""
+"""Maximum number of running and queued hash computations; each takes about 0.3 s."""
 
 MAX_KNOWN_WAITING = 8
-"""Additional queue places for accounts that have logged in before from the same address."""
+"""Number of further queue places for accounts that have logged in from the same address."""
 
 LOOKUP_THREADS = 2
 
@@ -133,7 +135,7 @@ T = TypeVar("T")
 
 
 class TooManyLoginsError(Exception):
-    """Raised if the queue of passwords to hash is full."""
+    """Raised if the queue of hash computations is full."""
 
 
 class AccessThreads:
@@ -148,7 +150,7 @@ class AccessThreads:
         self._note_places = BoundedSemaphore(MAX_NOTES)
 
     async def run(self, look: Callable[[], T]) -> T:
-        """Run a short store operation in a thread; return its result."""
+        """Run a short database operation in a thread; return its result."""
         return await asyncio.wrap_future(self._lookups.submit(copy_context().run, look))
 
     async def run_hashing(self, work: Callable[[], T], is_known: bool = True) -> T:
@@ -157,7 +159,7 @@ class AccessThreads:
         Parameters
         ----------
         is_known
-            Whether the account has logged in before from the same address.
+            Whether the account has logged in from the same address, and may use further places.
 
         Raises
         ------
@@ -174,12 +176,12 @@ class AccessThreads:
         return await asyncio.wrap_future(running)
 
     def close(self) -> None:
-        """Shut down the thread pools and cancel queued work; running work finishes soon."""
+        """Shut down the thread pools without waiting; cancel queued work."""
         for threads in (self._lookups, self._hashes, self._notes):
             threads.shutdown(wait=False, cancel_futures=True)
 
     def note(self, write: Callable[[], None]) -> None:
-        """Run a write in a thread without waiting for it; a failure is logged."""
+        """Queue a write of a last-use time without waiting; drop it if the queue is full."""
         if self._note_places.acquire(blocking=False):
             running = self._notes.submit(_tried, write)
             running.add_done_callback(lambda _: self._note_places.release())

@@ -1,4 +1,4 @@
-"""Changes of accounts and API keys, and creation of the first account."""
+"""Creation and change of accounts and API keys."""
 
 from collections.abc import Sequence
 
@@ -22,12 +22,12 @@ SET_UP_S = 3600.0
 
 
 class AccountService:
-    """Changes of accounts. Its methods block: call them from a thread.
+    """Service that creates and changes accounts; its methods block.
 
     Parameters
     ----------
     store
-        Accounts, sessions and keys.
+        Database of accounts, sessions and keys.
     """
 
     def __init__(self, store: AccessStore, hashing: Hashing) -> None:
@@ -36,7 +36,7 @@ class AccountService:
     def add(
         self, name: str, role: Role, password: str, now_ns: int, must_change: bool = False
     ) -> str:
-        """Add an account; return its normalised name.
+        """Add an account; return the normalised login name.
 
         Parameters
         ----------
@@ -58,7 +58,7 @@ class AccountService:
     def set_password(
         self, name: str, password: str, now_ns: int, must_change: bool = False
     ) -> None:
-        """Change a password; all sessions of the account end.
+        """Change the password of an account, and end all sessions of the account.
 
         Parameters
         ----------
@@ -76,21 +76,21 @@ class AccountService:
         self._store.accounts.set_password(name, hashed, now_ns, must_change)
 
     def offer_set_up(self, now_ns: int) -> str | None:
-        """Return a new set-up token for the first account; None if an account exists.
+        """Return a new token for creating the first account; None if an account exists.
 
-        An earlier token becomes invalid.
+        Earlier tokens become invalid.
         """
         token = new_token()
         expires_ns = now_ns + round(SET_UP_S * NS_PER_S)
         return token if self._store.set_up.offer(digest(token), expires_ns) else None
 
     def set_up(self, token: str, name: str, password: str, now_ns: int) -> bool:
-        """Create the first account, an admin; return whether the token was valid.
+        """Create the first account, an administrator; return False if the token is invalid.
 
         Raises
         ------
         NameRefusedError, PasswordRefusedError
-            If the name or password is rejected; the token remains valid then.
+            If the name or password is rejected; the token then remains valid.
         """
         name = account_name(name)
         password = new_password(password, name)
@@ -103,7 +103,14 @@ class AccountService:
 def create_key(
     store: AccessStore, name: str, role: Role, units: Sequence[str], days: int, now_ns: int
 ) -> tuple[ApiKey, str]:
-    """Create an API key; return its stored record and the complete key, which is not stored.
+    """Create an API key; return the stored record and the complete key, which is not stored.
+
+    Parameters
+    ----------
+    units
+        Units for which the key is valid; empty for all units.
+    days
+        Validity period, days.
 
     Raises
     ------

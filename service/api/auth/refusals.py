@@ -1,4 +1,4 @@
-"""Audit entries of refused requests, with a rate limit."""
+"""Audit entries for refused requests, with a rate limit."""
 
 import asyncio
 import json
@@ -16,19 +16,19 @@ from service.store.port import StoreError
 log = structlog.get_logger()
 
 N_AT_ONCE = 20
-"""Burst limit: number of refusals in quick succession that are all recorded."""
+"""Burst limit: maximum number of refusals in quick succession that are recorded."""
 
 SECONDS_EACH = 30.0
 """Time after which one more refusal may be recorded, s: at most 2,880 a day."""
 
 
 class Refusals:
-    """Writer of refused requests to the audit trail; above a rate limit they are only counted.
+    """Writer of audit entries for refused requests; above a rate limit, refusals are only counted.
 
     Parameters
     ----------
     audit
-        Audit trail.
+        Database of the audit trail.
     """
 
     def __init__(self, audit: AuditStore, clock: Clock) -> None:
@@ -37,7 +37,15 @@ class Refusals:
         self.n_more = 0
 
     async def note(self, deed: AuditAction, status: int) -> None:
-        """Write a refusal to the audit trail; above the rate limit, count it for the next entry."""
+        """Record a refused request; above the rate limit, count it for the next entry.
+
+        Parameters
+        ----------
+        deed
+            Audit entry without the status.
+        status
+            HTTP status of the answer.
+        """
         if not self._allowance.take(self._clock.monotonic_s()):
             self.n_more += 1
             return
@@ -54,23 +62,23 @@ class Refusals:
 REFUSED = (401, 403, 409, 413, 422, 429)
 
 MAX_PROBLEM = 8192
-"""Maximum number of bytes of a problem document that are read."""
+"""Maximum size of a problem document that is read for the audit entry, bytes."""
 
 
 class AuditTrail:
-    """ASGI middleware that sets the client of audit entries and records refused changes.
+    """ASGI middleware that gives audit entries the client address, and records refused changes.
 
     Parameters
     ----------
     refusals
-        Writer of refused requests; it receives those whose method is not safe.
+        Writer of audit entries for refused requests.
     """
 
     def __init__(self, app: ASGIApp, refusals: Refusals, clock: Clock) -> None:
         self._app, self._refusals, self._clock = app, refusals, clock
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request, and record it if it is refused."""
+        """Forward a request; record it if it would change state and is refused."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -95,7 +103,7 @@ class AuditTrail:
 
 
 class _Answer:
-    """Forwarder of an answer that keeps its status and the problem document of a refusal."""
+    """Forwarder of one answer, which keeps the status and, for a refusal, the problem document."""
 
     def __init__(self, send: Send) -> None:
         self._send = send

@@ -1,4 +1,4 @@
-"""Routes for login, logout, change of the own password, and creation of the first account."""
+"""Routes for login, logout, password change, and creation of the first account."""
 
 import asyncio
 from contextlib import suppress
@@ -33,46 +33,46 @@ PermissionName = Literal["read", "act_on_alarms", "change_measuring", "read_audi
 
 
 class SessionModel(ApiModel):
-    """Identity and permissions of the caller."""
+    """Identity and permissions of the caller, and whether a login is required."""
 
     login_required: bool
-    """Whether this client must log in to read data. Changes always require a login, except in the
+    """Whether this client must log in to read data; changes always require a login, except in the
     demonstration."""
 
     set_up_needed: bool
-    """Whether the first account must still be created."""
+    """Whether no account exists, so that the first account must be created."""
 
     password_change_needed: bool
-    """Whether the caller must first change the password, which an administrator has set."""
+    """Whether the caller must change the password, because an administrator has set it."""
 
     name: Annotated[str | None, Field(examples=["anna"])]
     """Name of the account or key; null without a login."""
 
     role: Annotated[RoleName | None, Field(examples=["operator"])]
-    """Role of the caller; null if a login is needed. Local callers without a login are viewers."""
+    """Role of the caller; null if the caller must log in first."""
 
     permissions: Annotated[list[PermissionName], Field(examples=[["read", "act_on_alarms"]])]
-    """Permissions of the caller; empty if a login is needed."""
+    """Permissions of the caller; empty if the caller must log in first."""
 
 
 class LoginModel(RequestModel):
     """Request to log in."""
 
     name: LoginName
-    """Name of the account; not case-sensitive."""
+    """Login name; not case-sensitive."""
 
     password: Password
     """Password of the account."""
 
 
 class NewPasswordModel(RequestModel):
-    """Request to change the own password."""
+    """Request of a person to change the password of the own account."""
 
     password: Password
     """Current password."""
 
     new_password: Password
-    """New password: 12 to 256 characters, at least 6 different characters."""
+    """New password: 12 to 256 characters, at least 6 of them different."""
 
 
 class SetUpModel(RequestModel):
@@ -82,10 +82,10 @@ class SetUpModel(RequestModel):
     """Set-up token that the service printed when it started."""
 
     name: LoginName
-    """Name of the account: a-z 0-9 . _ @ -."""
+    """Login name, of the characters a-z 0-9 . _ @ -."""
 
     password: Password
-    """Password of the account: 12 to 256 characters, at least 6 different characters."""
+    """Password of the account: 12 to 256 characters, at least 6 of them different."""
 
 
 BEGUN, ENDED = "session.begun", "session.ended"
@@ -93,6 +93,13 @@ BEGUN, ENDED = "session.begun", "session.ended"
 
 async def record(audit: AuditStore, clock: Clock, action: str, name: str) -> None:
     """Record a login or logout in the audit trail.
+
+    Parameters
+    ----------
+    action
+        `BEGUN` or `ENDED`.
+    name
+        Name of the account.
 
     Raises
     ------
@@ -127,12 +134,12 @@ SET_UP_PROBLEMS = problem_responses(
 
 
 def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
-    """Return the router for sessions."""
+    """Return the router for sessions and for the creation of the first account."""
     router = APIRouter(prefix="/api/v1", tags=["access"])
 
     @router.get("/session", summary="The caller", dependencies=[OPEN])
     async def session(request: Request) -> SessionModel:
-        """Return the identity and permissions of the caller, and whether a login is needed."""
+        """Return identity and permissions of the caller, and whether a login is required."""
         return await session_model(caller_of(request), authenticator)
 
     @router.post(
@@ -143,7 +150,7 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
         dependencies=[OPEN],
     )
     async def log_in(request: Request, response: Response, asked: LoginModel) -> SessionModel:
-        """Start a session and set its cookie; an earlier session of the browser ends."""
+        """Log in: start a session and set its cookie; an earlier session of the browser ends."""
         logged_in = await _log_in(authenticator, request, asked.name, asked.password)
         await _end(authenticator, caller_of(request))
         await _record_login(context, authenticator, logged_in)
@@ -151,7 +158,7 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
 
     @router.delete("/session", summary="Log out", status_code=204, dependencies=[OPEN])
     async def log_out(request: Request, response: Response) -> None:
-        """End the session of the browser, if any, and delete its cookie."""
+        """Log out: end the session of the browser, if any, and delete the session cookie."""
         caller = caller_of(request)
         await _end(authenticator, caller)
         if caller.identity is not None and caller.identity.means is Means.SESSION:
@@ -169,7 +176,7 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
     async def change_password(
         request: Request, response: Response, asked: NewPasswordModel
     ) -> SessionModel:
-        """Change the own password; all sessions of the account end, and a new session starts."""
+        """Change the password of the caller; all earlier sessions end, and a new one starts."""
         identity = _person(identity_of(request))
         await _log_in(authenticator, request, identity.name, asked.password)
         new = identity.name, asked.new_password
@@ -189,7 +196,7 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
         dependencies=[OPEN],
     )
     async def set_up(request: Request, asked: SetUpModel) -> SessionModel:
-        """Create the first account, an admin, with the token printed by the service."""
+        """Create the first account, an administrator, with the token that the service printed."""
         with refusals_as_problems():
             is_made = await authenticator.set_up(asked.token, asked.name, asked.password)
         if not is_made:
@@ -219,7 +226,7 @@ async def _log_in(
 async def _record_login(
     context: Context, authenticator: Authenticator, logged_in: LoggedIn
 ) -> None:
-    """Record a login in the audit trail; if this fails, end the session."""
+    """Record a login in the audit trail; if recording fails, end the new session."""
     try:
         await record(context.store.audit, context.clock, BEGUN, logged_in.identity.name)
     except StoreError:
@@ -241,7 +248,7 @@ async def _begun(
 
 
 def _is_secure(request: Request) -> bool:
-    """Whether the browser uses HTTPS, also through a proxy that forwards requests over HTTP."""
+    """Whether the browser uses HTTPS, even if a proxy forwards its requests over HTTP."""
     return "https" in (request.url.scheme, request.headers.get("origin", "").partition(":")[0])
 
 
@@ -258,7 +265,7 @@ def _person(identity: Identity) -> Identity:
 
 
 async def session_model(caller: Caller, authenticator: Authenticator) -> SessionModel:
-    """Return the API model of a caller and its permissions."""
+    """Return the API model of a caller with its identity and permissions."""
     identity = caller.identity
     may_all = identity is not None and (identity.is_proven or identity.role is Role.ADMIN)
     needs_set_up = not may_all and not await authenticator.has_accounts()

@@ -10,11 +10,11 @@ from pathlib import Path
 
 
 class PortInUseError(Exception):
-    """Raised if a port or socket file cannot be opened; the message gives the reason."""
+    """Raised if a TCP port or Unix socket file cannot be opened; the message gives the reason."""
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Return a socket that listens on a TCP port.
+    """Return a socket that listens on a TCP port of an IPv4 or IPv6 address.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def url_of(listener: socket.socket, has_tls: bool = False) -> str:
-    """Return the URL of the service on a listening socket."""
+    """Return the URL of the service on a listening socket, or ``unix:PATH`` for a Unix socket."""
     if listener.family == socket.AF_UNIX:
         return f"unix:{listener.getsockname()}"
     host, port = listener.getsockname()[:2]
@@ -40,12 +40,12 @@ def url_of(listener: socket.socket, has_tls: bool = False) -> str:
 
 
 MODE = 0o660
-"""Mode of the socket file: access for padwatch's user and group; the proxy is in the group."""
+"""Mode of the socket file: access for the user padwatch and its group, with the proxy."""
 
 
 @contextmanager
 def socket_file(path: Path) -> Iterator[socket.socket]:
-    """Listen on a Unix socket file; its mode limits access, and the file is removed on exit.
+    """Return a context with a socket that listens on a Unix socket file, removed on exit.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def socket_file(path: Path) -> Iterator[socket.socket]:
 
 
 def _remove_stale(path: Path) -> None:
-    """Remove the socket file that a killed service left behind."""
+    """Remove a socket file on which no process listens, as after a crash; raise if it is in use."""
     try:
         mode = path.lstat().st_mode
     except OSError:
@@ -89,16 +89,16 @@ def _remove_stale(path: Path) -> None:
 
 
 class CertificateError(Exception):
-    """Raised if a certificate or key is unusable; the message gives the reason."""
+    """Raised if a TLS certificate or private key is unusable; the message gives the reason."""
 
 
 def server_tls(certificate: Path, key: Path) -> ssl.SSLContext:
-    """Return a server TLS context (TLS 1.2 or newer) for a certificate and its key.
+    """Return a TLS context of a server (TLS 1.2 or newer) for a certificate and its private key.
 
     Raises
     ------
     CertificateError
-        If a file is unreadable or invalid, or the key does not match.
+        If a file is unreadable or invalid, or the key does not match the certificate.
     """
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2

@@ -1,4 +1,4 @@
-"""ASGI middleware between the HTTP server and the application."""
+"""ASGI middleware between HTTP server and application: checks of hosts, bodies and load."""
 
 import asyncio
 import re
@@ -30,7 +30,7 @@ class HeadRequests:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request."""
+        """Forward a request; drop the body of the answer to a HEAD request."""
         if scope.get("method") != "HEAD":
             await self._app(scope, receive, send)
             return
@@ -50,15 +50,16 @@ LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 
 class KnownHosts:
-    """ASGI middleware that refuses requests for unknown hosts.
+    """ASGI middleware that refuses requests with an unknown host in the Host header.
 
-    A page of another site can resolve its own host name to 127.0.0.1 (DNS rebinding); the Host
-    header then still contains that name.
+    This prevents DNS rebinding, by which another site resolves its own host name to 127.0.0.1; its
+    requests contain that host name.
 
     Parameters
     ----------
     hosts
-        Accepted names and addresses without port, besides loopback and the server's address.
+        Accepted host names and addresses without port, in addition to loopback and the address of
+        the server.
     """
 
     def __init__(self, app: ASGIApp, hosts: Iterable[str]) -> None:
@@ -99,7 +100,7 @@ SECURITY_HEADERS = (
 
 
 class AddedHeaders:
-    """ASGI middleware that adds missing headers to all answers."""
+    """ASGI middleware that adds headers to all answers that do not contain them."""
 
     def __init__(self, app: ASGIApp, headers: Sequence[tuple[str, str]]) -> None:
         self._app, self._headers = app, headers
@@ -121,7 +122,7 @@ FOR, PROTO = b"x-forwarded-for", b"x-forwarded-proto"
 
 
 class TrustedProxy:
-    """ASGI middleware for a Unix socket: client address and scheme as sent by a trusted proxy."""
+    """ASGI middleware that takes client address and scheme from the headers of a trusted proxy."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -135,7 +136,7 @@ class TrustedProxy:
 
 
 def _last(scope: Scope, name: bytes) -> str:
-    """Return the last value of a list header; the proxy adds it, earlier values may be forged."""
+    """Return the last value of a list header, which the proxy added; empty without the header."""
     values = [value for found, value in scope["headers"] if found == name]
     return values[-1].decode("latin-1").rpartition(",")[2].strip() if values else ""
 
@@ -148,11 +149,11 @@ def _client(address: str) -> tuple[str, int] | None:
 
 
 TOKEN = re.compile(rb'"(?:[^"\\]++|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)
-"""Regular expression for a JSON string, terminated or not, or a bracket; it never backtracks."""
+"""Pattern of a JSON string, terminated or not, or of a bracket; matching never backtracks."""
 
 
 def is_deeper_than(limit: int, text: bytes) -> bool:
-    """Whether arrays and objects of a text, valid JSON or not, are nested deeper than a limit."""
+    """Whether arrays and objects in a JSON text, even an invalid one, exceed a nesting depth."""
     if text.count(b"[") + text.count(b"{") <= limit:
         return False  # true for all usual requests, and faster than scanning strings
     depth = 0
@@ -168,20 +169,20 @@ def is_deeper_than(limit: int, text: bytes) -> bool:
 
 
 class TooLargeError(Exception):
-    """Raised if a body exceeds the size limit."""
+    """Raised if a request body exceeds the size limit."""
 
 
 class WholeBodies:
-    """ASGI middleware that reads the whole body before it calls the application.
+    """ASGI middleware that receives and checks the whole request body before the application runs.
 
-    The deadlines of the connection limit the duration of reading.
+    The deadlines of `GuardedProtocol` limit the duration of receiving.
     """
 
     def __init__(self, app: ASGIApp, limits: HttpLimitSettings) -> None:
         self._app, self._limits = app, limits
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Read and check the body, then forward the request."""
+        """Receive and check the body, then forward the request, or refuse it."""
         try:
             body = await self._body(scope, receive)
         except TooLargeError:
@@ -229,7 +230,7 @@ def _declares_more(length: bytes, limit: int) -> bool:
 
 
 def _replayed(body: bytes, receive: Receive) -> Receive:
-    """Return a `receive` function for the body, then for further messages of the connection."""
+    """Return a `receive` function that gives the whole body first, then messages from `receive`."""
     whole: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
 
     async def given() -> Message:
@@ -239,9 +240,9 @@ def _replayed(body: bytes, receive: Receive) -> Receive:
 
 
 class BoundedAnswers:
-    """ASGI middleware that limits the number of concurrent requests and their duration.
+    """ASGI middleware that limits the number and duration of concurrent requests.
 
-    Both limits apply until the answer starts; then the deadlines of the connection apply.
+    Both limits apply until the answer starts; then the deadlines of `GuardedProtocol` apply.
     """
 
     def __init__(self, app: ASGIApp, limits: HttpLimitSettings) -> None:
@@ -250,7 +251,7 @@ class BoundedAnswers:
         self._deadlines: set[asyncio.Timeout] = set()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request; refuse it above the limit or if its answer does not start in time."""
+        """Forward a request; answer 503 above the limit, or if no answer starts in time."""
         if self._n_running >= self._limits.max_requests:
             await BUSY.send(scope, send)
             return
@@ -300,7 +301,7 @@ class BoundedAnswers:
 
 
 def guarded(answers: BoundedAnswers, limits: HttpLimitSettings, hosts: Iterable[str]) -> ASGIApp:
-    """Return `answers` wrapped by the middleware for bodies, hosts, headers and HEAD requests.
+    """Return `answers` inside the middleware for bodies, hosts, headers and HEAD requests.
 
     Bodies are read before requests are counted, so that slow clients do not exhaust the limit.
     """

@@ -25,14 +25,14 @@ from service.api.http.refusals import (
 from service.settings.processes import HttpLimitSettings
 
 MAX_UNSENT_BYTES = 64 * 1024 * 1024
-"""Maximum total of unsent bytes; above it, the connections with most of them are aborted."""
+"""Maximum total of unsent bytes, above which connections with the most such bytes are aborted."""
 
 MAX_PAUSE_S = 1.0
-"""Maximum time between sweeps that counts towards deadlines, s."""
+"""Maximum time between two deadline checks that counts towards deadlines, s."""
 
 
 class Connections:
-    """Open connections of a server, with limits on their number.
+    """Collection of the open connections of a server, with limits on their number.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Connections:
         return self._n_open
 
     def admit(self, connection: "GuardedProtocol") -> bool:
-        """Add a connection; return False if a limit is reached and no connection is idle."""
+        """Add a connection; return False if it is one too many, even after closing an idle one."""
         neighbours = self._of_peer[connection.peer]
         if len(neighbours) >= self.limits.max_connections_per_peer:
             has_room = _make_room(neighbours)
@@ -73,7 +73,7 @@ class Connections:
             del self._of_peer[connection.peer]
 
     def sweep(self) -> None:
-        """Close all connections that exceeded a deadline; called periodically."""
+        """Close all connections that have exceeded a deadline, or the limit of unsent bytes."""
         now_s = self.now_s()
         stalled_s = max(0.0, now_s - self._swept_s - MAX_PAUSE_S)
         self._swept_s = now_s
@@ -83,7 +83,7 @@ class Connections:
         self._relieve()
 
     def abort_all(self) -> None:
-        """Abort all connections."""
+        """Abort all connections without sending the remaining bytes."""
         for connection in self.all():
             connection.abort()
 
@@ -102,7 +102,7 @@ class Connections:
 
 
 def _make_room(connections: set["GuardedProtocol"]) -> bool:
-    """Close the longest idle connection; return whether any connection was idle.
+    """Close the connection that has been idle longest; return False if none is idle.
 
     Connections that never sent a request are closed first.
     """
@@ -115,16 +115,16 @@ def _make_room(connections: set["GuardedProtocol"]) -> bool:
 
 
 STOP_S = 2
-"""Time after which uvicorn cancels the remaining requests and logs tracebacks, s."""
+"""Time after the start of a shutdown at which uvicorn cancels the remaining requests, s."""
 
 
 class GuardedConfig(uvicorn.Config):
-    """Configuration of uvicorn, with the open connections and running requests.
+    """Configuration of uvicorn, which holds the middleware and the open connections.
 
     Parameters
     ----------
     hosts
-        Host names of the service besides loopback.
+        Accepted host names and addresses, in addition to loopback.
     now_s
         Function that returns the monotonic time for deadlines, s.
     """
@@ -157,13 +157,13 @@ class GuardedConfig(uvicorn.Config):
 
 
 MAX_PIPELINED = 8
-"""Maximum number of pipelined requests; browsers do not use pipelining."""
+"""Maximum number of pipelined requests on a connection; browsers do not use pipelining."""
 
 FRAMING_BYTES = 256 * 1024
-"""Maximum overhead of a chunked body, in addition to 8 bytes per byte of data."""
+"""Maximum number of bytes of a chunked body on the wire, in addition to 8 per byte of data."""
 
 PROGRESS_BYTES = 48 * 1024
-"""Minimum number of bytes that a client must read within ``unsent_s``."""
+"""Minimum number of bytes of an answer that a client must read within ``unsent_s``."""
 
 
 class Phase(Enum):
@@ -175,7 +175,7 @@ class Phase(Enum):
 
 
 class GuardedProtocol(HttpToolsProtocol):
-    """HTTP/1.1 connection with deadlines and size limits."""
+    """HTTP/1.1 connection of uvicorn with deadlines and size limits."""
 
     def __init__(
         self,
@@ -197,7 +197,7 @@ class GuardedProtocol(HttpToolsProtocol):
     # callbacks of the transport
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Add the connection to the open connections, or refuse it."""
+        """Add the connection to the open connections; answer 503 and close it above a limit."""
         super().connection_made(transport)
         self.peer = self.client[0] if self.client else ""
         if not self._all.admit(self):
@@ -211,7 +211,7 @@ class GuardedProtocol(HttpToolsProtocol):
         self._all.leave(self)
 
     def data_received(self, data: bytes) -> None:
-        """Parse received bytes; malformed or oversized requests end the connection."""
+        """Parse received bytes; a malformed or oversized request ends the connection."""
         self._unset_keepalive_if_required()
         if self._ignores_input:
             return
@@ -226,14 +226,14 @@ class GuardedProtocol(HttpToolsProtocol):
             self._check_sizes()
 
     def resume_writing(self) -> None:
-        """Reset the deadline of unsent bytes."""
+        """Reset the deadline for unsent bytes, and resume sending."""
         super().resume_writing()
         self._unsent_since_s = None
 
     # callbacks of the parser; feed_data raises HttpParserError for their exceptions
 
     def on_message_begin(self) -> None:
-        """Reset the state for a new request."""
+        """Reset the deadline and byte counts for a new request."""
         super().on_message_begin()
         if self._phase is not Phase.HEAD:
             self._enter(Phase.HEAD)
@@ -241,13 +241,13 @@ class GuardedProtocol(HttpToolsProtocol):
         self._refusal = NOT_HTTP
 
     def on_url(self, url: bytes) -> None:
-        """Append a part of the request target; limit its length."""
+        """Append a part of the request target; raise ValueError above the maximum length."""
         super().on_url(url)
         if len(self.url) > 1024 * self._limits.max_target_kb:
             self._stop(TARGET_TOO_LONG)
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """Append a header; limit the total size of headers."""
+        """Append a header; raise ValueError above the maximum total size, or for a trailer."""
         if self._phase is Phase.BODY:
             self._stop(NOT_HTTP)  # trailers are not supported
         super().on_header(name, value)
@@ -256,7 +256,7 @@ class GuardedProtocol(HttpToolsProtocol):
             self._stop(HEAD_TOO_LARGE)
 
     def on_headers_complete(self) -> None:
-        """Call the application with the request, or queue a pipelined request."""
+        """Start the application for the request, or queue a pipelined request."""
         if len(self.pipeline) >= MAX_PIPELINED:
             self._stop(NOT_HTTP)
         if not self.url.startswith(b"/"):
@@ -276,7 +276,7 @@ class GuardedProtocol(HttpToolsProtocol):
         self._enter(Phase.NOTHING)
 
     def on_response_complete(self) -> None:
-        """Restart the keep-alive time after an answer, which the client may not have read yet."""
+        """Start the keep-alive time after an answer, even if the client has not read it yet."""
         super().on_response_complete()
         self._unsent_since_s = None
         if self._phase is Phase.NOTHING:
@@ -300,13 +300,13 @@ class GuardedProtocol(HttpToolsProtocol):
             self._end(TOO_SLOW if self._phase is not Phase.NOTHING and self._n_wire else None)
 
     def extend_deadlines(self, seconds: float) -> None:
-        """Extend the deadlines by a time in which the server was stalled."""
+        """Extend the deadlines by the time for which the server was stalled, s."""
         self._since_s += seconds
         if self._unsent_since_s is not None:
             self._unsent_since_s += seconds
 
     def waiting_since(self) -> tuple[bool, float] | None:
-        """Return whether a request was ever received, and the start of the wait; None if busy."""
+        """Return whether any request was received, and the start of the idle time; None if busy."""
         is_answered = self._phase is Phase.NOTHING and self._is_answering()
         if is_answered or self.transport.is_closing():
             return None
@@ -317,7 +317,7 @@ class GuardedProtocol(HttpToolsProtocol):
         return self.transport.get_write_buffer_size()
 
     def close_idle(self) -> None:
-        """Close the idle connection to make room for a new connection."""
+        """Close this idle connection to make room for a new connection."""
         self._end(None)
 
     def abort(self) -> None:
@@ -327,7 +327,7 @@ class GuardedProtocol(HttpToolsProtocol):
         self.transport.abort()
 
     def shutdown(self) -> None:
-        """Shut the connection down; incomplete requests are not answered."""
+        """Close the connection after pending answers; an incomplete request is not answered."""
         if self._phase is Phase.BODY:
             self._end(None)
         else:
@@ -362,7 +362,7 @@ class GuardedProtocol(HttpToolsProtocol):
         raise ValueError(refusal.title)
 
     def _check_sizes(self) -> None:
-        """Limit the bytes in the parser: an endless header, or chunk framing without data."""
+        """End the connection if the head or the chunk framing of a request is too long."""
         if self._phase is Phase.HEAD and self._n_wire > 1024 * (
             self._limits.max_head_kb + self._limits.max_target_kb
         ):
@@ -371,7 +371,7 @@ class GuardedProtocol(HttpToolsProtocol):
             self._end(NOT_HTTP)
 
     def _refuse(self) -> None:
-        """Refuse a malformed request, or close the connection after pending answers."""
+        """Refuse a malformed request; while an answer is pending, only close after the answer."""
         if self._phase is Phase.HEAD and self._is_answering():
             self._answer_and_close()
         else:
@@ -385,7 +385,7 @@ class GuardedProtocol(HttpToolsProtocol):
             self.transport.close()
 
     def _end(self, refusal: Refusal | None) -> None:
-        """Close the connection; send the problem document first, if possible."""
+        """Close the connection; send the refusal first, if given and if an answer is possible."""
         self._ignores_input = True
         if refusal is not None and self._may_answer():
             self.transport.write(refusal.as_http(SECURITY_HEADERS))
@@ -393,7 +393,7 @@ class GuardedProtocol(HttpToolsProtocol):
         self.transport.close()
 
     def _drop_answers(self) -> None:
-        """Mark all unfinished requests as disconnected; uvicorn marks the newest only."""
+        """Mark all unfinished requests as disconnected; uvicorn marks only the newest request."""
         waiting = [cycle for cycle, _ in self.pipeline]
         self.pipeline.clear()
         for cycle in (self._running, self.cycle, *waiting):

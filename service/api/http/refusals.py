@@ -15,7 +15,13 @@ MAX_INSTANCE = 256
 
 @dataclass(frozen=True)
 class Refusal:
-    """Problem with a fixed text; an answer adds only the path of the request."""
+    """Refusal of a request: fixed text of the problem document.
+
+    Parameters
+    ----------
+    retry_after_s
+        Value of the header Retry-After, s; None omits the header.
+    """
 
     status: int
     title: str
@@ -23,7 +29,7 @@ class Refusal:
     retry_after_s: int | None = None
 
     def body(self, instance: str = "") -> bytes:
-        """Return the problem document as JSON."""
+        """Return the problem document as JSON; `instance` is the path of the request."""
         problem = {
             "type": "about:blank",
             "title": self.title,
@@ -35,14 +41,14 @@ class Refusal:
         return json.dumps(problem).encode()
 
     def headers(self, n_bytes: int) -> list[tuple[bytes, bytes]]:
-        """Return the headers for a document of `n_bytes` bytes."""
+        """Return the HTTP headers for a problem document of `n_bytes` bytes."""
         headers = [(b"content-type", MEDIA_TYPE), (b"content-length", b"%d" % n_bytes)]
         if self.retry_after_s is not None:
             headers.append((b"retry-after", b"%d" % self.retry_after_s))
         return headers
 
     def as_http(self, more: Sequence[tuple[str, str]]) -> bytes:
-        """Return the complete HTTP/1.1 answer, with the header ``Connection: close``."""
+        """Return the complete HTTP/1.1 answer, with further headers and ``Connection: close``."""
         body = self.body()
         line = b"HTTP/1.1 %d %s\r\n" % (self.status, HTTPStatus(self.status).phrase.encode())
         added = [(name.encode(), value.encode()) for name, value in more]
@@ -50,7 +56,7 @@ class Refusal:
         return line + b"".join(b"%s: %s\r\n" % header for header in headers) + b"\r\n" + body
 
     async def send(self, scope: Scope, send: Send) -> None:
-        """Send the problem document as answer to a request."""
+        """Send the problem document as the answer to an ASGI request."""
         # JSON escapes characters of the path beyond ASCII
         body = self.body(scope["path"])
         headers = self.headers(len(body))

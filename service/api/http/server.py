@@ -1,4 +1,4 @@
-"""HTTP server: uvicorn with deadlines, heartbeats and a bounded shutdown."""
+"""HTTP server: uvicorn with deadlines, heartbeats and a shutdown in bounded time."""
 
 import asyncio
 import socket
@@ -11,14 +11,14 @@ from service.api.http.protocol import STOP_S, Connections, GuardedConfig, Guarde
 from service.runtime.heartbeats import UNHEARD, Pulse
 
 SHUTDOWN_S = 1.0
-"""Time that open requests have to finish when the server stops, s."""
+"""Time after which unfinished requests are cancelled when the server stops, s."""
 
 SWEEP_TICKS = 5
-"""Period of connection sweeps, in uvicorn ticks of 0.1 s."""
+"""Period of the checks of connection deadlines, in uvicorn ticks of 0.1 s."""
 
 
 class GuardedServer(uvicorn.Server):
-    """Uvicorn with deadlines for connections and without signal handlers."""
+    """Uvicorn server with deadlines for connections and without signal handlers."""
 
     def __init__(self, config: GuardedConfig) -> None:
         super().__init__(config)
@@ -26,7 +26,7 @@ class GuardedServer(uvicorn.Server):
         self._pulse: Pulse = UNHEARD
 
     async def run_on(self, listener: socket.socket, pulse: Pulse) -> None:
-        """Serve requests on a listening socket until the server is stopped."""
+        """Serve requests on a listening socket until stopped; send heartbeats to `pulse`."""
         self._pulse = pulse
         await self.serve([listener])
 
@@ -64,14 +64,14 @@ class GuardedServer(uvicorn.Server):
         yield
 
     async def on_tick(self, counter: int) -> bool:
-        """Send a heartbeat, and sweep the connections periodically."""
+        """Send a heartbeat, check connection deadlines; return whether the server must stop."""
         self._pulse.beat()
         if counter % SWEEP_TICKS == 0:
             self.open.sweep()
         return await super().on_tick(counter)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Stop within a bounded time; clients that do not read their answers are disconnected."""
+        """Stop the server; after `SHUTDOWN_S`, cancel requests and abort all connections."""
         # give up before uvicorn cancels the tasks, which logs a traceback for each
         patience = asyncio.get_running_loop().call_later(SHUTDOWN_S, self._give_up)
         try:

@@ -65,7 +65,7 @@ AlarmIdText = Annotated[str, Field(examples=["U1:ujb_shaft_x:channel_not_ok"])]
 
 
 class HoldModel(ApiModel):
-    """Shelving or outage of an alarm."""
+    """Period in which an alarm is shelved or out of service."""
 
     actor: str
     """Person who shelved the alarm or took it out of service."""
@@ -74,10 +74,10 @@ class HoldModel(ApiModel):
     """Reason given by the person."""
 
     since: Time
-    """Start of the shelving or outage."""
+    """Start of the period."""
 
     until: Time | None
-    """End of the shelving or outage; null without a planned end."""
+    """Planned end of the period; null without a planned end."""
 
 
 class RaisedAtModel(ApiModel):
@@ -96,45 +96,46 @@ class RaisedAtModel(ApiModel):
     """Oil temperature, °C; null if unknown."""
 
     cell: CellModel | None
-    """Condition cell of these values; null if one of the values is unknown."""
+    """Cell of the grid of operating conditions; null if a coordinate of the cell is unknown."""
 
 
 class AlarmModel(ApiModel):
     """Alarm with its current state."""
 
     id: AlarmIdText
-    """Stable identifier: unit, subject and kind."""
+    """Stable identifier of the alarm: unit, subject and kind, separated by colons."""
 
     unit: str
-    """Unit; "plant" for alarms about the service itself."""
+    """Identifier of the unit; "plant" for alarms about the service itself."""
 
     subject: str
-    """Channel or bearing; "device" or "link" for the whole unit; for "plant", a part of the service
-    or the unit whose samples were lost."""
+    """Channel or bearing of the alarm; "device" or "link" if it concerns the whole unit; if `unit`
+    is "plant", a part of the service, or the unit whose samples were lost."""
 
     kind: AlarmKindName
     """Kind of alarm."""
 
     state: AlarmStateName
-    """State in the life cycle of ISA-18.2."""
+    """State of the alarm in the alarm life cycle of ISA-18.2."""
 
     level: Annotated[AlarmLevelName, ByName] | None
-    """Level of the alarm, which is its priority; null if the alarm is not active."""
+    """Level of the alarm, used as its priority; null if the alarm is not active."""
 
     is_active: bool
-    """Whether the alarm is active, also while it is hidden."""
+    """Whether the alarm is active; also true for a shelved, suppressed or out-of-service alarm."""
 
     is_acknowledged: bool
     """Whether the newest occurrence is acknowledged."""
 
     is_latched: bool
-    """Whether only the latch keeps the alarm active: the condition has cleared, a reset is due."""
+    """Whether the alarm is latched: its condition has cleared, but it is active until a reset."""
 
     is_chattering: bool
-    """Whether the alarm was raised too often in a short time, within the last ten minutes."""
+    """Whether the alarm was chattering in the last ten minutes: raised often in a short time."""
 
     occurrence: int
-    """Number of times the alarm was raised or rose in level; acknowledgements refer to it."""
+    """Number of the newest occurrence, to state in an acknowledgement; it increases by one when the
+    alarm is raised or rises in level."""
 
     raised: Time | None
     """Start of the newest occurrence."""
@@ -143,43 +144,44 @@ class AlarmModel(ApiModel):
     """Operating condition when the alarm was last raised; null if unknown or never raised."""
 
     condition: ConditionName
-    """Current condition; "unknown" without good data. An unknown condition is never a return to
-    normal: an active alarm stays active."""
+    """Condition of the alarm by the newest data; "unknown" without good data. An active alarm whose
+    condition becomes unknown stays active."""
 
     condition_reason: str
-    """Reason of the condition; "ok" without a fault."""
+    """Code of the reason for `condition`; "ok" without a fault."""
 
     value: Annotated[float | None, Field(examples=[163.2])]
-    """Value compared with the limit; while the condition is unknown, the last known value."""
+    """Value compared with the limit; the last known value while the condition is unknown; null
+    without a value."""
 
     limit: Annotated[float | None, Field(examples=[150.0])]
     """Limit; null for an alarm without a limit."""
 
     value_unit: Annotated[str | None, Field(examples=["µm 0-pk"])]
-    """Unit of value and limit."""
+    """Unit of value and limit; null for an alarm without a unit."""
 
     film: FilmConditionModel | None
-    """Condition of the newest film reading, for alarms of film stiffness: operating state and cell;
-    null for other alarms, and before the first reading."""
+    """Operating condition at the newest film reading, for alarms of film stiffness; null for other
+    alarms, and before the first reading."""
 
     suppressed_by: str | None
     """Reason why the alarm is suppressed by design; null if it is not suppressed."""
 
     shelf: HoldModel | None
-    """Shelving; null if the alarm is not shelved."""
+    """Current shelving of the alarm; null if the alarm is not shelved."""
 
     outage: HoldModel | None
-    """Outage; null if the alarm is in service."""
+    """Current period out of service; null if the alarm is in service."""
 
 
 class AlarmCountModel(ApiModel):
     """Counts of alarms by state."""
 
     n_active: int
-    """Number of alarms that are active and not hidden."""
+    """Number of active alarms that are not hidden (shelved, suppressed or out of service)."""
 
     n_danger: int
-    """Number of active alarms at level danger."""
+    """Number of these active alarms whose level is danger."""
 
     n_unacknowledged: int
     """Number of alarms that are not hidden and whose newest occurrence is unacknowledged."""
@@ -188,11 +190,11 @@ class AlarmCountModel(ApiModel):
     """Number of alarms that are shelved, suppressed or out of service."""
 
     n_unjudged: int
-    """Number of alarms that are not active and whose condition is unknown."""
+    """Number of alarms that are neither active nor hidden and whose condition is unknown."""
 
 
 class AlarmListModel(DatedAnswer):
-    """Alarms that are not normal, and alarms whose condition is unknown."""
+    """List of alarms that are not normal, and of normal alarms whose condition is unknown."""
 
     origin: OriginName
     """Origin of the data: live, or replay of a recording."""
@@ -204,14 +206,14 @@ class AlarmListModel(DatedAnswer):
     """Alarms that are not normal: unacknowledged first, danger before alert, newest first."""
 
     unjudged: list[AlarmModel]
-    """Alarms that were normal when last judged, and whose condition is unknown now."""
+    """Alarms that are in the normal state and whose condition is unknown."""
 
 
 class AlarmEventModel(ApiModel):
-    """Event of an alarm."""
+    """Event in the history of an alarm, such as a change of state or a comment."""
 
     id: int
-    """Number of the event in the store; later events have higher numbers."""
+    """Number of the event in the history of all alarms; later events have higher numbers."""
 
     alarm: AlarmIdText
     """Identifier of the alarm."""
@@ -220,7 +222,7 @@ class AlarmEventModel(ApiModel):
     """Identifier of the unit."""
 
     subject: str
-    """Subject of the alarm, such as a channel or bearing."""
+    """Subject of the alarm, such as the identifier of a channel or bearing."""
 
     kind: AlarmKindName
     """Kind of alarm."""
@@ -229,10 +231,10 @@ class AlarmEventModel(ApiModel):
     """Number of the event in the history of the alarm, from 1 without gaps."""
 
     change: AlarmChangeName
-    """Kind of change of the alarm by the event."""
+    """Kind of event."""
 
     level: Annotated[AlarmLevelName, ByName] | None
-    """Level after the event; for a return to normal, the level before it."""
+    """Level after the event; for a return to normal, the level before the return; null if none."""
 
     state_before: AlarmStateName
     """State of the alarm before the event."""
@@ -241,32 +243,32 @@ class AlarmEventModel(ApiModel):
     """State of the alarm after the event."""
 
     time: Time
-    """Time of the event: by the samples if they caused it, otherwise by the host clock."""
+    """Time of the event: sample time if samples caused it, otherwise time of the host clock."""
 
     occurrence: int
-    """Occurrence that the event belongs to."""
+    """Number of the occurrence of the alarm to which the event belongs."""
 
     value: float | None
-    """Value compared with the limit."""
+    """Value compared with the limit; null without a value."""
 
     limit: float | None
     """Limit; null for an alarm without a limit."""
 
     value_unit: str | None
-    """Unit of value and limit."""
+    """Unit of value and limit; null for an alarm without a unit."""
 
     actor: str
-    """Person who caused the event; empty if the change was automatic."""
+    """Person or key that caused the event; empty for an automatic change."""
 
     reason: str
-    """Reason of the event."""
+    """Reason for the event."""
 
     raised_at: RaisedAtModel | None
-    """Operating condition when the occurrence was raised; null if unknown."""
+    """Operating condition when the alarm was raised; null if unknown."""
 
 
 class AlarmEventsModel(ApiModel):
-    """Page of alarm events."""
+    """One page of the list of alarm events."""
 
     origin: OriginName
     """Origin of the data: live, or replay of a recording."""
@@ -275,7 +277,7 @@ class AlarmEventsModel(ApiModel):
     """Alarm events, newest first."""
 
     next_before: int | None
-    """Value of ``before`` for the next page; null on the last page."""
+    """Value of the parameter ``before`` for the next page; null on the last page."""
 
 
 def alarm_list_model(
@@ -295,7 +297,7 @@ def alarm_list_model(
 
 
 def alarm_model(engine: AlarmList, films: FilmState, alarm: Alarm) -> AlarmModel:
-    """Return the API model of an alarm."""
+    """Return the API model of an alarm with its current state."""
     identity, condition = alarm.identity, alarm.condition
     is_judged = engine.is_judged(alarm)
     unseen = "not_connected" if condition.is_known else str(condition.reason)
@@ -315,7 +317,10 @@ def alarm_model(engine: AlarmList, films: FilmState, alarm: Alarm) -> AlarmModel
 
 
 def _film(films: FilmState, identity: AlarmIdentity) -> FilmConditionModel | None:
-    """Return the condition of the newest reading of a film; None for other alarms."""
+    """Return the operating condition at the newest reading of the film of an alarm.
+
+    None if the alarm is not about a film, and before the first reading.
+    """
     if identity.kind not in FILM_KINDS:
         return None
     news, rules = films.newest(identity.unit, identity.subject), films.rules(identity.unit)
@@ -325,7 +330,7 @@ def _film(films: FilmState, identity: AlarmIdentity) -> FilmConditionModel | Non
 
 
 def grid_of(films: FilmState) -> CellGrid:
-    """Return the grid of condition cells, which all units share."""
+    """Return the grid of operating-condition cells, which is common to all units."""
     return films.settings.baseline.settings().grid
 
 
@@ -349,7 +354,7 @@ def _raised_at(point: OperatingPoint | None, grid: CellGrid) -> RaisedAtModel | 
 
 
 def _urgency(alarm: Alarm) -> tuple[bool, bool, int, int]:
-    """Return the sort key: hidden alarms last; unacknowledged, danger and newest alarms first."""
+    """Return the sort key of an alarm: unacknowledged, danger, newest first; hidden alarms last."""
     shown = alarm.shelf is None and alarm.outage is None and alarm.suppressed_by is None
     return (not shown, alarm.is_acknowledged, -(alarm.level or 0), -(alarm.raised_ns or 0))
 

@@ -1,4 +1,4 @@
-"""Route for alarm rates."""
+"""Route for the performance figures of the alarm system, such as alarms per day."""
 
 import asyncio
 from collections.abc import Iterable, Sequence
@@ -31,7 +31,7 @@ UnitKey = Annotated[str, Field(examples=["U1"])]
 
 
 class FrequentModel(ApiModel):
-    """Frequent alarm, with its number of announcements."""
+    """Frequently announced alarm, with its number of announcements."""
 
     alarm: AlarmIdText
     """Identifier of the alarm."""
@@ -47,41 +47,41 @@ class AlarmFiguresModel(ApiModel):
     """Performance figures of an alarm list according to ISA-18.2."""
 
     n_alarms: int
-    """Number of announcements: alarm raised, risen to danger, or no longer hidden."""
+    """Number of announcements: alarms raised, risen to danger, or active when no longer hidden."""
 
     per_day: Annotated[float, Field(examples=[3.4])]
-    """Mean number of alarms per day."""
+    """Mean number of announcements per day."""
 
     per_10_min: Annotated[float, Field(examples=[0.02])]
-    """Mean number of alarms in ten minutes."""
+    """Mean number of announcements per ten minutes."""
 
     most_in_10_min: int
-    """Largest number of alarms in ten minutes."""
+    """Largest number of announcements in ten minutes."""
 
     share_in_flood: float
-    """Fraction of the ten-minute periods with more than ten alarms."""
+    """Fraction of the ten-minute periods with more than ten announcements, 0 to 1."""
 
     n_by_level: dict[AlarmLevelName, int]
-    """Number of alarms by priority."""
+    """Number of announcements by level of the alarm."""
 
     share_by_level: dict[AlarmLevelName, float]
-    """Fraction of the alarms by priority; 0 without alarms."""
+    """Fraction of all announcements by level of the alarm, 0 to 1; 0 without announcements."""
 
     most_frequent: list[FrequentModel]
-    """Most frequent alarms, at most ten, in descending order."""
+    """Alarms with the most announcements, at most ten, in descending order."""
 
     chattering: dict[AlarmIdText, int]
-    """Number of times each alarm was raised in bursts that the plant file defines as chattering."""
+    """Number of times each alarm was raised while chattering; the plant file defines chattering."""
 
     n_fleeting: int
-    """Number of alarms that returned to normal within chattering_window_s."""
+    """Number of alarms that returned to normal within ``chattering_window_s`` of the plant file."""
 
 
 class AlarmRatesModel(ApiModel):
-    """Rates of alarms in a time range, and alarms active for more than a day."""
+    """Alarm performance figures in a time range, and alarms active for more than a day."""
 
     start: Time
-    """Start of the range; later than requested if the requested range has too many events."""
+    """Start of the counted range; later than requested if there are too many events."""
 
     end: Time
     """End of the range."""
@@ -90,32 +90,34 @@ class AlarmRatesModel(ApiModel):
     """Whether all events of the requested range were counted."""
 
     all: AlarmFiguresModel
-    """Figures of all requested units together."""
+    """Performance figures of all requested units together."""
 
     units: dict[UnitKey, AlarmFiguresModel]
-    """Figures of each unit, and of "plant" for alarms about the service itself."""
+    """Performance figures by unit; "plant" for alarms about the service itself."""
 
     stale: list[AlarmModel]
     """Alarms active for more than a day, oldest first."""
 
 
 MAX_RATED = 100_000
-"""Maximum number of events that one request counts."""
+"""Maximum number of events that are counted for one request."""
 
 
 def counted(
     store: Store, wanted: AlarmQuery, units: Sequence[str], rule: ChatterRule
 ) -> dict[str, object]:
-    """Count alarms in the stored events; return fields of `AlarmRatesModel`.
+    """Return the fields of `AlarmRatesModel` except `stale`, from the stored alarm events.
 
-    Counting 100,000 events takes seconds: call the function in a thread.
+    The function takes seconds for 100,000 events: call it in a thread.
 
     Parameters
     ----------
     wanted
         Query with unit, start and end.
     units
-        Units to report, also those without events.
+        Identifiers of the units to report, also of units without events.
+    rule
+        Definition of chattering alarms.
 
     Raises
     ------
@@ -157,7 +159,7 @@ END = "End of the range; default: now.", "2026-11-21T09:00:00Z"
 
 
 def alarm_rate_router(context: Context) -> APIRouter:
-    """Return the router for alarm rates."""
+    """Return the router for alarm performance figures."""
     router = subject_router("/alarms", "alarms", reach=Reach.ASKED)
     engine, films = context.alarms, context.films
 
@@ -171,7 +173,7 @@ def alarm_rate_router(context: Context) -> APIRouter:
     ) -> AlarmRatesModel:
         """Count alarms per ten minutes and per day; list frequent, chattering and stale alarms.
 
-        Stored events are counted by unit and for the whole plant, over at most 400 days.
+        The numbers are given by unit and for all units together, over at most 400 days.
         """
         now_ns = context.clock.now_ns()
         end_ns = ns_from_datetime(end, "end") if end else now_ns

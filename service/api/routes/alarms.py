@@ -58,7 +58,7 @@ class AcknowledgeModel(ActorModel):
     """Request to acknowledge an occurrence of an alarm."""
 
     occurrence: Annotated[int, Field(ge=1, le=10**15, examples=[3])]
-    """Occurrence to acknowledge; a later occurrence is not acknowledged."""
+    """Number of the occurrence to acknowledge; later occurrences remain unacknowledged."""
 
     comment: NoteText = ""
     """Comment, at most 500 printable characters."""
@@ -94,11 +94,11 @@ RAISED_AT = {
     "attitude_deg": "deg",
     "oil_temperature_c": "°C",
 }
-"""Units of the columns with the operating condition in which an occurrence was raised."""
+"""Units of the columns for the operating condition in which an alarm was raised, by column."""
 
 
 def event_table(events: Sequence[StoredEvent], grid: CellGrid) -> list[Column]:
-    """Return alarm events as columns, named like the JSON fields except ``time_utc``."""
+    """Return alarm events as table columns: ``time_utc``, and columns named like JSON fields."""
     rows = [event_model(stored, grid) for stored in events]
     times = Column("time_utc", "time", [stored.event.time_ns for stored in events])
     flat = [name for name in AlarmEventModel.model_fields if name not in ("time", "raised_at")]
@@ -121,7 +121,7 @@ MAX_EVENTS = 1000
 
 N_COMMENTS = 30
 S_PER_COMMENT = 10.0
-"""Rate limit of comments per person or key: burst size, and time for each further comment, s.
+"""Rate limit of comments per person or key: `N_COMMENTS` at once, then one per `S_PER_COMMENT`, s.
 
 Comments are limited because they are never deleted."""
 
@@ -135,7 +135,7 @@ AlarmId = Annotated[
 ]
 
 OUTAGE = [needs(Permission.CHANGE_MEASURING)]
-"""Permission to take alarms out of service, which send no messages then."""
+"""Permission to take an alarm out of service; the alarm then sends no messages."""
 
 UNKNOWN = {404: "Unknown alarm"}
 ACTION_PROBLEMS = problem_responses(403, 409, 422, 503, own=UNKNOWN)
@@ -145,7 +145,7 @@ COMMENT_PROBLEMS = ACTION_PROBLEMS | problem_responses(
 
 
 def alarm_router(context: Context) -> APIRouter:
-    """Return the router that reads alarms; include it after other routes below ``/alarms``."""
+    """Return the router that reads alarms; it must follow other routers for ``/alarms/...``."""
     router = subject_router("/alarms", "alarms")
     engine, films, origin, clock = context.alarms, context.films, context.origin, context.clock
     listed = SharedAnswer(
@@ -156,7 +156,7 @@ def alarm_router(context: Context) -> APIRouter:
 
     @router.get("", summary="All alarms that are not normal", response_model=AlarmListModel)
     async def alarms() -> Response:
-        """List alarms that are not normal, most urgent first, and alarms with unknown condition."""
+        """List alarms that are not normal, most urgent first; then those of unknown condition."""
         return await listed.answer()
 
     @router.get(
@@ -171,8 +171,8 @@ def alarm_router(context: Context) -> APIRouter:
     ) -> Response:
         """List events of all alarms, newest first, in pages.
 
-        State, eccentricity, attitude and oil temperature select occurrences by the condition in
-        which they were raised.
+        Operating state, eccentricity, attitude angle and oil temperature select alarms by the
+        operating condition in which they were raised.
 
         As CSV or Parquet: one row per event.
         """
@@ -195,7 +195,7 @@ def alarm_router(context: Context) -> APIRouter:
 
     @router.get("/{alarm}", summary="One alarm", responses=problem_responses(own=UNKNOWN))
     async def one(alarm: AlarmId) -> AlarmModel:
-        """Return one alarm, also in the normal state, with the value compared with its limit."""
+        """Return one alarm, also if it is normal, with its value and limit."""
         try:
             return alarm_model(engine, films, engine.alarm(alarm))
         except LookupError as error:
@@ -205,20 +205,20 @@ def alarm_router(context: Context) -> APIRouter:
 
 
 def operation_router(context: Context) -> APIRouter:
-    """Return the router that changes alarms; each operation returns the stored alarm."""
+    """Return the router for operations on alarms; each operation returns the changed alarm."""
     router = subject_router("/alarms/{alarm}", "alarms", Permission.ACT_ON_ALARMS)
     allowances: dict[str, TokenBucket] = {}
 
     @router.post("/acknowledge", summary="Acknowledge", responses=ACTION_PROBLEMS)
     async def acknowledge(alarm: AlarmId, asked: AcknowledgeModel) -> AlarmModel:
-        """Acknowledge an occurrence; repeating the request changes nothing."""
+        """Acknowledge an occurrence of an alarm; repeating the request changes nothing."""
         return await _done(
             context, alarm, Acknowledge(**{**dict(asked), "actor": actor_or(asked.actor)})
         )
 
     @router.post("/shelve", summary="Shelve", responses=ACTION_PROBLEMS)
     async def shelve(alarm: AlarmId, asked: ShelveModel) -> AlarmModel:
-        """Hide an alarm for a limited time; if it is active afterwards, it is announced again."""
+        """Hide an alarm for a limited time; an alarm still active afterwards is announced again."""
         if asked.duration_s > context.max_shelf_s:
             detail = f"duration_s {asked.duration_s:g} is above {context.max_shelf_s:g}"
             raise ProblemError(422, "Wrong parameter", detail, "duration_s")
@@ -227,7 +227,7 @@ def operation_router(context: Context) -> APIRouter:
 
     @router.post("/unshelve", summary="Unshelve", responses=ACTION_PROBLEMS)
     async def unshelve(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
-        """End a shelving early."""
+        """End the shelving of an alarm early."""
         return await _done(context, alarm, Unshelve(actor_or(asked.actor)))
 
     @router.post(
@@ -247,7 +247,7 @@ def operation_router(context: Context) -> APIRouter:
         dependencies=OUTAGE,
     )
     async def return_to_service(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
-        """Return an alarm to service; if it is active, it is announced again."""
+        """Return an alarm to service; an active alarm is announced again."""
         return await _done(context, alarm, ReturnToService(actor_or(asked.actor)))
 
     @router.post("/reset", summary="Reset a latched alarm", responses=ACTION_PROBLEMS)
@@ -257,7 +257,7 @@ def operation_router(context: Context) -> APIRouter:
 
     @router.post("/comment", summary="Comment", responses=COMMENT_PROBLEMS)
     async def comment(request: Request, alarm: AlarmId, asked: CommentModel) -> AlarmModel:
-        """Add a comment to the events of an alarm; its state does not change."""
+        """Add a comment to the events of an alarm; the state of the alarm does not change."""
         now_s = context.clock.monotonic_s()
         new = TokenBucket(N_COMMENTS, S_PER_COMMENT, now_s)
         if not allowances.setdefault(identity_of(request).actor, new).take(now_s):
@@ -301,7 +301,7 @@ async def event_query(
 
 
 async def _done(context: Context, id_: str, action: Action) -> AlarmModel:
-    """Execute an operation; return the alarm after it is stored."""
+    """Execute an operation on an alarm; return the alarm after the operation is stored."""
     try:
         alarm = await context.operators.operate(id_, action)
     except LookupError as error:

@@ -1,4 +1,4 @@
-"""Route for the audit trail."""
+"""Route for the audit trail: recorded actions of persons, machines and the service."""
 
 import json
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ SourceName = Literal["api", "command_line", "padwatch"]
 
 
 class AuditEntryModel(ApiModel):
-    """Entry of the audit trail."""
+    """Entry of the audit trail: one action with its actor and object."""
 
     number: Annotated[int, Field(examples=[117])]
     """Number of the entry, from 1 without gaps."""
@@ -31,19 +31,19 @@ class AuditEntryModel(ApiModel):
     """Time of the action."""
 
     actor: Annotated[str, Field(examples=["A. Name"])]
-    """Person or key that acted; empty if unknown."""
+    """Name of the person or API key that acted; empty if unknown."""
 
     source: SourceName
     """Source of the action: API, command line, or padwatch itself."""
 
     peer: Annotated[str | None, Field(examples=["127.0.0.1"])]
-    """Address of the client, or user of the operating system; null if unknown."""
+    """Network address of the client, or user name in the operating system; null if unknown."""
 
     action: Annotated[str, Field(examples=["alarm.shelved"])]
     """Name of the action."""
 
     object: Annotated[str, Field(examples=["U1:ujb_shaft_x:channel_not_ok"])]
-    """Object of the action."""
+    """Object of the action, such as the identifier of an alarm."""
 
     before: Annotated[dict[str, Any] | None, Field(examples=[{"state": "unacknowledged"}])]
     """State of the object before the action; null without a state."""
@@ -52,27 +52,27 @@ class AuditEntryModel(ApiModel):
     """State of the object after the action; null without a state."""
 
     reason: str
-    """Reason given by the actor."""
+    """Reason given by the actor; may be empty."""
 
     previous_hash: str
     """Hash of the previous entry, 64 hexadecimal digits."""
 
     hash: str
-    """SHA-256 of the other fields of this entry."""
+    """SHA-256 hash of the other fields of this entry, including the previous hash."""
 
 
 class AuditModel(ApiModel):
-    """Page of the audit trail."""
+    """One page of the audit trail."""
 
     entries: list[AuditEntryModel]
     """Entries of the audit trail, newest first."""
 
     next_before: int | None
-    """Value of ``before`` for the next page; null on the last page."""
+    """Value of the parameter ``before`` for the next page; null on the last page."""
 
     head_error: str | None
-    """Reason why the file with the newest hash could not be written; null if it was written.
-    Entries are stored in both cases."""
+    """Reason why the file with the newest hash could not be written; null if it was written. The
+    entries themselves are stored in both cases."""
 
 
 TEXTS = (
@@ -82,7 +82,7 @@ TEXTS = (
 
 
 def audit_table(entries: Sequence[AuditEntry]) -> list[Column]:
-    """Return audit entries as columns; states before and after the action are JSON texts."""
+    """Return audit entries as table columns; states before and after the action are JSON texts."""
     return [
         Column("number", "count", [entry.number for entry in entries]),
         Column("time_utc", "time", [entry.time_ns for entry in entries]),
@@ -157,7 +157,7 @@ def _model(entry: AuditEntry) -> AuditEntryModel:
 
 
 def _document(text: str | None) -> dict[str, Any] | None:
-    """Return a stored JSON object; any other text is returned as member ``text``."""
+    """Return the object in a stored JSON text; other text as ``{"text": text}``; None for None."""
     if text is None:
         return None
     try:

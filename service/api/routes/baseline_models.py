@@ -25,10 +25,10 @@ SupportName = Literal["own", "borrowed", "none"]
 
 
 class BaselineVersionModel(ApiModel):
-    """Version of a learned baseline, without its cells."""
+    """Version of the learned baseline of a bearing, without its cells."""
 
     version: Annotated[int, Field(examples=[3])]
-    """Version of the baseline, from 1."""
+    """Number of the version, from 1."""
 
     estimator: EstimatorName
     """Estimator of the learned stiffness."""
@@ -41,7 +41,7 @@ class BaselineVersionModel(ApiModel):
     """Person or program that started the learning."""
 
     created: Time
-    """Time of learning, by the host clock."""
+    """Time when the baseline was learned, by the host clock."""
 
     learned_from: Time
     """Time of the first reading of the learning period."""
@@ -53,7 +53,7 @@ class BaselineVersionModel(ApiModel):
     """Machine event that made this version necessary; empty without an event."""
 
     remark: Annotated[str, Field(examples=["-5.1 % from version 1 under like conditions"])]
-    """Reason why it was not accepted automatically, or a remark on its readings; may be empty."""
+    """Reason why this version was not accepted automatically, remark on its readings, or empty."""
 
     is_frozen: bool
     """Whether this version is in force and an engineer has frozen learning."""
@@ -82,68 +82,68 @@ class BaselineStepModel(ApiModel):
 
 
 class ReadingCountsModel(ApiModel):
-    """Counts of recent readings; they show why a film is not learned or judged."""
+    """Counts of recent film readings, which show why a film is not learned or judged."""
 
     days: Annotated[float, Field(examples=[7.0])]
-    """Length of the period, days."""
+    """Length of the period whose readings are counted, days."""
 
     n_at_speed: Annotated[int, Field(examples=[180])]
     """Number of readings at rated speed."""
 
     n_settled: Annotated[int, Field(examples=[0])]
-    """Number of these readings after the warm-up; 0 if every run ends before the film is warm."""
+    """Number of these readings in a settled operating state after the warm-up of the film."""
 
     n_complete: int
-    """Number of settled readings with stiffness, eccentricity and oil temperature, in the direction
-    with fewer such readings."""
+    """Number of settled readings with stiffness, eccentricity and oil temperature, in x or y,
+    whichever has fewer."""
 
     n_judged: int
-    """Number of complete readings with a verdict on the film, in the direction with fewer."""
+    """Number of complete readings with a verdict on the film, in x or y, whichever has fewer."""
 
 
 class LearningModel(ApiModel):
-    """Progress of learning a baseline."""
+    """Progress of learning the baseline of a bearing."""
 
     since: Time | None
     """Start of the learning period: first reading or last machine event; null without readings."""
 
     until: Time | None
-    """End of the learning period; afterwards the baseline does not change until it is renewed."""
+    """End of the learning period, after which learning stops; null without readings."""
 
     is_over: bool
     """Whether the learning period has ended."""
 
     n_readings: int | None
-    """Number of settled readings so far; null after a baseline was learned in this period."""
+    """Number of usable readings so far; null once this period has a baseline."""
 
     n_days: Annotated[int | None, Field(examples=[12])]
-    """Number of days with settled readings; null once this period has a baseline."""
+    """Number of days with usable readings; null once this period has a baseline."""
 
     n_days_wanted: Annotated[int, Field(examples=[20])]
-    """Number of days with readings that the first baseline needs."""
+    """Number of days with usable readings that the first baseline requires."""
 
     recent: ReadingCountsModel
-    """Counts of the readings of the last days."""
+    """Counts of the readings of the last days, for diagnosis."""
 
 
 class BaselinesModel(BearingAnswer):
-    """All baseline versions of a bearing, and the steps of their history."""
+    """All baseline versions of a bearing, and their history."""
 
     estimator: EstimatorName | None
     """Estimator of the watched stiffness; null if the bearing is not watched."""
 
     in_force: int | None
-    """Version in force; null without a version in force."""
+    """Number of the version in force; null if no version is in force."""
 
     is_frozen: bool
     """Whether an engineer has frozen learning."""
 
     renewed: Time | None
-    """Time of the newest machine event; only later readings are used; null without an event."""
+    """Time of the newest machine event; earlier readings are not used. Null without an event."""
 
     acceptance: Literal["automatic", "by_engineer"]
-    """Acceptance of learned baselines: automatic if a baseline agrees with the previous one, or
-    only by an engineer."""
+    """Acceptance of learned baselines: "automatic" if a baseline agrees with the previous one, or
+    always "by_engineer"."""
 
     learning: LearningModel | None
     """Progress of learning; null if the bearing is not watched."""
@@ -152,11 +152,11 @@ class BaselinesModel(BearingAnswer):
     """Versions of the baseline, newest first."""
 
     steps: list[BaselineStepModel]
-    """Steps of the history, newest first."""
+    """Steps in the history of the baselines, newest first."""
 
 
 class BaselineCellsModel(ApiModel):
-    """Cells of a baseline by column; each column has one value per cell."""
+    """Cells of a baseline in the grid of operating conditions, one value per cell in each list."""
 
     eccentricity_low: list[float]
     """Lower bound of the eccentricity ratio."""
@@ -171,10 +171,10 @@ class BaselineCellsModel(ApiModel):
     """Upper bound of the oil temperature, °C."""
 
     attitude_low_deg: list[float] | None
-    """Lower bound of the attitude angle; null if cells do not depend on the attitude angle."""
+    """Lower bound of the attitude angle, degrees; null if cells do not depend on this angle."""
 
     attitude_high_deg: list[float] | None
-    """Upper bound of the attitude angle; null if cells do not depend on the attitude angle."""
+    """Upper bound of the attitude angle, degrees; null if cells do not depend on this angle."""
 
     eccentricity_ratio: list[float]
     """Median eccentricity ratio of the readings in the cell."""
@@ -183,19 +183,19 @@ class BaselineCellsModel(ApiModel):
     """Median oil temperature of the readings in the cell, °C."""
 
     n_readings: list[int]
-    """Number of readings used; 0 in a cell without readings between other cells."""
+    """Number of readings learned in the cell; 0 in a cell without readings between other cells."""
 
     n_days: list[int]
     """Number of days with readings in the cell."""
 
     stiffness_n_per_m: list[float]
-    """Median stiffness of the readings; in a cell without readings, value of the surface."""
+    """Median stiffness of the readings, or of the fitted surface without readings, N/m."""
 
     scatter_percent: list[float]
-    """Robust standard deviation of single readings about the surface, %."""
+    """Robust standard deviation of single readings about the fitted stiffness surface, %."""
 
     surface_std_percent: list[float]
-    """Standard uncertainty of the surface in the middle of the cell, %."""
+    """Standard uncertainty of the fitted surface at the median condition of the cell, %."""
 
     support: list[SupportName]
     """Basis on which new readings in the cell are judged: learned readings of the cell ("own"), of
@@ -203,45 +203,45 @@ class BaselineCellsModel(ApiModel):
 
 
 class TimeScatterModel(ApiModel):
-    """Scatter of mean values of a healthy film for one averaging time."""
+    """Scatter of the mean stiffness of a healthy film for one averaging time."""
 
     time_scale_h: float
     """Averaging time, running hours."""
 
     share: float
-    """Standard deviation of the means divided by that of single readings."""
+    """Standard deviation of means over this time, divided by that of single readings."""
 
 
 class BaselineDirectionModel(ApiModel):
-    """Learned stiffness of a film in one direction."""
+    """Learned stiffness of an oil film in one direction, x or y."""
 
     cells: BaselineCellsModel
     """Cells with readings, and cells between them."""
 
     scatter_percent: float
-    """Typical scatter of single readings, %."""
+    """Typical standard deviation of single readings about the fitted stiffness surface, %."""
 
     u_random_percent: float
-    """Typical random uncertainty of single readings, %; it is a part of their scatter."""
+    """Typical random standard uncertainty of single readings, %, a part of their scatter."""
 
     rejected_share: float
-    """Fraction of the readings of the learning period that were rejected as outliers."""
+    """Fraction of the readings of the learning period rejected as outliers, 0 to 1."""
 
     time_scatter: list[TimeScatterModel]
-    """Scatter of mean values by averaging time, shortest first."""
+    """Scatter of mean values, one entry per averaging time, shortest time first."""
 
 
 class BaselineModel(BearingAnswer):
-    """Baseline of a bearing with its cells."""
+    """Baseline of a bearing: learned stiffness by cell of the operating-condition grid."""
 
     about: BaselineVersionModel
     """Origin and status of the baseline."""
 
     eccentricity_width: float | None
-    """Width of a cell in eccentricity ratio; null if nothing was learned."""
+    """Width of the cells in eccentricity ratio; null if nothing was learned."""
 
     oil_temperature_width_c: float | None
-    """Width of a cell in oil temperature, K; null if nothing was learned."""
+    """Width of the cells in oil temperature, K; null if nothing was learned."""
 
     x: BaselineDirectionModel | None
     """Baseline in x; null if there were too few readings."""
@@ -258,7 +258,7 @@ class BaselineActionModel(ActorModel):
 
 
 def _only_text(value: object) -> object:
-    """Return the text of a time; reject numbers, whose epoch and unit are unknown."""
+    """Return the text of a time; raise ValueError for a number, whose unit is unknown."""
     if not isinstance(value, str):
         raise ValueError("a time is written like 2026-11-21T08:00:00Z")
     return written_as_date(value)

@@ -1,4 +1,4 @@
-"""Routes for the baselines of a bearing, and for their changes by engineers."""
+"""Routes for the stiffness baselines of a bearing, and for changes of baselines by engineers."""
 
 import asyncio
 from typing import Annotated, Any
@@ -55,7 +55,15 @@ from service.store.documents import BASELINE, FORMAT_VERSION, to_json
 def version_model(
     entry: BaselineEntry, versions: Versions, steps: list[StoredStep]
 ) -> BaselineVersionModel:
-    """Return the API model of a baseline version, with its status after all steps."""
+    """Return the API model of a baseline version.
+
+    Parameters
+    ----------
+    versions
+        Version in force and rejected versions, after all steps.
+    steps
+        Steps in the history of all baselines of the bearing.
+    """
     own = [step for step in steps if step.version == entry.version]
     return BaselineVersionModel.of(
         entry,
@@ -76,7 +84,7 @@ def _status(entry: BaselineEntry, versions: Versions, own: list[StoredStep]) -> 
 
 
 def _remark(entry: BaselineEntry, own: list[StoredStep]) -> str:
-    """Return the reason of the learning step if it is not the machine event; otherwise empty."""
+    """Return the reason why a version was learned; empty if it is the machine event or unknown."""
     reasons = [step.reason for step in own if step.step is BaselineStep.LEARNED]
     return next((words for words in reasons if words != entry.event), "")
 
@@ -174,7 +182,7 @@ def baseline_router(context: Context) -> APIRouter:
         responses=problem_responses(404, 503),
     )
     async def baselines(unit: UnitId, bearing: BearingId) -> Response:
-        """Return versions, the version in force, steps, and the progress of learning."""
+        """Return all baseline versions of a bearing, their history, and progress of learning."""
         context.bearing(unit, bearing)
         return await rendered(lambda: _baselines(context, unit, bearing))
 
@@ -185,7 +193,7 @@ def baseline_router(context: Context) -> APIRouter:
         responses=READING_PROBLEMS,
     )
     async def one_baseline(unit: UnitId, bearing: BearingId, version: Version) -> Response:
-        """Return the cells by column: bounds, stiffness, scatter, and support for judgements."""
+        """Return the cells of a baseline with their bounds, stiffness and scatter."""
         context.bearing(unit, bearing)
         return await rendered(lambda: _baseline(context, unit, bearing, version))
 
@@ -196,7 +204,7 @@ def baseline_router(context: Context) -> APIRouter:
         response_class=Response,
     )
     async def export(unit: UnitId, bearing: BearingId, version: Version) -> Response:
-        """Export the baseline with its surface as a document that padwatch reads back exactly."""
+        """Export the complete baseline as a JSON document, which padwatch can read without loss."""
         context.bearing(unit, bearing)
         found = await in_thread(lambda: to_json(_stored(context, unit, bearing, version)))
         name = f"{unit}-{bearing}-baseline-{version}.json"
@@ -207,14 +215,14 @@ def baseline_router(context: Context) -> APIRouter:
 
 
 def baseline_action_router(context: Context) -> APIRouter:
-    """Return the router that changes baselines; each action returns the stored baselines."""
+    """Return the router for actions on baselines; each action returns the changed baselines."""
     router = subject_router(PATH, "baselines", Permission.CHANGE_MEASURING)
 
     @router.post("/{version}/accept", summary="Accept a baseline", responses=ACTION_PROBLEMS)
     async def accept(
         unit: UnitId, bearing: BearingId, version: Version, asked: BaselineActionModel
     ) -> BaselinesModel:
-        """Put this version in force from the next reading on."""
+        """Accept a baseline version, which is in force from the next reading."""
         await asyncio.to_thread(_require_version, context, unit, bearing, version)
         return await _done(context, unit, bearing, Accept(version), asked)
 
@@ -222,7 +230,7 @@ def baseline_action_router(context: Context) -> APIRouter:
     async def reject(
         unit: UnitId, bearing: BearingId, version: Version, asked: BaselineActionModel
     ) -> BaselinesModel:
-        """Reject this version; if in force, no baseline is in force until another is accepted."""
+        """Reject a version; if it was in force, none is in force until another is accepted."""
         await asyncio.to_thread(_require_version, context, unit, bearing, version)
         return await _done(context, unit, bearing, Reject(version), asked)
 
@@ -230,12 +238,12 @@ def baseline_action_router(context: Context) -> APIRouter:
     async def freeze(
         unit: UnitId, bearing: BearingId, asked: BaselineActionModel
     ) -> BaselinesModel:
-        """Freeze learning until it is thawed; the version in force does not change."""
+        """Suspend the learning of baselines; the version in force does not change."""
         return await _done(context, unit, bearing, Freeze(), asked)
 
     @router.post("/thaw", summary="Learn again", responses=ACTION_PROBLEMS)
     async def thaw(unit: UnitId, bearing: BearingId, asked: BaselineActionModel) -> BaselinesModel:
-        """Thaw learning after a freeze; it continues within the learning period."""
+        """Resume learning after a freeze, until the end of the learning period."""
         return await _done(context, unit, bearing, Thaw(), asked)
 
     @router.post("/renew", summary="Begin again", responses=ACTION_PROBLEMS)
@@ -256,7 +264,7 @@ def baseline_action_router(context: Context) -> APIRouter:
 async def _done(
     context: Context, unit: str, bearing: str, action: BaselineAction, asked: BaselineActionModel
 ) -> BaselinesModel:
-    """Execute an action; return the baselines after it is stored."""
+    """Execute an action on baselines; return the baselines after the action is stored."""
     place = watched_place(context, unit, bearing)
     try:
         await context.operators.act(place, action, actor_or(asked.actor), asked.reason)

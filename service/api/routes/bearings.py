@@ -1,4 +1,4 @@
-"""Routes for bearings: configuration, newest result, uncertainty budgets."""
+"""Routes for guide bearings: configuration, newest result, uncertainty budgets."""
 
 from typing import Annotated, Literal
 
@@ -39,10 +39,10 @@ Note = Annotated[str, Field(description="Note of the author.", examples=["after 
 
 
 class ReferenceModel(ApiModel):
-    """Origin of the gap reference in force."""
+    """Origin of the gap reference in force: source, time and author."""
 
     source: Literal["plant_file", "given", "measured"]
-    """Plant file, values entered by hand, or mean gaps measured when the reference was set."""
+    """Source: plant file, values entered by hand ("given"), or mean measured gaps ("measured")."""
 
     set: SetTime | None
     """Time when the reference was set; null for the plant file."""
@@ -59,7 +59,7 @@ PLANT_FILE = ReferenceModel(source="plant_file", set=None, author=None, note=Non
 
 
 class BearingModel(ApiModel):
-    """Configuration of a bearing, with the gap reference in force."""
+    """Configuration of a guide bearing, with the gap reference in force."""
 
     unit: str
     """Identifier of the unit."""
@@ -68,7 +68,7 @@ class BearingModel(ApiModel):
     """Identifier of the bearing."""
 
     bracket_stiffness_n_per_m: float
-    """Radial stiffness of the bracket, N/m."""
+    """Radial stiffness of the bearing bracket, N/m."""
 
     clearance_um: float
     """Radial clearance in operation, µm."""
@@ -80,26 +80,26 @@ class BearingModel(ApiModel):
     """Gap reference of the probes across the shaft, µm; null without such probes."""
 
     reference: ReferenceModel
-    """Origin of the gap reference."""
+    """Origin of the gap reference in force."""
 
     channels: dict[str, str]
-    """Identifiers of the channels shaft_x, shaft_y, bearing_x and bearing_y."""
+    """Identifiers of the channels, by place: shaft_x, shaft_y, bearing_x and bearing_y."""
 
 
 class LatestModel(BearingAnswer):
-    """Newest result of a bearing. Readings that are not current are null with a reason."""
+    """Newest result of a bearing; if it is not current, its readings are null and give a reason."""
 
     time: Time | None
-    """End of the samples of the newest result, also if the result is not current."""
+    """End of the samples of the newest result, even if it is not current; null without a result."""
 
     age_s: float | None
-    """Age of the newest result, s."""
+    """Age of the newest result, s; null without a result."""
 
     quality: QualityModel
-    """Worst quality of the 1× amplitudes and of the preferred stiffness."""
+    """Quality of the result: the worst of its 1× amplitudes and its preferred stiffness."""
 
     speed_source: SpeedSourceName | None
-    """Source of the running speed."""
+    """Source of the running speed of the newest result; null without a result."""
 
     runout: Annotated[
         dict[str, RunoutName | None],
@@ -118,35 +118,35 @@ class LatestModel(BearingAnswer):
     "shaft_x" to "bearing_y"; empty without waveforms or without a current result."""
 
     window: WindowModel | None
-    """Averaging window of the newest result."""
+    """Averaging window of the newest result; null without a result."""
 
     estimators: dict[str, EstimatorName | None]
     """Estimator of the preferred stiffness, by axes "xx" and "yy"; null without a stiffness."""
 
     readings: dict[str, ReadingModel]
-    """All quantities of the catalogue, by name."""
+    """Readings of all quantities of the catalogue, by name of the quantity."""
 
 
 class BudgetLineModel(ApiModel):
-    """Contribution of one source to the uncertainty of a result."""
+    """Contribution of one source of uncertainty to the uncertainty of a result."""
 
     name: Annotated[str, Field(examples=["bracket stiffness"])]
-    """Source of uncertainty."""
+    """Name of the source of uncertainty."""
 
     kind: Literal["random", "systematic"]
-    """Random if the error differs between results, systematic if it is constant."""
+    """Kind of error: random if it differs between results, systematic if it is constant."""
 
     distribution: Literal["normal", "uniform"]
     """Assumed distribution of the error."""
 
     width: float
-    """Standard uncertainty if normal, half-width if uniform, in the unit of the source."""
+    """Standard uncertainty (normal) or half-width (uniform) of the source, in its own unit."""
 
     sensitivity: float
-    """Change of the result per unit of the source."""
+    """Sensitivity coefficient: change of the result divided by the change of the source."""
 
     contribution: float
-    """Standard uncertainty of the result due to this source alone."""
+    """Standard uncertainty of the result due to this source alone, in the unit of the result."""
 
 
 class BudgetModel(ApiModel):
@@ -172,14 +172,14 @@ class BudgetModel(ApiModel):
 
 
 def reference_model(reference: GapReference | None) -> ReferenceModel:
-    """Return the API model of the origin of a gap reference; None stands for the plant file."""
+    """Return the API model of the origin of a gap reference; the plant file for None."""
     if reference is None:
         return PLANT_FILE
     return ReferenceModel.of(reference, note=reference.note or None)
 
 
 def latest_model(live: LiveState, unit: str, bearing: str) -> LatestModel:
-    """Return the API model of the newest result; values that are not current are null."""
+    """Return the API model of the newest result; readings are null if the result is not current."""
     current = live.current(unit, bearing)
     newest = current.assessment
     shown = newest if current.is_current else None
@@ -198,13 +198,13 @@ def latest_model(live: LiveState, unit: str, bearing: str) -> LatestModel:
 
 
 def estimator_names(assessment: Assessment) -> dict[str, EstimatorName | None]:
-    """Return the name of the estimator of the preferred stiffness, by axes."""
+    """Return the names of the estimators that give the preferred stiffness, by axes."""
     chosen = assessment.estimators
     return {axes: estimator.value if estimator else None for axes, estimator in chosen.items()}
 
 
 def runout_names(assessment: Assessment) -> dict[str, RunoutName | None]:
-    """Return the state of the runout compensation, by shaft channel."""
+    """Return the state of the runout compensation of each shaft channel, by channel."""
     return {place: verdict.value for place, verdict in assessment.runout.items()}
 
 
@@ -215,12 +215,12 @@ def bearing_router(context: Context) -> APIRouter:
 
     @router.get("", summary="All bearings of a unit", responses=unknown)
     async def bearings(unit: UnitId) -> list[BearingModel]:
-        """List the guide bearings of a unit with configuration and gap reference in force."""
+        """List the guide bearings of a unit with their configuration and gap reference in force."""
         return [_bearing(context, unit, bearing.id) for bearing in context.unit(unit).bearing]
 
     @router.get("/{bearing}", summary="One bearing as configured", responses=unknown)
     async def one_bearing(unit: UnitId, bearing: BearingId) -> BearingModel:
-        """Return bracket, clearance, channels, and the gap reference in force with its origin."""
+        """Return bracket stiffness, clearance, channels and gap reference of a bearing."""
         return _bearing(context, unit, bearing)
 
     @router.get(
@@ -230,13 +230,13 @@ def bearing_router(context: Context) -> APIRouter:
         responses=unknown,
     )
     async def latest(unit: UnitId, bearing: BearingId) -> Response:
-        """Return the newest result; values that are not current are null."""
+        """Return the newest result of a bearing; readings are null if the result is not current."""
         context.bearing(unit, bearing)
         return await rendered(lambda: latest_model(context.live, unit, bearing))
 
     @router.get("/{bearing}/budgets/{quantity}", summary="Uncertainty budget", responses=no_result)
     async def budget(unit: UnitId, bearing: BearingId, quantity: QuantityName) -> BudgetModel:
-        """Return the uncertainty budget of the newest result of a quantity."""
+        """Return the uncertainty budget of a quantity in the newest result."""
         context.bearing(unit, bearing)
         if quantity not in BY_NAME or not BY_NAME[quantity].has_uncertainty:
             detail = f"quantity {quantity!r} has no uncertainty budget; see /api/v1/quantities"
@@ -262,7 +262,11 @@ def _bearing(context: Context, unit: str, bearing: str) -> BearingModel:
 
 
 def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
-    """Return the budget of a current reading; for the preferred stiffness, of its estimator."""
+    """Return the uncertainty budget of a quantity in the newest result.
+
+    The budget of the preferred stiffness is that of its estimator. None without a current result or
+    a budget.
+    """
     assessment = current.assessment
     if assessment is None or not current.is_current:
         return None
@@ -287,6 +291,6 @@ def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
 
 
 def no_result(unit: str, bearing: str) -> ProblemError:
-    """Return the error for a bearing without a result, status 409."""
+    """Return the error with status 409 for a bearing without a result."""
     detail = f"unit {unit!r} bearing {bearing!r} has no result yet; the first takes one segment"
     return ProblemError(409, "No result yet", detail)

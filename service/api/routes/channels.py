@@ -1,4 +1,4 @@
-"""Routes for the channels of a unit and their newest samples."""
+"""Routes for the measuring channels of a unit and their newest samples."""
 
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
@@ -34,7 +34,7 @@ ChannelUnit = Annotated[
 
 
 class WaveformChannelModel(ApiModel):
-    """Waveform channel: settings and current state."""
+    """Settings and current state of a waveform channel."""
 
     id: Annotated[str, Field(examples=["ujb_shaft_x"])]
     """Identifier of the channel within the unit."""
@@ -49,53 +49,53 @@ class WaveformChannelModel(ApiModel):
     """Sensitivity of the transducer; null for a key-phase, and if counts are scaled directly."""
 
     sensitivity_unit: str | None
-    """Unit of the sensitivity."""
+    """Unit of the sensitivity; null without a sensitivity."""
 
     full_scale_v: float | None
-    """Converter input at full scale, V; null if counts are scaled directly."""
+    """Input voltage of the converter at full scale, V; null if counts are scaled directly."""
 
     ok_min_v: float | None
-    """Lowest mean voltage of a healthy transducer, V."""
+    """Lowest mean voltage of a healthy transducer, V; null without this limit."""
 
     ok_max_v: float | None
-    """Highest mean voltage of a healthy transducer, V."""
+    """Highest mean voltage of a healthy transducer, V; null without this limit."""
 
     unit_per_count: float | None
     """Engineering units per count; null if counts are not scaled directly."""
 
     ok_min: float | None
-    """Lowest mean of a healthy transducer in engineering units, if counts are scaled directly."""
+    """Lowest mean of a healthy transducer, in engineering units; null without this limit."""
 
     ok_max: float | None
-    """Highest mean of a healthy transducer in engineering units, if counts are scaled directly."""
+    """Highest mean of a healthy transducer, in engineering units; null without this limit."""
 
     gain_uncertainty: float
-    """Half-width of the relative error of the sensitivity."""
+    """Half-width of the relative error of the sensitivity; 0.01 is 1 %."""
 
     direction: Literal[1, -1]
-    """+1 if an increasing reading means motion along the positive bearing axis, else -1."""
+    """+1 if the reading increases with motion along the positive bearing axis, else -1."""
 
     probe: str | None
-    """Serial number or mark of the probe; null if unknown."""
+    """Serial number or label of the probe; null if unknown."""
 
     used_by: Annotated[list[str], Field(examples=[["UJB shaft_x"]])]
-    """Uses of the channel: bearing and place, or "key_phase"."""
+    """Uses of the channel: bearing identifier with key of the bearing, or "key_phase"."""
 
     quality: QualityModel
     """Quality of the newest block of samples."""
 
     minimum: float | None
-    """Lowest sample of the newest block; null for a bad channel, and for racks without samples."""
+    """Lowest sample of the newest block; null for a bad channel, or a device without samples."""
 
     maximum: float | None
-    """Highest sample of the newest block; null like `minimum`."""
+    """Highest sample of the newest block; null if `minimum` is null."""
 
     mean: float | None
-    """Mean of the newest block, for a proximity probe the gap; null like `minimum`."""
+    """Mean of the newest block: for a proximity probe, the gap. Null if `minimum` is null."""
 
 
 class SlowChannelModel(ApiModel):
-    """Slow channel: settings and newest reading."""
+    """Settings and newest reading of a slow channel, such as an oil temperature."""
 
     id: Annotated[str, Field(examples=["ujb_oil_temperature"])]
     """Identifier of the channel within the unit."""
@@ -104,16 +104,16 @@ class SlowChannelModel(ApiModel):
     """Unit of the readings."""
 
     minimum: float
-    """Lowest valid reading."""
+    """Lowest valid reading, in the unit of the readings."""
 
     maximum: float
-    """Highest valid reading."""
+    """Highest valid reading, in the unit of the readings."""
 
     used_by: Annotated[list[str], Field(examples=[["UJB oil_temperature"]])]
-    """Uses of the channel: bearing and key, or key of the unit."""
+    """Uses of the channel: bearing identifier with key of the bearing, or key of the unit."""
 
     value: float | None
-    """Newest reading; null if and only if the level is bad."""
+    """Newest reading; null if and only if its quality level is bad."""
 
     quality: QualityModel
     """Quality of the newest reading."""
@@ -129,29 +129,29 @@ class ChannelsModel(ApiModel):
     """Sampling rate, Hz."""
 
     time: Time | None
-    """End of the newest block, also if the block is not current; null without a block."""
+    """End of the newest block of samples, even if it is not current; null without a block."""
 
     age_s: float | None
-    """Age of the newest block, s."""
+    """Age of the newest block of samples, s; null without a block."""
 
     waveform: list[WaveformChannelModel]
-    """Waveform channels in the order of the source."""
+    """Waveform channels, in the order of the plant file."""
 
     slow: list[SlowChannelModel]
-    """Slow channels in the order of the source."""
+    """Slow channels, in the order of the plant file."""
 
 
 class ChannelSamplesModel(ApiModel):
-    """Samples of one channel."""
+    """Samples of one waveform channel."""
 
     unit: ChannelUnit
     """Engineering unit of the samples."""
 
     quality: QualityModel
-    """Worst quality of the blocks that contain the samples."""
+    """Worst quality of the channel in the blocks that contain the samples."""
 
     sample: list[float | None]
-    """Samples, one per sample index; null if the sample is missing or the channel was bad."""
+    """Samples at consecutive indices; null if a sample is missing or the channel was bad."""
 
 
 class WaveformModel(SampleRange):
@@ -164,13 +164,13 @@ class WaveformModel(SampleRange):
     """Time of the first sample."""
 
     age_s: float
-    """Age of the newest sample, s; it grows while the link is lost."""
+    """Age of the newest sample, s; it increases while the link is lost."""
 
     n_samples: int
     """Number of samples per channel."""
 
     channels: dict[str, ChannelSamplesModel]
-    """Samples of the requested channels."""
+    """Samples of the requested channels, by identifier of the channel."""
 
 
 UNITS: dict[Measurand, ChannelUnit] = {
@@ -180,7 +180,7 @@ UNITS: dict[Measurand, ChannelUnit] = {
     Measurand.ACCELERATION_M_S2: "m/s2",
     Measurand.KEY_PHASE_V: "V",
 }
-"""Units of waveform channels, written as in exported recordings."""
+"""Engineering units of waveform channels by measurand, written as in exported recordings."""
 
 USES = (*CHANNEL_KEYS, *OPTIONAL_CHANNEL_KEYS, *GAP_KEYS, "oil_temperature")
 """Keys of a bearing in the plant file that contain channel identifiers."""
@@ -190,7 +190,7 @@ UNIT_USES = ("speed_channel", "power_channel", "key_phase")
 
 
 def channels_model(live: LiveState, settings: UnitSettings) -> ChannelsModel:
-    """Return the API model of all channels of a unit, with the state of the newest block."""
+    """Return the API model of all channels of a unit, with their state in the newest block."""
     newest, why_not = live.newest_block(settings.id), live.why_no_samples(settings.id)
     shown = newest if why_not is None else None
     why = why_not or Reason.WAITING_FOR_DATA
@@ -212,7 +212,10 @@ def channels_model(live: LiveState, settings: UnitSettings) -> ChannelsModel:
 
 
 def rows_of(settings: UnitSettings, channel: str) -> list[int]:
-    """Return the row numbers of a channel in a block; a rack has several rows per channel."""
+    """Return the rows of a channel in the sample arrays of a block.
+
+    A device that sends amplitudes in place of samples has several rows per channel.
+    """
     if isinstance(settings.source, ModbusVectorSettings):
         return [n for n, row in enumerate(settings.source.rows) if row.channel == channel]
     return [n for n, each in enumerate(settings.channel) if each.id == channel]
@@ -240,7 +243,7 @@ def _waveform(
 def _extent(
     settings: UnitSettings, block: SampleBlock | None, rows: list[int], quality: Quality
 ) -> dict[str, Any]:
-    """Return minimum, maximum and mean of a channel in a block; racks have no samples."""
+    """Return minimum, maximum and mean of a channel in a block; each None without samples."""
     has_samples = not isinstance(settings.source, ModbusVectorSettings)
     if block is None or quality.level is Level.BAD or not has_samples:
         return {"minimum": None, "maximum": None, "mean": None}
@@ -258,7 +261,7 @@ def _slow(
 
 
 def _uses(settings: UnitSettings) -> dict[str, list[str]]:
-    """Return the uses of each channel, by channel identifier."""
+    """Return the keys of the plant file that name each channel, by channel identifier."""
     found: dict[str, list[str]] = {}
     for key in UNIT_USES:
         found.setdefault(getattr(settings, key), []).append(key)
@@ -271,7 +274,15 @@ def _uses(settings: UnitSettings) -> dict[str, list[str]]:
 def waveform_model(
     settings: UnitSettings, channels: Sequence[str], window: SampleWindow, age_s: float
 ) -> WaveformModel:
-    """Return the API model of the samples in a window."""
+    """Return the API model of the samples in a window.
+
+    Parameters
+    ----------
+    channels
+        Identifiers of the channels in the window, at least one.
+    age_s
+        Age of the newest sample, s.
+    """
     units = {each.id: UNITS[each.measurand] for each in settings.channel}
     return WaveformModel.of(
         window,
@@ -292,7 +303,7 @@ NO_SAMPLES = {409: "There are no samples"}
 NEWEST = "Duration of the newest samples; limited to those in memory."
 
 MAX_NUMBERS = 200_000
-"""Maximum number of samples in one answer, all channels together."""
+"""Maximum number of samples in one answer, summed over all channels."""
 
 
 def channel_router(context: Context) -> APIRouter:
@@ -303,7 +314,7 @@ def channel_router(context: Context) -> APIRouter:
     async def channels(unit: UnitId) -> ChannelsModel:
         """List settings and state of every waveform channel and slow channel of a unit.
 
-        The state refers to the newest block; the values of a bad channel are null.
+        The state is that of the newest block of samples; the values of a bad channel are null.
         """
         return channels_model(context.live, context.unit(unit))
 
@@ -353,7 +364,7 @@ def require_samples(settings: UnitSettings) -> None:
 
 
 def held_blocks(live: LiveState, unit: str) -> tuple[Sequence[SampleBlock], float]:
-    """Return the buffered blocks of a unit and their age; raise a problem without samples."""
+    """Return the buffered blocks of a unit and the age of the newest, s; without any, raise 409."""
     blocks, age_s = live.blocks(unit), live.data_age_s(unit)
     if not blocks or age_s is None:
         raise ProblemError(409, "No samples", f"no sample of unit {unit!r} has arrived yet")

@@ -1,4 +1,4 @@
-"""Route for the readings of a film over time, with their operating conditions."""
+"""Route for the stiffness readings of an oil film over time, with their operating conditions."""
 
 from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal, cast
@@ -43,22 +43,22 @@ ProvenanceName = Literal["measured", "simulated"]
 
 
 class FilmSeriesModel(ApiModel):
-    """Columns of film readings in one direction, with one value per time; null if unknown."""
+    """Readings of a film in x or y; every list has one value per time, null if unknown."""
 
     stiffness_n_per_m: list[float | None]
-    """Stiffness by the watched estimator, N/m."""
+    """Stiffness, N/m."""
 
     u_random_n_per_m: list[float | None]
     """Random standard uncertainty of the stiffness, N/m."""
 
     shaft_um_pk: list[float | None]
-    """Shaft motion relative to the bearing at 1×, zero to peak."""
+    """1× amplitude of the shaft relative to the bearing, µm zero-to-peak."""
 
     bearing_um_pk: list[float | None]
-    """Bearing motion at 1×, zero to peak."""
+    """1× amplitude of the bearing, µm zero-to-peak."""
 
     evidence: list[EvidenceName]
-    """"measured", or the reason why the stiffness is unknown."""
+    """State of the reading: "measured", or the reason why its stiffness is unknown."""
 
     verdict: list[VerdictName]
     """Verdict on the film when the reading was made."""
@@ -67,35 +67,35 @@ class FilmSeriesModel(ApiModel):
     """Alarm level in force when the reading was made; null without a level."""
 
     change_percent: list[float | None]
-    """Most significant mean change of stiffness when the reading was made, %."""
+    """Most significant mean change of stiffness when the reading was made, %; null if unknown."""
 
     deviation_percent: list[float | None]
-    """Deviation of the single reading, %; null if the reading was not compared."""
+    """Deviation of the reading from the baseline, %; null if the reading was not compared."""
 
 
 class FilmReadingsModel(BearingHistory):
-    """Readings of a film with their operating conditions, oldest first."""
+    """Stiffness readings of an oil film with their operating conditions, oldest first."""
 
     estimator: EstimatorName
     """Estimator of the stiffness."""
 
     n_found: int
-    """Number of matching readings in this range, including readings that the answer omits."""
+    """Number of matching readings in the range, also of readings that the answer omits."""
 
     next_end: Time | None
-    """Without thinning, ``end`` of the page with older readings; null without older readings."""
+    """Without thinning, parameter ``end`` for the page of older readings; null if there is none."""
 
     time: list[float]
     """Times of the readings, seconds since 1970 UTC."""
 
     provenance: list[ProvenanceName]
-    """"measured" on the machine, or "simulated" without samples."""
+    """Origin of the readings: "measured" on the machine, or "simulated"."""
 
     operating_state: list[OperatingStateName]
     """Operating state of the unit."""
 
     is_settled: list[bool]
-    """Whether the operating state had lasted long enough for a comparison of films."""
+    """Whether the operating state had lasted long enough for a comparison with the baseline."""
 
     speed_rpm: list[float | None]
     """Running speed, r/min."""
@@ -128,7 +128,13 @@ EVIDENCE_NAMES = {code: cast("EvidenceName", code.name.lower()) for code in Read
 
 
 def rows_shown(n_found: int, max_points: int, is_thinned: bool) -> Rows:
-    """Return the row numbers to show: thinned evenly with the newest row, or the newest rows."""
+    """Return the numbers of at most `max_points` of `n_found` rows, ascending, with the newest row.
+
+    Parameters
+    ----------
+    is_thinned
+        Whether rows are selected evenly from all rows; otherwise the newest rows are selected.
+    """
     if n_found <= max_points:
         return np.arange(n_found)
     if not is_thinned:
@@ -195,22 +201,24 @@ UNITS = {
     "_deg": "deg",
     "_c": "°C",
 }
-"""Units of columns by the suffix of the column name."""
+"""Units of table columns, by suffix of the column name."""
 
 CONDITION = (
     *("provenance", "operating_state", "is_settled", "speed_rpm", "power_mw"),
     *("eccentricity_ratio", "attitude_deg", "oil_temperature_c", "baseline_version"),
 )
-"""Names of the columns that are common to both directions."""
+"""Names of the table columns that do not depend on the direction."""
 
 
 def film_table(model: FilmReadingsModel, found: FilmHistory, rows: list[int]) -> list[Column]:
-    """Return the readings of a model as table columns.
+    """Return the readings of a film as table columns.
 
     Parameters
     ----------
-    rows
-        Numbers of the rows of the history that the model contains.
+    model
+        API model of the readings.
+    found, rows
+        History of the film, and the numbers of its rows that the model contains.
     """
     times = found.history.time_ns[rows].tolist()
     return [
@@ -231,14 +239,14 @@ def _columns(model: ApiModel, names: Iterable[str], prefix: str = "") -> Iterato
 MAX_POINTS = 20_000
 
 MAX_READ = 120_000
-"""Maximum number of readings read by one request: over two years at one per ten minutes."""
+"""Maximum number of readings that one request reads: two years of readings every ten minutes."""
 
 
 READING_PROBLEMS = problem_responses(404, 422, 503, own={409: "The film is not watched"})
 
 
 def film_history_router(context: Context) -> APIRouter:
-    """Return the router for the readings of a film."""
+    """Return the router for the stored readings of a film."""
     router = subject_router("/units/{unit}/bearings/{bearing}/film", "film")
 
     @router.get(
@@ -267,7 +275,7 @@ def film_history_router(context: Context) -> APIRouter:
             ),
         ] = True,
     ) -> Response:
-        """List stiffness and operating condition of the readings of a film, oldest first.
+        """List the readings of a film with stiffness and operating condition, oldest first.
 
         As CSV or Parquet: one row per reading.
         """

@@ -1,4 +1,4 @@
-"""Route for the current film of a bearing: verdict, change, cause, condition."""
+"""Route for the current state of an oil film: verdict, change of stiffness, cause, condition."""
 
 import math
 from dataclasses import dataclass
@@ -48,10 +48,10 @@ LevelHeldName = Literal["alert", "danger"]
 
 
 class FilmChangeModel(ApiModel):
-    """Most significant mean deviation of the stiffness from the baseline."""
+    """Mean deviation of stiffness from the baseline, at its most significant averaging time."""
 
     percent: Annotated[float, Field(examples=[-19.2])]
-    """Change of stiffness, %; negative if the film is softer."""
+    """Change of stiffness, %; negative if the film is softer than the baseline."""
 
     low_95: Annotated[float, Field(examples=[-21.9])]
     """Lower end of the 95 % interval of the change, %."""
@@ -60,27 +60,27 @@ class FilmChangeModel(ApiModel):
     """Upper end of the 95 % interval of the change, %."""
 
     ln: Annotated[float, Field(examples=[-0.213])]
-    """Change as natural logarithm of stiffness over baseline; the limits apply to it."""
+    """Change as ln(stiffness / baseline stiffness); the alarm limits apply to this value."""
 
     ln_std: float
     """Standard uncertainty of `ln`."""
 
     time_scale_h: Annotated[float, Field(examples=[4.0])]
-    """Averaging time, running hours."""
+    """Averaging time of this change, running hours."""
 
     significance: Annotated[float, Field(examples=[12.4])]
-    """Absolute change divided by its standard uncertainty."""
+    """Absolute value of `ln`, divided by `ln_std`."""
 
     significance_wanted: Annotated[float, Field(examples=[6.5])]
-    """Significance that a change with this averaging time must reach."""
+    """Smallest significance at which a change with this averaging time can raise an alarm."""
 
     as_of: Time | None
-    """Time of the newest reading in the average; null if it is older than the start of the service
-    or than the baseline in force."""
+    """Time of the newest reading in the average; null if this reading was made before the service
+    started or before the baseline in force."""
 
 
 class FilmDeviationModel(ApiModel):
-    """Deviation of one reading from its baseline."""
+    """Deviation of the stiffness of one reading from the baseline."""
 
     percent: float
     """Deviation of stiffness, %."""
@@ -93,24 +93,24 @@ class FilmDeviationModel(ApiModel):
 
 
 class FilmCauseModel(ApiModel):
-    """Cause of a change, inferred from the motion of the shaft."""
+    """Cause of a change of stiffness, inferred from the motion of shaft and bearing."""
 
     cause: CauseName
     """Cause: film of this bearing, oil of all bearings, bracket or transducer, or unknown."""
 
     reason: str
-    """Reason for this cause in words."""
+    """Reason why this cause was inferred."""
 
     film_share: float | None
-    """Share of the change due to the film if an accelerometer causes the rest, 0 to 1 within its
-    uncertainty; null if unknown, or if no such mixture explains the motion."""
+    """Fraction of the change that is due to the film if a transducer error causes the rest, 0 to 1
+    within its uncertainty; null if unknown, or if no such combination explains the motion."""
 
     film_share_std: float | None
-    """Standard uncertainty of `film_share`."""
+    """Standard uncertainty of `film_share`; null if `film_share` is null."""
 
 
 class FilmDirectionModel(ApiModel):
-    """State of a film in one direction."""
+    """State of an oil film in one direction, x or y."""
 
     verdict: Annotated[VerdictName, ByName]
     """Verdict on the newest reading. Only "normal", "alert" and "danger" judge the film. The other
@@ -123,61 +123,61 @@ class FilmDirectionModel(ApiModel):
     """Reason why the film is not judged; "ok" if it is judged."""
 
     level: LevelHeldName | None
-    """Alarm level in force, also while the newest reading cannot be judged."""
+    """Alarm level in force, also while the newest reading cannot be judged; null if none."""
 
     change: FilmChangeModel | None
-    """Change of stiffness; null without a baseline, before the shortest averaging time is over, and
-    without a current reading."""
+    """Change of stiffness; null without a baseline, until the shortest averaging time has passed,
+    and without a current reading."""
 
     deviation: FilmDeviationModel | None
-    """Deviation of the newest reading alone; null if it was not compared."""
+    """Deviation of the newest reading alone; null if this reading was not compared."""
 
     stiffness_n_per_m: float | None
-    """Stiffness of the newest reading; null if it could not be determined."""
+    """Stiffness of the newest reading, N/m; null if it could not be determined."""
 
     cause: FilmCauseModel | None
     """Cause of the change while a level is in force; otherwise null."""
 
 
 class FilmLimitsModel(ApiModel):
-    """Limits of change for alert and danger."""
+    """Alarm limits for the absolute change of ln(stiffness)."""
 
     alert: Annotated[float, Field(examples=[0.035])]
-    """Absolute change of ln of stiffness for alert: 0.04 is 4 %."""
+    """Limit for an alert; 0.04 is a change of 4 %."""
 
     danger: Annotated[float, Field(examples=[0.15])]
-    """Absolute change of ln of stiffness for danger."""
+    """Limit for danger."""
 
 
 class FilmModel(BearingAnswer):
-    """Current state of the film of a bearing."""
+    """Current state of the oil film of a bearing."""
 
     is_watched: bool
-    """Whether stiffness is compared with a baseline."""
+    """Whether the film is watched: its stiffness is compared with a baseline."""
 
     why_not: str | None
-    """Reason why stiffness is not compared; null if it is compared."""
+    """Reason why the film is not watched; null if it is watched."""
 
     estimator: EstimatorName | None
-    """Estimator of the compared stiffness; it does not change, so that readings are comparable."""
+    """Fixed estimator of the stiffness, so that readings are comparable; null if not watched."""
 
     time: Time | None
     """Time of the newest reading; null without a reading since the service started."""
 
     is_current: bool
-    """Whether the newest reading is current."""
+    """Whether the newest reading is recent and the baseline in force has not changed since then."""
 
     next_reading: Time | None
-    """Time of the next reading; null without current data."""
+    """Time at which the next reading is due; null without current data."""
 
     condition: FilmConditionModel | None
-    """Operating condition of the newest result; null without current data."""
+    """Operating condition of the bearing at the newest result; null without current data."""
 
     baseline_version: int | None
-    """Version of the baseline in force; null without such a baseline."""
+    """Version of the baseline in force; null if no baseline is in force."""
 
     limits: FilmLimitsModel | None
-    """Limits of change; null if the film is not watched."""
+    """Alarm limits; null if the film is not watched."""
 
     x: FilmDirectionModel | None
     """State in x; null if the film is not watched."""
@@ -187,7 +187,7 @@ class FilmModel(BearingAnswer):
 
 
 class FilmWordModel(ApiModel):
-    """Verdict on a film in one direction."""
+    """Verdict, alarm level and change of stiffness of a film in one direction."""
 
     verdict: VerdictName
     """Verdict on the newest reading; "no_reading" if this reading is not current."""
@@ -196,11 +196,11 @@ class FilmWordModel(ApiModel):
     """Alarm level in force; null without a level."""
 
     change_percent: float | None
-    """Most significant mean change of stiffness, %."""
+    """Most significant mean change of stiffness, %; null if `change` of the film is null."""
 
 
 class FilmBriefModel(ApiModel):
-    """Summary of the film of a bearing."""
+    """Summary of the oil film of a bearing."""
 
     bearing: str
     """Identifier of the bearing."""
@@ -216,7 +216,7 @@ class FilmBriefModel(ApiModel):
 
 
 CURRENT_PERIODS = 2.5
-"""Maximum age of a current reading, relative to the newest result, in reading periods."""
+"""Maximum time from a current reading to the newest result, in reading periods."""
 
 NORMAL_95 = 1.96
 """Half-width of the 95 % interval of a normal distribution, in standard deviations."""
@@ -230,6 +230,10 @@ class WatchedFilm:
 
     Parameters
     ----------
+    news
+        Newest reading with its findings; None without a reading since the service started.
+    baseline
+        Baseline in force; None without such a baseline.
     why_not_current
         Reason why the newest reading is not current; None if it is current.
     """
@@ -250,7 +254,7 @@ def why_unwatched(context: Context, unit: str, bearing: str) -> str | None:
 
 
 def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
-    """Return the API model of the current film of a bearing."""
+    """Return the API model of the current state of the film of a bearing."""
     seen, place = _seen(context, unit, bearing), context.films.place(unit, bearing)
     x, y = _directions(seen) if seen else (None, None)
     limits = seen.rules.change if seen else None
@@ -310,7 +314,7 @@ def _why_not_current(
 
 
 def _next_reading_ns(seen: WatchedFilm) -> int | None:
-    """Return the start of the first reading slot after the newest result."""
+    """Return the time at which the next reading is due; None without current data."""
     newest, period_ns = seen.current.assessment, seen.rules.reading_ns
     if newest is None or not seen.current.is_current:
         return None
@@ -334,7 +338,7 @@ def _directions(seen: WatchedFilm) -> tuple[FilmDirectionModel, FilmDirectionMod
 
 
 def _unread(reason: str, level: LevelHeldName | None) -> FilmDirectionModel:
-    """Return the state of a direction without a current reading: only the level in force."""
+    """Return the state in a direction without a current reading: a reason and the alarm level."""
     unknown = dict.fromkeys(("change", "deviation", "stiffness_n_per_m", "cause"))
     return FilmDirectionModel.of(verdict="no_reading", reason=reason, level=level, **unknown)
 
@@ -364,7 +368,7 @@ def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding, row: 
 
 
 def _unseen(learned: QuantityBaseline, reading: FilmReading) -> str:
-    """Return the reason that a reading has no baseline: unknown cell or unknown attitude angle."""
+    """Return why the baseline does not cover a reading: cell or attitude angle not learned."""
     is_seen = learned.table.find(learned.grid.cells(reading.conditions))[0] >= 0
     return ATTITUDE_NOT_LEARNED if is_seen else NOT_LEARNED
 
@@ -396,27 +400,33 @@ def _deviation(finding: FilmFinding) -> FilmDeviationModel | None:
 
 
 def percent_of(ln: float) -> float:
-    """Convert a change of the natural logarithm to a relative change, %."""
+    """Return the relative change of a quantity, %, for a change `ln` of its natural logarithm."""
     return 100.0 * math.expm1(ln)
 
 
 def interval_percent(ln: float, std: float) -> tuple[float, float]:
-    """Return the 95 % interval, %, of a change of the natural logarithm."""
+    """Return the ends of the 95 % interval of a relative change, %.
+
+    Parameters
+    ----------
+    ln, std
+        Change of the natural logarithm, and its standard uncertainty.
+    """
     return percent_of(ln - NORMAL_95 * std), percent_of(ln + NORMAL_95 * std)
 
 
 def verdict_name(verdict: Verdict) -> VerdictName:
-    """Return the name of a verdict."""
+    """Return the name of a verdict in the API."""
     return cast("VerdictName", verdict.name.lower())
 
 
 def level_name(level: int | None) -> LevelHeldName | None:
-    """Return the name of an alarm level; None without a level."""
+    """Return the name of an alarm level in the API; None without a level."""
     return None if level is None else cast("LevelHeldName", Verdict(int(level)).name.lower())
 
 
 def watched_place(context: Context, unit: str, bearing: str) -> FilmPlace:
-    """Return a watched film; raise a problem of status 404 or 409 if it is not watched."""
+    """Return unit, bearing and estimator of a film; raise a problem if the film is not watched."""
     context.bearing(unit, bearing)
     place = context.films.place(unit, bearing)
     if place is None:
@@ -426,14 +436,14 @@ def watched_place(context: Context, unit: str, bearing: str) -> FilmPlace:
 
 
 def film_router(context: Context) -> APIRouter:
-    """Return the router for the current film."""
+    """Return the router for the current state of a film."""
     router = subject_router("/units/{unit}/bearings/{bearing}/film", "film")
 
     @router.get(
         "", summary="A film now", response_model=FilmModel, responses=problem_responses(404)
     )
     async def film(unit: UnitId, bearing: BearingId) -> Response:
-        """Return verdict, change with its uncertainty, cause and condition, for x and y.
+        """Return verdict, change of stiffness and cause in x and y, and the operating condition.
 
         A film that cannot be judged is never reported as normal; its verdict states the reason.
         """

@@ -1,4 +1,4 @@
-"""Routes for the motion of a shaft in its bearing at the full sampling rate."""
+"""Routes for the sampled motion of a shaft in its bearing, live and from recordings."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -43,7 +43,7 @@ from service.settings.units import UnitSettings
 
 
 class EllipseModel(ApiModel):
-    """Ellipse of the 1× orbit in the middle of the samples."""
+    """Ellipse of the 1× orbit of the shaft, at the middle sample."""
 
     major_um_pk: float
     """Semi-major axis, µm."""
@@ -52,23 +52,23 @@ class EllipseModel(ApiModel):
     """Semi-minor axis, µm."""
 
     angle_deg: float
-    """Angle of the major axis from x towards y, -90 to 90 degrees."""
+    """Angle of the major axis from the x axis towards the y axis, -90 to 90 degrees."""
 
     sense: Literal["x_to_y", "y_to_x", "straight"]
-    """Direction of motion along the orbit."""
+    """Sense of rotation along the orbit; "straight" if the orbit is a line."""
 
 
 class MotionOrder1Model(ApiModel):
-    """Motion at running speed (1×), from a tapered window of eight turns around each sample."""
+    """1× component of the motion, from a tapered window of eight turns around each sample."""
 
     frequency_hz: float
     """Running speed, Hz."""
 
     shaft_x_um: list[float | None]
-    """Displacement of 1× in x, µm; null with too few neighbouring samples."""
+    """1× displacement in x for each sample, µm; null with too few neighbouring samples."""
 
     shaft_y_um: list[float | None]
-    """Displacement of 1× in y, µm; null with too few neighbouring samples."""
+    """1× displacement in y for each sample, µm; null with too few neighbouring samples."""
 
     ellipse: EllipseModel
     """Ellipse of the 1× orbit."""
@@ -84,13 +84,13 @@ class MotionModel(SampleRange, BearingAnswer):
     """Time of the first sample."""
 
     offset_s: float | None
-    """Offset of the first sample from the recording's start, s; null for the newest samples."""
+    """Time of the first sample after the start of the recording, s; null for the newest samples."""
 
     total_s: float | None
     """Duration of the recording including gaps, s; null for the newest samples."""
 
     age_s: float | None
-    """Age of the newest samples, s; null for a recording."""
+    """Age of the newest sample, s; null for a recording."""
 
     n_samples: int
     """Number of samples in each direction."""
@@ -102,25 +102,25 @@ class MotionModel(SampleRange, BearingAnswer):
     """Displacement in y without its mean, µm; null if the sample is missing or bad."""
 
     centre_um: Annotated[list[float] | None, Field(examples=[[-12.5, -61.0]])]
-    """Mean position [x, y] in the clearance circle, µm, by the gap reference in force; null if the
-    gaps do not determine it."""
+    """Mean position [x, y] of the shaft centre in the clearance circle, µm, from the gap reference
+    in force; null if unknown."""
 
     clearance_um: float
     """Radius of the clearance circle, µm."""
 
     speed_rpm: float | None
-    """Running speed, r/min, from the key-phase, else from the slow channel."""
+    """Running speed, r/min, from the key-phase, else from the slow channel; null if unknown."""
 
     order1: MotionOrder1Model | None
-    """Motion at running speed; null without a speed, or with too few samples."""
+    """1× component of the motion; null if the speed is unknown or the samples are too few."""
 
     mark: list[float] | None
-    """Passages of the key-phase mark, as interpolated distances from the first sample in samples;
-    null for a unit without a key-phase."""
+    """Positions of the key-phase pulses, in samples from the first sample, interpolated; null for a
+    unit without a key-phase."""
 
 
 class OrbitModel(ApiModel):
-    """Orbit of the newest turns of the shaft relative to its bearing, without the means."""
+    """Orbit of the shaft relative to its bearing in the newest turns, about its mean position."""
 
     time: Time
     """Time of the first sample."""
@@ -132,14 +132,14 @@ class OrbitModel(ApiModel):
     """Duration of the samples, s."""
 
     shaft_x_um: list[float]
-    """Displacement in x, µm."""
+    """Displacement in x without its mean, µm."""
 
     shaft_y_um: list[float]
-    """Displacement in y, µm."""
+    """Displacement in y without its mean, µm."""
 
 
 DECIMALS = 3
-"""Number of decimals of displacements in µm; finer than a tenth of a count."""
+"""Number of decimals of displacements in µm, finer than a tenth of a converter count."""
 
 SENSES: dict[int, Literal["x_to_y", "y_to_x", "straight"]] = {
     1: "x_to_y",
@@ -161,9 +161,11 @@ def motion_model(
     Parameters
     ----------
     age_s
-        Age of the newest samples, s; None for a recording.
-    recording, recorded
-        Name of the recording, and position of the samples in it; None for the newest samples.
+        Age of the newest sample, s; None for a recording.
+    recording
+        Name of the recording; None for the newest samples.
+    recorded
+        Position of the samples in the recording; None for the newest samples.
     """
     marks = motion.marks
     return MotionModel.of(
@@ -209,7 +211,7 @@ def orbit_model(orbit: OrbitTrace) -> OrbitModel:
 
 
 MAX_SAMPLES = 60_000
-"""Maximum number of samples of each direction in one answer: 100 s at 600 Hz, 2 MB."""
+"""Maximum number of samples per direction in one answer: 100 s at 600 Hz, about 2 MB."""
 
 MAX_SECONDS = 600.0
 
@@ -224,7 +226,7 @@ RECORDING_PROBLEMS = problem_responses(
 
 
 def motion_router(context: Context) -> APIRouter:
-    """Return the router for the newest motion."""
+    """Return the router for the newest orbit and motion."""
     router = subject_router("/units/{unit}/bearings", "bearing")
     orbits = Renderings()
 
@@ -235,7 +237,7 @@ def motion_router(context: Context) -> APIRouter:
         responses=problem_responses(404, 409),
     )
     async def orbit(unit: UnitId, bearing: BearingId) -> Response:
-        """Return the newest turns of the shaft relative to the bearing."""
+        """Return the orbit of the shaft relative to the bearing in the newest turns."""
         context.bearing(unit, bearing)
         assessment = context.live.assessment(unit, bearing)
         if assessment is None or assessment.orbit is None:
@@ -253,7 +255,7 @@ def motion_router(context: Context) -> APIRouter:
         bearing: BearingId,
         seconds: Annotated[float, duration(HELD_S, NEWEST, examples=[5.0])] = 5.0,
     ) -> Response:
-        """Return the newest motion of a shaft in its bearing: unfiltered, and 1× only."""
+        """Return the newest motion of a shaft in its bearing, unfiltered and as 1× component."""
         context.bearing(unit, bearing)
         settings, watched = context.unit(unit), context.references.bearing(unit, bearing)
         require_samples(settings)
@@ -265,7 +267,7 @@ def motion_router(context: Context) -> APIRouter:
 
 
 def recorded_motion_router(context: Context) -> APIRouter:
-    """Return the router for the motion in recordings."""
+    """Return the router for the shaft motion in recordings."""
     router = subject_router("/recordings", "recordings")
 
     @router.get(
@@ -293,7 +295,8 @@ def recorded_motion_router(context: Context) -> APIRouter:
     ) -> Response:
         """Return the motion of a shaft in its bearing from a part of a recording.
 
-        The calibration in the recording applies. The samples end before a restart of the device.
+        The calibration stored in the recording applies. If the device restarted within this part,
+        samples after the restart are omitted.
         """
         kept = await entry_of(context, recording)
         unit = _unit_of(context, kept)

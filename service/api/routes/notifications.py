@@ -1,4 +1,4 @@
-"""Route for the receivers of alarm messages, with their backlogs."""
+"""Route for the receivers of alarm messages, with the state of their deliveries."""
 
 from typing import Annotated, Literal
 
@@ -26,50 +26,50 @@ class DeadLetterModel(ApiModel):
     """Identifier of the message for the receiver."""
 
     outcome: Literal["refused", "expired"]
-    """Outcome: permanently rejected by the receiver ("refused"), or too old ("expired")."""
+    """Reason for giving up: rejected by the receiver ("refused"), or too old ("expired")."""
 
     reason: Annotated[str, Field(examples=["410 Gone"])]
-    """Answer of the receiver, or reason why the receiver was not reached."""
+    """Answer of the receiver to the last attempt, or reason why it was not reached."""
 
     time: Time
     """Time when the delivery was abandoned."""
 
 
 class ReceiverModel(ApiModel):
-    """Receiver of alarm messages, with its backlog."""
+    """Receiver of alarm messages, with waiting, failed and undeliverable messages."""
 
     id: Annotated[str, Field(examples=["control-room"])]
-    """Name of the receiver in the plant file; for mail, with the recipient."""
+    """Name of the receiver in the plant file; for mail, followed by the recipient."""
 
     kind: ChannelKind | None
     """Kind of receiver; null if the receiver is no longer in the plant file."""
 
     address: Annotated[str | None, Field(examples=["https://alarms.example"])]
-    """Server of a webhook, or mail address."""
+    """Server of a webhook, or mail address; null if the receiver is no longer in the plant file."""
 
     state: SenderStateName
-    """State of the sender."""
+    """State of the delivery of messages to the receiver."""
 
     is_failing: bool
-    """Whether the newest attempt failed."""
+    """Whether the newest delivery attempt failed."""
 
     n_failures: int
-    """Number of failed attempts since the last success."""
+    """Number of failed delivery attempts since the last success."""
 
     failing_since: Time | None
-    """Time of the first failed attempt since the last success; null without failures."""
+    """Time of the first of these failed attempts; null without failures."""
 
     reason: Annotated[str | None, Field(examples=["Connection refused"])]
-    """Reason of the newest failure."""
+    """Reason for the newest failure; null without failures."""
 
     next_attempt: Time | None
-    """Time of the next attempt; null unless the sender waits for it."""
+    """Time of the next attempt after a failure; null if no retry is due."""
 
     n_waiting: int
-    """Number of waiting messages."""
+    """Number of messages waiting for delivery."""
 
     waiting_since: Time | None
-    """Time since which the oldest message waits; null without waiting messages."""
+    """Time when the oldest waiting message was queued; null without waiting messages."""
 
     n_dead: int
     """Number of messages that will never be delivered: rejected or too old."""
@@ -78,7 +78,7 @@ class ReceiverModel(ApiModel):
     """Newest message that will never be delivered; null without such a message."""
 
     last_delivered: Time | None
-    """Time of the newest delivery; null without a delivery."""
+    """Time of the newest successful delivery; null without a delivery."""
 
 
 class DeliveryModel(DatedAnswer):
@@ -88,10 +88,10 @@ class DeliveryModel(DatedAnswer):
     """Origin of the data; a replay sends no messages."""
 
     n_waiting: int
-    """Number of waiting messages of all receivers."""
+    """Number of messages waiting for delivery, of all receivers."""
 
     n_failing: int
-    """Number of receivers whose newest attempt failed."""
+    """Number of receivers whose newest delivery attempt failed."""
 
     receivers: list[ReceiverModel]
     """Receivers in the order of the plant file, then receivers that are no longer in it."""
@@ -111,7 +111,7 @@ def delivery_router(context: Context) -> APIRouter:
         responses=problem_responses(503),
     )
     async def delivery() -> Response:
-        """List receivers of webhooks and mail with backlog, failures and undelivered messages."""
+        """List the receivers of alarm messages with their waiting and failed messages."""
         receivers = [_receiver(view) for view in await context.receivers()]
         return await rendered_now(lambda: _delivery(context, receivers))
 

@@ -1,4 +1,4 @@
-"""Route for the overview of the plant, which is rendered once for all clients."""
+"""Route for the overview of the plant; one rendered answer serves all clients."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,19 +19,19 @@ from service.live.live_view import UnitStatus
 
 
 class EvidenceStatusModel(ApiModel):
-    """State of the evidence of alarms."""
+    """State of the writing of alarm evidence."""
 
     error: str | None
-    """Reason why the newest attempt to write evidence failed."""
+    """Reason why the newest attempt to write evidence failed; null if it succeeded."""
 
     n_waiting: int
-    """Number of occurrences whose evidence is not written yet."""
+    """Number of alarm occurrences whose evidence is not written yet."""
 
     n_written: int
-    """Number of occurrences whose evidence was written since the service started."""
+    """Number of alarm occurrences whose evidence was written since the service started."""
 
     n_lost: int
-    """Number of occurrences dropped since the service started because too many were waiting."""
+    """Number of alarm occurrences without evidence because too many waited, since the start."""
 
 
 class PlantModel(ApiModel):
@@ -41,18 +41,18 @@ class PlantModel(ApiModel):
     """Display name of the plant."""
 
     origin: Literal["live", "replay"]
-    """Live data or replay of a recording; also in the header Padwatch-Origin of every answer."""
+    """"live" or "replay" of a recording; every answer repeats it in the header Padwatch-Origin."""
 
 
 class StoreModel(ApiModel):
     """State of the database."""
 
     error: str | None
-    """Reason why results are not stored; null if they are stored."""
+    """Reason why results cannot be stored or read; null without a fault."""
 
     n_unstored: int
-    """Number of results missing in the database: dropped because the database did not answer for
-    too long, or rejected by the database and parked."""
+    """Number of results that are not in the database, because it did not answer for too long or
+    rejected them."""
 
 
 class CapturesModel(ApiModel):
@@ -69,29 +69,29 @@ class CapturesModel(ApiModel):
 
 
 class UnitOverviewModel(BasicUnitModel):
-    """Unit with the newest results and films of all its bearings."""
+    """Generating unit with the newest results and film summaries of all its guide bearings."""
 
     bearings: list[LatestModel]
     """Newest results of the guide bearings."""
 
     films: list[FilmBriefModel]
-    """Film summaries of the guide bearings, in the same order."""
+    """Summaries of the films of the guide bearings, in the order of `bearings`."""
 
 
 class OverviewModel(DatedAnswer):
-    """Overview of the plant for a control room."""
+    """Overview of the plant: units, alarms, and state of the service."""
 
     plant: PlantModel
     """Name of the plant and origin of the data."""
 
     refresh_s: float
-    """Period of results, s."""
+    """Time between successive results, s."""
 
     store: StoreModel
     """State of the database."""
 
     alarms: AlarmCountModel
-    """Counts of alarms."""
+    """Counts of alarms by state."""
 
     captures: CapturesModel
     """State of the recordings around alarms."""
@@ -108,15 +108,23 @@ DATA_AGE, AGE, NONE = b'"data_age_s":', b'"age_s":', b"null"
 NO_UNITS = b'"units":[]}'
 
 COUNTERS_S = 1.0
-"""Maximum age of the sample counts in an answer, s; they change many times a second."""
+"""Maximum age of the sample counts in the overview, s, if nothing else changes."""
 
 SHARED_S = 0.2
-"""Time for which one answer serves all clients if no link, result or alarm changes, s."""
+"""Time for which one answer serves all clients unless a link, result or alarm changes, s."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Rendered overview with its revision, time of rendering and entity tag."""
+    """Rendered overview, with the state and monotonic time of rendering and its entity tag.
+
+    Parameters
+    ----------
+    revision
+        Values that make the answer outdated if any of them changes.
+    made_s
+        Monotonic time of rendering, s.
+    """
 
     revision: tuple[object, ...]
     made_s: float
@@ -126,16 +134,16 @@ class Answer:
 
 @dataclass(frozen=True)
 class UnitState:
-    """State of a unit from which its part of the overview is rendered.
+    """State of a unit, from which the part of the overview about this unit is rendered.
 
     Parameters
     ----------
     values
-        State as objects that are replaced, not modified, by a change.
+        Objects of the state; a change replaces an object and does not modify it.
     status
-        Status of the unit, an object that is replaced when samples arrive.
+        Status of the unit, which is replaced when samples arrive.
     ages_s
-        Ages of the newest sample and of the newest result of each bearing.
+        Age of the newest sample, then age of the newest result of each bearing, s; None if unknown.
     now_s
         Monotonic time of the state, s.
     """
@@ -148,30 +156,40 @@ class UnitState:
 
 @dataclass(frozen=True)
 class UnitPart:
-    """JSON of a unit, split at the positions of its ages."""
+    """Rendered JSON of a unit without its ages.
+
+    Parameters
+    ----------
+    state
+        State that was rendered.
+    pieces
+        JSON before, between and after the ages.
+    digest
+        Hash of the JSON without ages.
+    """
 
     state: UnitState
     pieces: Sequence[bytes]
     digest: bytes
 
     def is_of(self, state: UnitState) -> bool:
-        """Whether the part is up to date with a state; objects are compared by identity."""
+        """Whether the JSON is up to date with a state; objects are compared by identity."""
         mine = self.state
         if any(old is not new for old, new in zip(mine.values, state.values, strict=True)):
             return False
         return mine.status is state.status or state.now_s - mine.now_s < COUNTERS_S
 
     def filled(self, ages_s: Sequence[float | None]) -> bytes:
-        """Return the JSON with the given ages inserted."""
+        """Return the JSON of the unit with the given ages, in the order of `UnitState.ages_s`."""
         first, *others = self.pieces
         ages = (NONE if age_s is None else repr(age_s).encode() for age_s in ages_s)
         return b"".join([first, *(x for pair in zip(ages, others, strict=True) for x in pair)])
 
 
 class Overview:
-    """Renderer of the overview; the part of a unit is cached until the unit changes.
+    """Renderer of the overview; the JSON of each unit is cached until its state changes.
 
-    The state is read on the event loop, which also writes it; rendering runs in threads.
+    The state is read on the event loop, on which it also changes; rendering runs in threads.
     """
 
     def __init__(self, context: Context) -> None:
@@ -190,7 +208,7 @@ class Overview:
         return Response(kept.body, media_type="application/json", headers={"ETag": kept.tag})
 
     def _revision(self) -> tuple[object, ...]:
-        """Return all values whose changes must be shown without delay."""
+        """Return values that make a rendered overview outdated if any of them changes."""
         live, alarms, captures = self._context.live, self._context.alarms, self._context.captures
         stored = (live.store_error, live.n_unstored)
         return (live.revision, alarms.revision, *stored, captures.error, captures.n_running)
@@ -242,7 +260,7 @@ class Overview:
         return UnitPart(state, _around_ages(content), digest_of(content))
 
     def _ageless(self, unit: str, bearing: str) -> LatestModel:
-        """Return the model of a bearing without its age; it is cached until the next result."""
+        """Return the newest result of a bearing without its age, cached until the next result."""
         current = self._context.live.current(unit, bearing)
         values = (current.assessment, current.quality.reason)
         kept = self._latest.get((unit, bearing))
@@ -253,7 +271,7 @@ class Overview:
         return kept[1]
 
     def _head(self) -> OverviewModel:
-        """Return the model of the overview without units."""
+        """Return the API model of the overview, with an empty list of units."""
         context = self._context
         return OverviewModel.of(
             context,
@@ -267,7 +285,7 @@ class Overview:
 
 
 def _around_ages(content: bytes) -> list[bytes]:
-    """Split the JSON of a unit at its ages, which are all null; the source's age is the first."""
+    """Split the JSON of a unit at its null ages: of the newest sample, then of each result."""
     source, bearings = content.split(DATA_AGE + NONE, 1)
     *before, last = bearings.split(AGE + NONE)
     return [source + DATA_AGE, *(piece + AGE for piece in before), last]
@@ -280,7 +298,7 @@ def overview_router(context: Context) -> APIRouter:
 
     @router.get("/overview", summary="Everything at a glance", response_model=OverviewModel)
     async def overview() -> Response:
-        """Return all units with all bearings; values that are not current are null."""
+        """Return all units with bearings and films; values that are not current are null."""
         return await shown.answer()
 
     return router

@@ -22,17 +22,17 @@ from service.store.access.identities import Permission
 
 
 class DeviceClockModel(ApiModel):
-    """Device clock compared with the host clock."""
+    """Offset and drift of the device clock relative to the host clock."""
 
     offset_s: float | None
-    """Lead of the device's time stamps over the host clock, s; null without time stamps."""
+    """Offset of the device clock, s, positive if ahead; null if the device sends no time stamps."""
 
     drift_ppm: float | None
     """Deviation of the sampling rate, timed by the host clock, from its nominal value, ppm; null
     during the first minute, and for a device that samples on request."""
 
     drift_uncertainty_ppm: float | None
-    """Standard uncertainty of the drift, ppm."""
+    """Standard uncertainty of the drift, ppm; null if the drift is null."""
 
     n_stamp_faults: int
     """Number of blocks whose time stamp was discarded because it contradicts the sample index."""
@@ -42,25 +42,25 @@ class DeviceClockModel(ApiModel):
 
 
 class SourceModel(ApiModel):
-    """State of the source of a unit, and counts of its samples."""
+    """State of the data source of a unit, and counts of its samples."""
 
     state: Literal["connecting", "connected", "not_connected", "ended"]
-    """State of the link; only the replay of a recording can be "ended"."""
+    """State of the link to the source; only the replay of a recording can be "ended"."""
 
     reason: str | None
     """Reason why samples do not arrive; null if they arrive."""
 
     since: Time | None
-    """Time since which the link is in this state."""
+    """Start of the present state of the link; null if unknown."""
 
     data_age_s: float | None
-    """Age of the newest sample, s."""
+    """Age of the newest sample, s; null without a sample."""
 
     last_sample_time: Time | None
-    """Time of the newest sample by the device clock."""
+    """Time of the newest sample by the device clock; null without a sample."""
 
     n_offered: int
-    """Number of samples per channel counted by the device: stored + flagged + gap + rejected."""
+    """Number of samples per channel that the device made: stored + flagged + gap + rejected."""
 
     n_stored: int
     """Number of accepted samples with all channels good."""
@@ -69,19 +69,19 @@ class SourceModel(ApiModel):
     """Number of accepted samples with at least one channel not good."""
 
     n_gap: int
-    """Number of samples that never arrived."""
+    """Number of missing samples, which never arrived."""
 
     n_repeated: int
-    """Number of repeated samples, which were dropped."""
+    """Number of samples received more than once; the repetitions were dropped."""
 
     n_restarts: int
-    """Number of restarts of the sample index by the device."""
+    """Number of times the device restarted its sample index."""
 
     rejected: dict[str, int]
     """Number of rejected samples, by reason."""
 
     clock: DeviceClockModel | None
-    """Device clock; null if it cannot be compared with the host clock."""
+    """Offset and drift of the device clock; null if unknown."""
 
 
 SourceKind = Literal[
@@ -90,7 +90,7 @@ SourceKind = Literal[
 
 
 class PollsModel(ApiModel):
-    """Statistics of the duration of polls, including decoding."""
+    """Statistics of the duration of polls of a device, including decoding of the answers."""
 
     n: int
     """Number of answered polls since the service started."""
@@ -103,16 +103,16 @@ class PollsModel(ApiModel):
 
 
 class SourceHealthModel(SourceModel):
-    """Source of a unit: kind, state, and counts of its samples."""
+    """Data source of a unit: kind, state, and counts of its samples."""
 
     unit: Annotated[str, Field(examples=["U1"])]
     """Identifier of the unit."""
 
     kind: SourceKind
-    """Kind of source."""
+    """Kind of source: protocol of the device, or simulation."""
 
     n_failed: int
-    """Number of failed connections and lost links since the service started."""
+    """Number of failed connection attempts and lost links since the service started."""
 
     rate_hz: float
     """Sampling rate, Hz."""
@@ -121,7 +121,7 @@ class SourceHealthModel(SourceModel):
     """Poll period, s; null for a device that is not polled."""
 
     polls: PollsModel | None
-    """Duration of polls; null before the second poll, and for a device that is not polled."""
+    """Statistics of polls; null before the second poll, and for a device that is not polled."""
 
     refused_frames: Annotated[dict[str, int], Field(examples=[{"duplicate": 2}])]
     """Number of CAN frames rejected since the service started, by reason."""
@@ -146,10 +146,10 @@ def source_model(live: LiveState, unit: str) -> SourceModel:
 
 
 class GapModel(ApiModel):
-    """Gap: samples that were not delivered, or not received while the service was stopped."""
+    """Gap in the samples of a unit, also while the service was stopped."""
 
     epoch: int
-    """Epoch of the sample index."""
+    """Epoch of the sample index; it changes when the device restarts its count."""
 
     first_index: int
     """Index of the first missing sample."""
@@ -164,51 +164,51 @@ class GapModel(ApiModel):
     """Time of the first sample after the gap."""
 
     is_estimated: bool
-    """Whether the device restarted its sample index in the gap; `n_samples` is then estimated from
-    the times. Otherwise it is exact."""
+    """Whether `n_samples` is estimated from times, because the device restarted its sample index in
+    the gap; otherwise `n_samples` is exact."""
 
 
 class BasicUnitModel(ApiModel):
-    """Unit with the state of its source."""
+    """Generating unit with the state of its data source."""
 
     id: str
     """Stable identifier of the unit."""
 
     name: str
-    """Display name of the unit."""
+    """Name of the unit for display."""
 
     rated_speed_rpm: float
     """Rated speed, r/min."""
 
     source: SourceModel
-    """State of the source of the unit."""
+    """State of the data source of the unit."""
 
 
 class UnitModel(BasicUnitModel):
-    """Unit with the state of its source and its bearings."""
+    """Generating unit with the state of its data source and its guide bearings."""
 
     bearing_ids: list[str]
     """Identifiers of the guide bearings of the unit."""
 
 
 class QuantityModel(ApiModel):
-    """Quantity of results and trends, from the catalogue."""
+    """Measured quantity of a bearing, from the catalogue of quantities."""
 
     name: str
     """Name of the quantity in readings and trends."""
 
     unit: str
-    """Unit and detector of the values."""
+    """Unit of the values; for an amplitude, also the detector."""
 
     label: str
     """Description of the quantity in words."""
 
 
 class ConfigurationModel(ApiModel):
-    """Configuration: plant file as read, with defaults, without secrets."""
+    """Configuration of the service: settings of the plant file and defaults, without secrets."""
 
     version: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", examples=["9f86d081" * 8])]
-    """SHA-256 of the configuration; evidence of alarms refers to it."""
+    """SHA-256 hash of the configuration; evidence reports of alarms state this version."""
 
     padwatch: Annotated[str, Field(examples=["0.1.0"])]
     """Version of the program."""
@@ -217,10 +217,10 @@ class ConfigurationModel(ApiModel):
     """Source commit of the program; null if unknown."""
 
     json_schema: Annotated[str, Field(examples=["/api/v1/configuration/schema"])]
-    """Path of the JSON schema, with meaning, limits and default of every key."""
+    """URL path of the JSON schema, which gives meaning, limits and default of every setting."""
 
     settings: dict[str, Any]
-    """All settings, by the keys of the plant file."""
+    """All settings, structured like the plant file."""
 
 
 SCHEMA = "/api/v1/configuration/schema"
@@ -239,7 +239,7 @@ def plant_router(context: Context) -> APIRouter:
 
     @router.get("/units/{unit}", summary="One unit", responses=problem_responses(404))
     async def one_unit(unit: UnitId) -> UnitModel:
-        """Return a unit and the state of its source."""
+        """Return a unit with the state of its source."""
         return _unit(context, context.unit(unit).id)
 
     @router.get(
@@ -248,7 +248,7 @@ def plant_router(context: Context) -> APIRouter:
         dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
     )
     async def quantities() -> list[QuantityModel]:
-        """List name, unit and meaning of all quantities of a bearing."""
+        """List name, unit and description of all quantities of a bearing."""
         return [QuantityModel.of(quantity) for quantity in CATALOGUE]
 
     @router.get("/sources", summary="Health of each source")
@@ -271,7 +271,7 @@ def plant_router(context: Context) -> APIRouter:
     async def configuration() -> ConfigurationModel:
         """Return the plant file as read when the service started, without secrets.
 
-        The evidence of alarms refers to the version of the configuration.
+        Evidence reports of alarms state the version of the configuration.
         """
         if context.configuration is None:
             raise ProblemError(404, "No configuration", "no configuration is kept here")

@@ -1,4 +1,4 @@
-"""Routes for recordings of samples: list, description, download."""
+"""Routes for recordings of samples: list, description and download of recordings."""
 
 from collections.abc import Callable, Generator
 from typing import Annotated, Any, Literal
@@ -22,45 +22,45 @@ from service.store.waveforms import WaveformKind
 
 
 class RunningRecordingModel(ApiModel):
-    """Recording in progress: occurrence of an alarm whose samples are being written."""
+    """Recording in progress, identified by the alarm that caused it."""
 
     alarm: Annotated[str, Field(examples=["U1:UJB:shaft_x"])]
     """Identifier of the alarm."""
 
     occurrence: int
-    """Occurrence of the alarm."""
+    """Number of the occurrence of the alarm."""
 
 
 class RecordingAlarmModel(RunningRecordingModel):
     """Alarm event that caused a recording."""
 
     change: Annotated[str, Field(examples=["raised"])]
-    """Kind of event."""
+    """Kind of alarm event."""
 
     level: str | None
-    """Level of the alarm at the time of the event."""
+    """Level of the alarm at the time of the event; null without a level."""
 
     time: Time
     """Time of the event."""
 
 
 class RecordingModel(ApiModel):
-    """Finished recording."""
+    """Finished recording of samples."""
 
     id: Annotated[str, Field(examples=["U1-20261121T090312.400Z-shaft_x"])]
     """Name of the recording."""
 
     kind: Literal["capture", "continuous"]
-    """Samples around an alarm, or part of a continuous recording."""
+    """"capture" for samples around an alarm, "continuous" for a part of a continuous recording."""
 
     state: Literal["complete", "damaged"]
-    """State according to the manifest and the newest check."""
+    """State of the files according to the manifest and the newest check."""
 
     reason: str | None
     """Reason why the recording is damaged; null if it is complete."""
 
     unit: str | None
-    """Unit; null, like all fields from the manifest, if the manifest cannot be read."""
+    """Identifier of the unit. This and all nullable fields below are null without a manifest."""
 
     start: Time | None
     """Time of the first sample."""
@@ -78,30 +78,30 @@ class RecordingModel(ApiModel):
     """Size of all files of the recording, bytes."""
 
     alarms: list[RecordingAlarmModel]
-    """Alarm events that caused the recording; the first event started it. Empty if continuous."""
+    """Alarm events that caused the recording, first event first; empty if continuous."""
 
 
 class RecordingsModel(ApiModel):
-    """Recordings of samples around alarms, and continuous recordings."""
+    """List of recordings, finished and in progress, and state of recording."""
 
     recordings: list[RecordingModel]
     """Finished recordings, newest first."""
 
     being_made: list[RunningRecordingModel]
-    """Recordings in progress."""
+    """Recordings around alarms in progress."""
 
     error: str | None
-    """Reason why samples around alarms cannot be recorded now; null if they can."""
+    """Reason why samples around alarms cannot be recorded now; null if recording is possible."""
 
     continuous: list[str]
     """Identifiers of the units that are recorded continuously."""
 
     continuous_error: str | None
-    """Reason why continuous recording fails now; null if it does not fail."""
+    """Reason why continuous recording fails now; null if recording does not fail."""
 
 
 class RecordedChannelModel(ApiModel):
-    """Waveform channel of a recording."""
+    """Waveform channel in a recording."""
 
     id: str
     """Identifier of the channel within the unit."""
@@ -114,7 +114,7 @@ class RecordedChannelModel(ApiModel):
 
 
 class RecordedSlowModel(ApiModel):
-    """Slow channel of a recording."""
+    """Slow channel in a recording, such as an oil temperature."""
 
     id: str
     """Identifier of the channel within the unit."""
@@ -134,19 +134,19 @@ class RecordedFileModel(ApiModel):
 
 
 class RecordingInfoModel(ApiModel):
-    """Description of a recording after a full check."""
+    """Description of a recording, made from a full check of its files."""
 
     recording: RecordingModel
-    """Entry of the recording in the list."""
+    """The recording as in the list of recordings."""
 
     made_by: str
     """Program that made the recording, and its purpose."""
 
     sample_type: Literal["int16", "float32"]
-    """Type of the stored samples: counts of the converter, or engineering units."""
+    """Type of the stored samples: int16 counts of the converter, or float32 engineering units."""
 
     end: Time
-    """End of the last sample: time at which the next sample would follow."""
+    """End of the recording: time of the last sample plus one sampling interval."""
 
     n_gaps: int
     """Number of gaps in the samples."""
@@ -158,20 +158,20 @@ class RecordingInfoModel(ApiModel):
     """Number of rejected samples, by reason."""
 
     epochs: list[int]
-    """Epochs of the sample index; more than one if the device restarted its count."""
+    """Epochs of the sample index; several if the device restarted its count meanwhile."""
 
     channels: list[RecordedChannelModel]
-    """Waveform channels, in the order of the columns."""
+    """Waveform channels, in the order of the columns of the stored samples."""
 
     slow_channels: list[RecordedSlowModel]
-    """Slow channels, in the order of the columns."""
+    """Slow channels, in the order of the columns of the stored readings."""
 
     files: dict[str, RecordedFileModel]
     """Files of the recording by name, except the manifest and the list of alarms."""
 
 
 def recording_model(kept: RecordingEntry) -> RecordingModel:
-    """Return the API model of a recording as an entry of the list."""
+    """Return the API model of a recording for the list of recordings."""
     manifest = kept.manifest
     described = ("unit", "start", "rate_hz", "n_samples")
     return RecordingModel.of(
@@ -185,7 +185,7 @@ def recording_model(kept: RecordingEntry) -> RecordingModel:
 
 
 def recording_info(shelf: RecordingLibrary, kept: RecordingEntry) -> RecordingInfoModel:
-    """Return the API model of the description of a recording.
+    """Check the files of a recording; return the API model of its description.
 
     Raises
     ------
@@ -242,7 +242,7 @@ def recording_router(context: Context) -> APIRouter:
             int, Query(ge=1, le=500, description="Maximum number of recordings.")
         ] = 100,
     ) -> RecordingsModel:
-        """List the newest recordings, and the recordings around alarms in progress."""
+        """List the newest finished recordings, and the recordings around alarms in progress."""
         if unit is not None:
             context.unit(unit)
         found = await in_thread(lambda: library_of(context).newest(limit, unit, kind))
@@ -262,7 +262,7 @@ def recording_router(context: Context) -> APIRouter:
         response_model=RecordingInfoModel,
     )
     async def one_recording(recording: RecordingId) -> Response:
-        """Check a recording; return its channels, gaps, rejected samples and files."""
+        """Check the files of a recording; return its channels, gaps, rejected samples and files."""
         kept = await entry_of(context, recording)
         try:
             return await rendered(lambda: recording_info(library_of(context), kept))
@@ -320,7 +320,7 @@ async def _download(
 
 
 def library_of(context: Context) -> RecordingLibrary:
-    """Return the library of recordings; raise a problem of status 404 without a library."""
+    """Return the library of recordings; raise a problem of status 404 if none are kept here."""
     if context.recordings is None:
         words = "no recordings are kept here; see the process that analyses the unit"
         raise ProblemError(404, "No recordings", words)
@@ -328,7 +328,7 @@ def library_of(context: Context) -> RecordingLibrary:
 
 
 async def entry_of(context: Context, recording: str) -> RecordingEntry:
-    """Return the entry of a recording; raise a problem of status 404 for an unknown name."""
+    """Return the library entry of a recording; raise a problem of status 404 if it is unknown."""
     library = library_of(context)
     found = await in_thread(lambda: library.one(recording))
     if found is None:
@@ -337,7 +337,7 @@ async def entry_of(context: Context, recording: str) -> RecordingEntry:
 
 
 def damaged_recording(recording: str, error: Exception) -> ProblemError:
-    """Log a damaged recording; return the error for it, status 410."""
+    """Log that a recording is damaged; return the error with status 410 for the request."""
     log.error("a recording cannot be read", recording=recording, reason=str(error))
     words = f"recording {recording} is damaged on the disk and cannot be read"
     return ProblemError(410, "Damaged", words)

@@ -1,4 +1,4 @@
-"""Routes for gap references of the shaft centre, and for reference vectors of 1×."""
+"""Routes for gap references, which fix the shaft centre, and for reference vectors of 1×."""
 
 import asyncio
 from typing import Annotated, Literal
@@ -27,7 +27,7 @@ from service.store.references import GapReference, SetVectorReference
 
 
 class SetReferenceModel(ApiModel):
-    """Stored gap reference of a bearing."""
+    """Stored gap reference of a bearing: probe gaps with the shaft centred."""
 
     gap_reference_um: MicrometrePair
     """Probe gaps [x, y] with the shaft centred, µm."""
@@ -36,7 +36,7 @@ class SetReferenceModel(ApiModel):
     """Gaps of the probes across the shaft, µm; null without such probes."""
 
     source: Literal["given", "measured"]
-    """Values entered by hand, or mean gaps measured when the reference was set."""
+    """Source: values entered by hand ("given"), or mean measured gaps ("measured")."""
 
     set: Time
     """Time when the reference was set."""
@@ -49,24 +49,24 @@ class SetReferenceModel(ApiModel):
 
 
 class VectorModel(ApiModel):
-    """Vector of 1×: amplitude and phase."""
+    """Vibration vector of 1×: amplitude and phase."""
 
     amplitude_um_pk: Annotated[float, Field(examples=[61.2])]
     """Amplitude, µm zero-to-peak."""
 
     phase_deg: Annotated[float | None, Field(examples=[134.8])]
-    """Phase lead over the key-phase, degrees; null without a key-phase, so that only amplitudes are
-    compared."""
+    """Phase lead over the key-phase pulse, degrees; null without a key-phase, when only amplitudes
+    are compared."""
 
 
 class Order1ReferenceModel(BearingAnswer):
-    """Stored reference of 1×: vectors of a healthy bearing."""
+    """Stored 1× reference of a bearing: vibration vectors in the healthy state."""
 
     state: Annotated[OperatingStateName, ByName]
     """Operating state to which the reference applies."""
 
     vectors: dict[PlaceName, VectorModel]
-    """Reference vectors by channel."""
+    """Reference vectors of 1×, by channel."""
 
     set: Time
     """Time when the reference was set."""
@@ -79,7 +79,7 @@ class Order1ReferenceModel(BearingAnswer):
 
 
 class TakeReferenceModel(ActorModel):
-    """Request to store the current 1× vectors as reference."""
+    """Request to store the current 1× vectors of a bearing as reference."""
 
     note: NoteText = ""
     """Note, at most 500 printable characters."""
@@ -104,8 +104,8 @@ def reference_router(context: Context) -> APIRouter:
     async def references(unit: UnitId, bearing: BearingId) -> list[SetReferenceModel]:
         """List the stored gap references of a bearing, newest first, at most 1000.
 
-        The newest reference is in force a few seconds after it was set. Without stored references,
-        the plant file applies.
+        The newest reference comes into force a few seconds after it was set. Without stored
+        references, the reference of the plant file applies.
         """
         context.bearing(unit, bearing)
         history = await asyncio.to_thread(context.store.reference_history, unit, bearing)
@@ -117,8 +117,8 @@ def reference_router(context: Context) -> APIRouter:
     async def order1_references(unit: UnitId, bearing: BearingId) -> list[Order1ReferenceModel]:
         """List the stored 1× references of a bearing, newest first, at most 1000.
 
-        In each operating state the newest reference applies. Without stored references, the
-        reference of the plant file applies.
+        In each operating state, the newest reference of this state applies. Without stored
+        references, the reference of the plant file applies.
         """
         context.bearing(unit, bearing)
         history = await asyncio.to_thread(context.store.order1_references.history, unit, bearing)
@@ -133,7 +133,7 @@ def reference_router(context: Context) -> APIRouter:
     async def take(
         unit: UnitId, bearing: BearingId, asked: TakeReferenceModel
     ) -> Order1ReferenceModel:
-        """Store the 1× vectors of the newest result as reference for the operating state."""
+        """Store the 1× vectors of the newest result as reference for its operating state."""
         context.bearing(unit, bearing)
         current = context.live.current(unit, bearing)
         try:

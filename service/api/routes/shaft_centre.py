@@ -31,29 +31,29 @@ from service.store.series import U_RANDOM, U_SYSTEMATIC
 
 
 class CentreColumnModel(ApiModel):
-    """Columns of one quantity of the shaft centre, with one value per time."""
+    """Values of one coordinate of the shaft centre over time; every list has one value per time."""
 
     mean: list[float | None]
     """Mean of the usable readings; null without usable readings."""
 
     u_random: list[float | None]
-    """Mean of the random standard uncertainty."""
+    """Mean of the random standard uncertainties of the readings; null if unknown."""
 
     u_systematic: list[float | None]
-    """Mean of the systematic standard uncertainty."""
+    """Mean of the systematic standard uncertainties of the readings; null if unknown."""
 
     worst_level: list[LevelName | None]
-    """Worst quality level; null without readings."""
+    """Worst quality level of the readings; null without readings."""
 
 
 class CentreLineModel(BearingHistory):
-    """Shaft centre line of a bearing, oldest first, by column."""
+    """Shaft centre line of a bearing, oldest first, as one list per quantity."""
 
     clearance_um: float
     """Radius of the clearance circle, µm."""
 
     bucket_s: float | None
-    """Width of the buckets, s; null for single readings."""
+    """Width of the time intervals (buckets) that are averaged, s; null for single readings."""
 
     simulated_until: Time | None
     """End of the simulated readings; null if all readings in this range are measured."""
@@ -62,10 +62,10 @@ class CentreLineModel(BearingHistory):
     """Time of each reading or start of each bucket, seconds since 1970 UTC."""
 
     x_um: CentreColumnModel
-    """Shaft centre in x, µm."""
+    """Position of the shaft centre in x, µm."""
 
     y_um: CentreColumnModel
-    """Shaft centre in y, µm."""
+    """Position of the shaft centre in y, µm."""
 
     eccentricity_ratio: CentreColumnModel
     """Eccentricity ratio: eccentricity divided by clearance."""
@@ -80,7 +80,7 @@ COLUMNS = {
     "eccentricity_ratio": "eccentricity_ratio",
     "attitude_angle_deg": "attitude_angle_deg",
 }
-"""Names of the quantities by name of the column."""
+"""Names of the quantities in the catalogue, by field of `CentreLineModel`."""
 
 
 def centre_router(context: Context) -> APIRouter:

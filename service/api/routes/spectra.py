@@ -1,4 +1,4 @@
-"""Routes for spectra of a bearing: newest spectrum, and stored spectra over time."""
+"""Routes for the amplitude spectra of a bearing: newest spectra, and stored spectra over time."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -33,13 +33,13 @@ from service.store.spectra import SpectraQuery, StoredSpectrum
 
 
 class PlaceSpectraModel(ApiModel):
-    """Spectra of one channel over time."""
+    """Amplitude spectra of one channel over time."""
 
     unit: Literal["um_pk"]
     """Unit of the amplitudes: µm of displacement, zero to peak."""
 
     amplitude: list[list[float] | None]
-    """Amplitudes per time and frequency; null for a time at which the channel was not usable."""
+    """Amplitudes as one list per time; null for a time at which the channel was not usable."""
 
 
 class SpectraModel(BearingHistory):
@@ -52,7 +52,7 @@ class SpectraModel(BearingHistory):
     """End of the samples of each spectrum, seconds since 1970 UTC."""
 
     duration_s: list[float]
-    """Duration of the averaged samples, s."""
+    """Duration of the samples averaged for each spectrum, s."""
 
     speed_rpm: list[float | None]
     """Running speed, r/min; null if unknown."""
@@ -61,13 +61,13 @@ class SpectraModel(BearingHistory):
     """Active power, MW; null if unknown."""
 
     operating_state: list[OperatingStateName]
-    """Operating state of the unit."""
+    """Operating state of the unit at each time."""
 
     level: list[LevelName]
-    """Worst quality level of the 1× amplitudes."""
+    """Worst quality level of the 1× amplitudes at each time."""
 
     reason: list[str]
-    """Reason of the quality level; "ok" if it is good."""
+    """Reason for the quality level; "ok" if the level is good."""
 
     order1_hz: list[float | None]
     """Frequency of 1×, Hz; null if unknown."""
@@ -76,24 +76,24 @@ class SpectraModel(BearingHistory):
     """Frequency of the vortex, Hz; null if unknown."""
 
     channels: dict[PlaceName, PlaceSpectraModel]
-    """Spectra of the requested channels."""
+    """Spectra of the requested channels, by channel."""
 
     n_found: int
-    """Number of spectra stored in this range; more than `max_spectra` are thinned evenly."""
+    """Number of spectra stored in the range; if above `max_spectra`, they are thinned evenly."""
 
     n_other_resolution: int
     """Number of spectra left out because their frequencies differ from those of the newest
     spectrum, after a change of the settings."""
 
     damaged: list[Time]
-    """Times of spectra left out because they are damaged on the disk."""
+    """Times of spectra that are left out because their stored data are damaged."""
 
     first: Time | None
     """Time of the oldest stored spectrum of this bearing; null without stored spectra."""
 
     simulated_until: Time | None
-    """End of the simulated readings of this bearing, which have no spectra; null if all are
-    measured."""
+    """End of the simulated readings of this bearing, which have no spectra; null without simulated
+    readings."""
 
 
 class SpectrumChannelModel(ApiModel):
@@ -107,7 +107,7 @@ class SpectrumChannelModel(ApiModel):
 
 
 class SpectrumModel(ApiModel):
-    """Averaged amplitude spectra of a bearing, as displacement."""
+    """Averaged amplitude spectra of a bearing; all amplitudes are displacements."""
 
     time: Time
     """End of the averaged samples."""
@@ -116,10 +116,10 @@ class SpectrumModel(ApiModel):
     """Frequencies of the spectral lines, Hz."""
 
     channels: dict[str, SpectrumChannelModel]
-    """Spectra of the channels shaft_x, shaft_y, bearing_x and bearing_y."""
+    """Spectra by channel: shaft_x, shaft_y, bearing_x and bearing_y."""
 
     lines: dict[str, float | None]
-    """Frequencies of order1 (1×) and of the vortex, Hz; null if unknown."""
+    """Frequencies of 1× ("order1") and of the vortex ("vortex"), Hz; null if unknown."""
 
 
 OWN_FIELDS = ("duration_s", "speed_rpm", "power_mw", "order1_hz", "vortex_hz")
@@ -129,7 +129,7 @@ MAX_NUMBERS = 2_000_000
 """Maximum number of amplitudes in one answer, about 20 MB."""
 
 DECIMALS = 6
-"""Number of decimals of amplitudes in µm; stored spectra are less precise."""
+"""Number of decimals of amplitudes in µm, more than the precision of stored spectra."""
 
 
 def _frequencies(shown: Sequence[StoredSpectrum], max_frequency_hz: float | None) -> FloatArray:
@@ -159,7 +159,7 @@ def _place(shown: Sequence[StoredSpectrum], place: PlaceName, n_lines: int) -> P
 
 
 def spectrum_model(assessment: Assessment) -> SpectrumModel:
-    """Return the API model of the amplitude spectra of a result."""
+    """Return the API model of the averaged amplitude spectra of a result."""
     spectrum, readings = assessment.spectrum, assessment.readings
     return SpectrumModel.of(
         time=assessment.time_ns,
@@ -194,7 +194,7 @@ def spectra_router(context: Context) -> APIRouter:
         responses=problem_responses(404, 409),
     )
     async def spectrum(unit: UnitId, bearing: BearingId) -> Response:
-        """Return averaged amplitude spectra of the newest result, all channels as displacement."""
+        """Return the averaged amplitude spectra of the newest result, all as displacement."""
         context.bearing(unit, bearing)
         assessment = context.live.assessment(unit, bearing)
         if assessment is None:
@@ -228,9 +228,9 @@ def spectra_router(context: Context) -> APIRouter:
             Query(gt=0.0, allow_inf_nan=False, description="Highest frequency.", examples=[6.0]),
         ] = None,
     ) -> Response:
-        """List stored averaged amplitude spectra, all channels as displacement.
+        """List stored averaged amplitude spectra, all as displacement.
 
-        Each spectrum applies to its own time; it is no mean or maximum up to the next spectrum.
+        Thinning omits spectra between those returned; it does not average them.
         """
         context.bearing(unit, bearing)
         places = list(dict.fromkeys(channel or PLACES))

@@ -1,4 +1,4 @@
-"""Trends grouped by operating state, or by condition cell along one axis."""
+"""Trends grouped by operating state, or by intervals of eccentricity or oil temperature."""
 
 import math
 from collections.abc import Iterator
@@ -18,21 +18,23 @@ MAX_GROUPS = 60
 SURVEY_POINTS = 5000
 
 BIN_TOLERANCE = 1e-9
-"""Distance from the bound between two bins, in bin widths, within which both bins are read."""
+"""If a value is closer to a bound than this, in bin widths, the bins on both sides are read."""
 
 
 class TooManyGroupsError(ValueError):
-    """Raised for more than `MAX_GROUPS` groups; the message gives the limit."""
+    """Raised if a query has more than `MAX_GROUPS` groups; the message gives the limit."""
 
 
 @dataclass(frozen=True)
 class TrendGroup:
-    """Trend of the readings in one operating state or condition cell.
+    """Trend of the readings in one operating state, or one interval of the grouping quantity.
 
     Parameters
     ----------
+    name
+        Operating state, or bounds of the interval such as "0.35 to 0.4".
     low, high
-        Bounds of the cell; None for operating states.
+        Bounds of the interval, in eccentricity ratio or °C; None for operating states.
     """
 
     name: str
@@ -43,19 +45,21 @@ class TrendGroup:
 
 @dataclass(frozen=True)
 class _Axis:
-    """Axis of eccentricity or temperature, divided into bins.
+    """Axis of eccentricity ratio or oil temperature, divided into bins of equal width.
 
     Parameters
     ----------
     quantity
-        Name of the quantity, and of the field of `TrendQuery` with its range.
+        Name of the quantity, which is also the field of `TrendQuery` with the requested range.
+    width
+        Width of a bin, in the unit of the quantity.
     """
 
     quantity: str
     width: float
 
     def narrowed(self, query: TrendQuery, low: float, high: float) -> TrendQuery:
-        """Return the query limited to one bin, which includes its lower but not its upper bound."""
+        """Return the query limited to a bin: from `low`, included, to `high`, excluded."""
         requested, below = getattr(query, self.quantity), math.nextafter(high, -math.inf)
         within = ValueRange(
             low if requested.low is None else max(low, requested.low),
@@ -68,7 +72,14 @@ class _Axis:
 def trend_groups(
     store: Store, query: TrendQuery, by: GroupName, grid: CellGrid
 ) -> list[TrendGroup]:
-    """Read the trend of each group that contains readings.
+    """Return the trend of each group that contains readings.
+
+    Parameters
+    ----------
+    by
+        Quantity that determines the group of a reading.
+    grid
+        Grid of operating conditions, which gives the widths of the intervals.
 
     Raises
     ------
@@ -98,7 +109,10 @@ def _by_cell(store: Store, query: TrendQuery, axis: _Axis) -> Iterator[TrendGrou
 
 
 def _bins(store: Store, query: TrendQuery, axis: _Axis) -> list[int]:
-    """Return the numbers of the bins between minimum and maximum of any bucket."""
+    """Return the numbers of the bins that may contain readings, from a coarse trend.
+
+    These are the bins between the minimum and the maximum of each bucket of the trend.
+    """
     survey = replace(query, quantities=(axis.quantity,), max_points=SURVEY_POINTS)
     series = store.trend(survey).series[axis.quantity]
     bins: set[int] = set()

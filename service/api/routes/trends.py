@@ -1,4 +1,4 @@
-"""Route for trends of a bearing: quantities over time."""
+"""Route for trends: quantities of a bearing over time."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
@@ -35,10 +35,12 @@ T = TypeVar("T")
 def trend_table(
     trend: Trend, groups: Sequence[TrendGroup] | None, past_end_ns: int | None
 ) -> list[Column]:
-    """Return a trend as columns; with groups, the rows of all groups in succession.
+    """Return a trend as table columns.
 
     Parameters
     ----------
+    groups
+        Groups whose rows are returned in succession, in place of the rows of the trend; or None.
     past_end_ns
         End of the simulated readings of the bearing; None without simulated readings.
     """
@@ -73,10 +75,10 @@ def _joined(parts: Iterable[Sequence[T]]) -> list[T]:
 
 
 class TrendSeriesModel(ApiModel):
-    """Columns of one quantity, with one value per time."""
+    """Values of one quantity over time; every list has one value per time."""
 
     unit: str
-    """Unit and detector of the values."""
+    """Unit of the values; for an amplitude, also the detector."""
 
     min: list[float | None]
     """Minimum of the usable readings; null without usable readings."""
@@ -91,57 +93,57 @@ class TrendSeriesModel(ApiModel):
     """Number of usable readings."""
 
     worst_level: list[LevelName | None]
-    """Worst quality level in the bucket; null without readings."""
+    """Worst quality level of the readings; null without readings."""
 
     u_random: list[float | None] | None
-    """Mean of the random standard uncertainty; null for quantities without uncertainty."""
+    """Mean of the random standard uncertainties; null for a quantity without uncertainty."""
 
     u_systematic: list[float | None] | None
-    """Mean of the systematic standard uncertainty; null for quantities without uncertainty."""
+    """Mean of the systematic standard uncertainties; null for a quantity without uncertainty."""
 
 
 class TrendColumns(ApiModel):
-    """Trends as columns: times, and the series of each quantity."""
+    """Trends of several quantities at common times."""
 
     bucket_s: float | None
-    """Width of the buckets, s; null for single readings."""
+    """Width of the time intervals (buckets) that combine readings, s; null for single readings."""
 
     time: list[float]
     """Time of each reading or start of each bucket, seconds since 1970 UTC."""
 
     series: dict[str, TrendSeriesModel]
-    """Series of the requested quantities, by name of the quantity."""
+    """Values of the requested quantities, by name of the quantity."""
 
 
 class TrendGroupModel(TrendColumns):
-    """Trends of the readings in one operating state or condition cell, by column."""
+    """Trends of the readings in one operating state, or one interval of a grouping quantity."""
 
     name: Annotated[str, Field(examples=["full_load"])]
-    """Name of the group: operating state, or bounds of the cell."""
+    """Name of the group: operating state, or bounds of the interval."""
 
     low: float | None
-    """Lower bound of eccentricity ratio or oil temperature in °C; null for operating states."""
+    """Lower bound of eccentricity ratio, or oil temperature in °C; null for operating states."""
 
     high: float | None
-    """Upper bound of eccentricity ratio or oil temperature in °C; null for operating states."""
+    """Upper bound of eccentricity ratio, or oil temperature in °C; null for operating states."""
 
 
 class TrendModel(TrendColumns, BearingHistory):
-    """Trends of one bearing, by column."""
+    """Trends of quantities of one bearing in a time range."""
 
     simulated_until: Time | None
     """End of the simulated readings; null if all readings in this range are measured."""
 
     coarse_until: Time | None
-    """End of the time whose single readings are deleted by retention: only buckets cover it, and
-    pages of single readings omit it; null if all single readings in this range are kept."""
+    """End of the part of the range whose single readings were deleted by retention, so that only
+    buckets are available; null if all single readings in the range are stored."""
 
     next_cursor: Annotated[str | None, Field(examples=["1795248192400000000"])]
-    """With ``cursor``, value of ``cursor`` for the next page; null on the last page."""
+    """Parameter ``cursor`` for the next page of single readings; null if there is none."""
 
     groups: list[TrendGroupModel] | None
-    """With ``group_by``, trends of each operating state or cell with readings; readings with an
-    unknown condition belong to no group."""
+    """Trends of each group with readings; null without ``group_by``. Readings whose grouping
+    quantity is unknown belong to no group."""
 
 
 def trend_model(
@@ -150,10 +152,12 @@ def trend_model(
     groups: list[TrendGroup] | None = None,
     past_end_ns: int | None = None,
 ) -> TrendModel:
-    """Return the API model of trends, and of their groups if requested.
+    """Return the API model of trends.
 
     Parameters
     ----------
+    groups
+        Groups of readings with their trends; None if not requested.
     past_end_ns
         End of the simulated readings of the bearing; None without simulated readings.
     """
@@ -168,7 +172,13 @@ def trend_model(
 
 
 def simulated_until(query: TrendQuery, past_end_ns: int | None) -> str | None:
-    """Return the end of the simulated readings in a range; None if all readings are measured."""
+    """Return the end of the simulated readings of a bearing, RFC 3339; None if the range has none.
+
+    Parameters
+    ----------
+    past_end_ns
+        End of the simulated readings of the bearing; None without simulated readings.
+    """
     if past_end_ns is None or past_end_ns < query.start_ns:
         return None
     return rfc3339(past_end_ns)
@@ -189,12 +199,12 @@ def bucket_s(trend: Trend) -> float | None:
 
 
 def times_s(trend: Trend) -> list[float]:
-    """Return the times of a trend in seconds since 1970."""
+    """Return the times of a trend in seconds since 1970 UTC."""
     return [time_ns / NS_PER_S for time_ns in trend.time_ns]
 
 
 def trend_columns(quantities: Iterable[str]) -> tuple[str, ...]:
-    """Return the columns of the store for a trend of the given quantities."""
+    """Return the names of the stored columns that contain the given quantities."""
     return columns_of(BY_NAME[name] for name in quantities)
 
 
@@ -218,7 +228,7 @@ MaxPoints = Annotated[
 ]
 MAX_QUANTITIES = 40
 HOLE_HOPS = 2.5
-"""Maximum distance of successive results without a gap in the trend, in result periods."""
+"""Maximum time between successive results that a trend shows without a gap, in result periods."""
 
 
 Cursor = Annotated[
@@ -271,7 +281,7 @@ def trend_router(context: Context) -> APIRouter:
         max_points: MaxPoints = 1000,
         cursor: Cursor = None,
     ) -> Response:
-        """Return trends: single readings, or buckets with minimum, maximum, mean and count.
+        """Return trends as single readings, or as minimum, maximum and mean of time intervals.
 
         As CSV or Parquet: one row per time; with `group_by`, one row per group and time.
         """
@@ -305,7 +315,7 @@ def trend_router(context: Context) -> APIRouter:
 def _read(
     context: Context, query: TrendQuery, group_by: GroupName | None, grid: CellGrid
 ) -> tuple[Trend, list[TrendGroup] | None, int | None]:
-    """Return the trend, its groups, and the end of the simulated readings."""
+    """Return the trend, its groups or None, and the end of the simulated readings or None."""
     past_end_ns = context.store.films.past_end_ns(query.unit, query.bearing)
     whole = context.store.trend(query)
     if group_by is None:
@@ -317,7 +327,13 @@ def _read(
 
 
 def _page_start_ns(cursor: str | None, group_by: GroupName | None, start_ns: int) -> int:
-    """Return the start of the page of a cursor; raise a problem if `group_by` is also given."""
+    """Return the start of the page at a cursor, or of the range without a cursor, ns since 1970.
+
+    Raises
+    ------
+    ProblemError
+        If both cursor and group are given.
+    """
     if cursor is not None and group_by is not None:
         detail = "pages cannot be grouped: omit cursor or group_by"
         raise ProblemError(422, "Wrong parameter", detail, "cursor")
