@@ -1,8 +1,7 @@
-"""Messages of the simulated CAN DAQ, their DBC file, and settings of a source that reads them.
+"""Messages of the simulated CAN DAQ, their DBC file, and the settings of a source for them.
 
-A block begins with messages of its sample index, epoch, channel status, time and slow values. Each
-of these messages contains the index of the first sample of the block, or its lowest 16 bits as a
-counter. The waveform messages follow.
+A block begins with messages of its sample index, epoch, health, time and slow values, each with a
+counter that refers to the first sample of the block. The waveform messages follow.
 """
 
 from dataclasses import dataclass
@@ -24,7 +23,7 @@ _MAX_SLOW = 50
 
 
 class Kind(Enum):
-    """Data type of a CAN signal; the value of each member is its NumPy type code."""
+    """Data type of a signal; the value is the NumPy type code."""
 
     U8 = "u1"
     U16 = "u2"
@@ -40,7 +39,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Field:
-    """Signal of a CAN message: byte offset, data type, and value of one count in `unit`."""
+    """Signal of a CAN message; `offset` is in bytes."""
 
     name: str
     offset: int
@@ -51,12 +50,10 @@ class Field:
 
 @dataclass(frozen=True)
 class MessageShape:
-    """Format of one CAN message of the simulated DAQ.
+    """CAN message of the simulated DAQ.
 
     Parameters
     ----------
-    length
-        Number of data bytes.
     first_channel
         Index of the first channel of a waveform message; None for other messages.
     """
@@ -83,7 +80,7 @@ class MessageShape:
         )
 
     def records(self, n_frames: int) -> npt.NDArray[np.void]:
-        """Return an array of `n_frames` records of this message, filled with zeros."""
+        """Return records of `n_frames` frames, filled with zeros."""
         return np.zeros(n_frames, dtype=self.dtype)
 
 
@@ -93,10 +90,8 @@ class DaqSignal:
 
     Parameters
     ----------
-    unit
-        Unit of the values.
-    factor
-        Value of one count in `unit`; 1 for float32 samples.
+    unit, factor
+        Unit of the values, and value of one count in this unit; 1 for float32 samples.
     """
 
     id: str
@@ -110,14 +105,10 @@ class CanShape:
 
     Parameters
     ----------
-    fd
-        Whether messages are CAN FD rather than classic CAN.
     floats
         Whether samples are float32 in engineering units rather than int16 counts.
     base_id
         Id of the first message; further messages have consecutive ids.
-    extended
-        Whether ids have 29 bits rather than 11.
 
     Raises
     ------
@@ -152,7 +143,7 @@ class CanShape:
 
     @property
     def messages(self) -> tuple[MessageShape, ...]:
-        """Formats of all messages of a block, in transmission order."""
+        """All messages in transmission order of a block."""
         shapes = [*(self._fd_heads() if self.fd else self._classic_heads()), *self._waves()]
         return tuple(
             MessageShape(
@@ -169,7 +160,7 @@ class CanShape:
 
     @property
     def waves(self) -> tuple[MessageShape, ...]:
-        """Formats of the waveform messages, which carry samples."""
+        """Waveform messages, which carry samples."""
         return tuple(m for m in self.messages if m.first_channel is not None)
 
     def _classic_heads(self) -> "list[_Shape]":
@@ -226,7 +217,7 @@ _COUNTER = Field("counter", 0, Kind.U16)
 
 
 def dbc_name(channel_id: str) -> str:
-    """Return the DBC name of a channel: letters, digits and underscores, no leading digit."""
+    """Return a channel id as a valid DBC name: letters, digits and underscores, no digit first."""
     name = "".join(c if c.isalnum() and c.isascii() else "_" for c in channel_id)
     return f"_{name}" if name[0].isdigit() else name
 
@@ -260,7 +251,7 @@ BA_DEF_DEF_ "VFrameFormat" "StandardCAN";
 
 
 def daq_dbc(shape: CanShape) -> str:
-    """Return the text of the DBC file that describes all messages of the simulated DAQ."""
+    """Return the text of the DBC file of the simulated DAQ."""
     parts = [_HEADER]
     parts += [_message(message) for message in shape.messages]
     parts.append(_ATTRIBUTES)
@@ -281,8 +272,6 @@ def daq_settings(
 
     Parameters
     ----------
-    link
-        Settings of the connection to the CAN bus.
     units
         Engineering unit of each waveform channel.
     others

@@ -1,4 +1,4 @@
-"""Simulated Modbus device with a block ring: a ring buffer of sample blocks in registers."""
+"""Simulated Modbus device with a block ring: writes the samples of a feed to registers."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -24,17 +24,15 @@ class RingDeviceSettings:
     ----------
     base_address
         Register address of the header.
-    samples_per_slot
-        Number of samples per channel in a slot.
-    n_slots
-        Number of slots. Header and slots must fit into 65536 registers: 12 channels, 50 samples,
-        10 slow values and 64 slots need 40,612 registers.
+    samples_per_slot, n_slots
+        Size of the ring, which must fit into 65536 registers with its header: 12 channels, 50
+        samples, 10 slow values and 64 slots need 40,612 registers.
     first_sequence
         Sequence number at power-up, 0 to 2**32 - 1, after which it wraps.
     first_index
         Sample index at power-up, 0 to 2**32 - 1; None for the sample index of the feed.
     slot_padding
-        Number of unused registers between two slots.
+        Unused registers between slots.
     """
 
     base_address: int = 0
@@ -46,9 +44,7 @@ class RingDeviceSettings:
 
 
 class RingDevice(ModbusDevice):
-    """Simulated Modbus device of one unit with a block ring.
-
-    The ring contains the first slot from the start.
+    """Converter and block ring of one unit; the first slot is available from the start.
 
     Slots begin at multiples of their length in the sample index of the feed. In a gap of the feed
     the device writes no slots; after the gap sequence number, sample index and time continue
@@ -111,12 +107,12 @@ class RingDevice(ModbusDevice):
 
     @property
     def step_s(self) -> float:
-        """Duration of one slot in seconds."""
+        """Duration of one slot."""
         return self.layout.slot_duration_s
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Fault functions by name, which take a count: faulty slots, frozen data, restarts."""
+        """Faults by name: of the next slots, frozen data, and restarts."""
         slot_faults = {**SLOT_FAULTS, "repeat": self._repeated}
         return {
             **super().faults,
@@ -131,14 +127,12 @@ class RingDevice(ModbusDevice):
         self._fault = None
 
     def produce_unpaced(self, n_slots: int) -> None:
-        """Write the next slots of the feed at once, without waiting for the duration of gaps.
-
-        Slots after a restart of the device in the feed are left for the next call.
+        """Write the next slots without delay, also after a gap, and without overwriting a new slot.
 
         Parameters
         ----------
         n_slots
-            Maximum number of written slots, with gaps between them counted in slots.
+            Maximum number of places of the ring, including gaps; at least one slot is written.
         """
         if self._n_frozen:
             self._n_frozen -= 1
@@ -157,7 +151,7 @@ class RingDevice(ModbusDevice):
                 limit = self._position + n_slots - 1
 
     def restart(self, next_epoch: bool = True) -> None:
-        """Restart the device with empty ring and reset counters, by default in the next epoch."""
+        """Restart the device, by default in the next epoch: clear the ring, reset the counters."""
         first = self._feed.take()
         if first is None:
             self.ended = True
@@ -166,10 +160,7 @@ class RingDevice(ModbusDevice):
         self._power_up(first, self._settings.first_index or 0)
 
     def read_registers(self, function: int, address: int, count: int) -> bytes | None:  # noqa: ARG002
-        """Return registers as big-endian words; None if one does not exist.
-
-        Functions 3 and 4 read the same registers.
-        """
+        """Return registers, equal for functions 3 and 4; None if a register does not exist."""
         asked = range(address, address + count)
         if self._settings.base_address in asked:
             self._look()
@@ -187,7 +178,7 @@ class RingDevice(ModbusDevice):
         self._n_looks += self.ended
 
     def _must_wait(self, ahead: RawBlock) -> bool:
-        """Return whether a patient device must wait until its client has read previous slots."""
+        """Whether a patient device must wait until its client has read previous slots."""
         if not self.patient:
             return False
         if not self._watch.anything_read:
@@ -247,7 +238,7 @@ class RingDevice(ModbusDevice):
         )
 
     def _repeated(self, slot: Slot) -> Slot:
-        """Slot fault: content of the previous slot with the sequence number of the new slot."""
+        """Slot fault: samples of the previous slot with the new sequence number."""
         before = self._before or slot
         return replace(before, sequence=slot.sequence, trailer=slot.trailer)
 

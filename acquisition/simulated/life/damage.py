@@ -27,16 +27,15 @@ GAINS = frozenset({DamageKind.PROBE_GAIN, DamageKind.ACCELEROMETER_GAIN})
 
 @dataclass(frozen=True)
 class Damage:
-    """Damage of one bearing or of its transducers, which grows from its onset.
+    """One damage of one bearing.
 
     Parameters
     ----------
     size
-        Final size, with a meaning that depends on the kind. Stiffness loss and clearance growth:
-        relative loss of film stiffness at a constant eccentricity ratio. Oil degradation: relative
-        loss of viscosity. Bracket loosening: relative loss of bracket stiffness. Pivot wear:
-        recession of the pad divided by the configured clearance. Gains: signed relative change;
-        -0.2 is a decrease by 20 %.
+        Final size, by kind. Stiffness loss and clearance growth: relative loss of film stiffness at
+        a constant eccentricity ratio. Oil and bracket: relative loss of viscosity and of bracket
+        stiffness. Pivot wear: recession of the pad divided by the configured clearance. Gains:
+        signed relative change, -0.2 is a decrease by 20 %.
     ramp_days
         Duration of the linear growth from 0 to `size`; 0 is a step.
     directions
@@ -67,7 +66,7 @@ class Damage:
             raise ValueError(f"directions = {self.directions} must be of {DIRECTIONS}")
 
     def extent(self, time_ns: TimeArray) -> FloatArray:
-        """Return the fraction of `size` that the damage has reached at each time, (n,)."""
+        """Return the fraction of `size` that the damage has reached, (n,)."""
         since_days = (time_ns - self.onset_ns) / (86_400.0 * NS_PER_S)
         if self.ramp_days == 0.0:
             return (since_days >= 0.0).astype(np.float64)
@@ -80,18 +79,12 @@ class Alteration:
 
     Parameters
     ----------
-    stiffness : (n,)
-        Factor of the film stiffness.
-    clearance : (n,)
-        Factor of the pad clearances.
-    viscosity : (n,)
-        Factor of the oil viscosity.
-    bracket : (n,)
-        Factor of the bracket stiffness.
+    stiffness, clearance, viscosity, bracket : (n,)
+        Factors.
     pivot_share : (n,)
         Recession of the worn pad divided by the configured clearance; 0 without damage.
     probe_gain, accelerometer_gain : (2, n)
-        Factors of the transducer gains in x and y.
+        Factors of the gains in x and y.
     """
 
     stiffness: FloatArray
@@ -104,7 +97,7 @@ class Alteration:
 
 
 def alteration(damage: tuple[Damage, ...], bearing: str, time_ns: TimeArray) -> Alteration:
-    """Return the combined effect of all damage on one bearing at given times."""
+    """Return the combined effect of all damage on one bearing."""
     lost = {
         kind: sum(
             (d.size * d.extent(time_ns) for d in damage if d.bearing == bearing and d.kind is kind),

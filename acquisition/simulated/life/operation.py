@@ -24,7 +24,7 @@ class Operation:
     Parameters
     ----------
     time_ns
-        Times of the rows in ns since 1970 UTC, evenly spaced or with gaps.
+        Times of the rows.
     """
 
     time_ns: TimeArray
@@ -38,7 +38,7 @@ class Operation:
 
     @property
     def step_s(self) -> float:
-        """Time between the first two rows in seconds."""
+        """Time between the first two rows."""
         return float(self.time_ns[1] - self.time_ns[0]) / NS_PER_S
 
     @property
@@ -58,7 +58,7 @@ class Operation:
 
     @property
     def starts(self) -> npt.NDArray[np.int64]:
-        """Indices of the rows at which the shaft begins to turn."""
+        """Indices of the first row of each run."""
         return np.flatnonzero(np.diff(self.is_turning.astype(np.int8), prepend=np.int8(0)) == 1)
 
 
@@ -104,10 +104,7 @@ class HeldLoad:
 def wander(
     random: np.random.Generator, n: int, step_s: float, time_s: float, rms: float
 ) -> FloatArray:
-    """Draw a first-order Gauss-Markov process with zero mean and time constant `time_s`, (n,).
-
-    The process is stationary from the first row.
-    """
+    """Return a first-order Gauss-Markov process with zero mean, stationary from row 0, (n,)."""
     import scipy.signal  # slow import, not needed at start-up
 
     memory = math.exp(-step_s / time_s)
@@ -119,7 +116,7 @@ def wander(
 def change_rows(
     random: np.random.Generator, n: int, step_s: float, interval_s: float
 ) -> FloatArray:
-    """Draw random times at which a level changes; return the level index at each row, (n,).
+    """Return the index of the current level at each row, (n,); levels change at random times.
 
     Parameters
     ----------
@@ -130,21 +127,17 @@ def change_rows(
 
 
 def held(levels: FloatArray, which: FloatArray) -> FloatArray:
-    """Return the level at each row, selected from `levels` by the level indices `which`, (n,)."""
+    """Return the current level at each row, selected by the indices `which`."""
     return np.asarray(levels[which.astype(np.int64)])
 
 
 def lagged(target: FloatArray, time_s: FloatArray, step_s: float, initial: float) -> FloatArray:
-    """Return the response y of a first-order lag, τ dy/dt = target − y, (n,).
-
-    It is exact for targets that are constant in each step.
+    """Return a first-order lag, τ dy/dt = target − y, exact for targets constant in each step.
 
     Parameters
     ----------
-    target : (n,)
-        Value that y approaches.
-    time_s : (n,)
-        Time constant τ; each change of its value costs computing time.
+    target, time_s : (n,)
+        Target and time constant; each change of the time constant costs computing time.
     initial
         Value before the first row.
     """

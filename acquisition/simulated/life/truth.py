@@ -1,4 +1,4 @@
-"""True state of a simulated life, and errors of the measuring chain."""
+"""True state of a life, and errors of the measuring chain."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ U_RANDOM_KNOWN = 0.1
 """Relative error of the random uncertainty that a reading states."""
 
 COMMON_ERRORS = ((4.0 * 3600.0, 0.004), (8.0 * 86_400.0, 0.003))
-"""Time constants and relative rms of slow stiffness errors by transducers and excitation."""
+"""Time constant and relative rms of slow stiffness errors: transducers, excitation."""
 
 GAIN_HALF_WIDTH = 0.05
 """Accuracy class of probes and accelerometers (Brito et al., section 2.2.1)."""
@@ -43,7 +43,7 @@ RUNOUT_UM_PK = 1.0
 """Residual runout at 1× after subtraction of the slow-roll vector."""
 
 NO_LOAD_SILENCE, LOADED_SILENCE = 0.08, 0.002
-"""Shares of readings with insufficient excitation, without load and with load."""
+"""Share of readings with insufficient excitation, without load and with load."""
 
 OUTAGES_PER_YEAR, OUTAGE_H = 3.0, (1.0, 10.0)
 """Number per year and duration of transducer outages in each direction."""
@@ -57,14 +57,10 @@ class Chain:
     ----------
     probe_gain, accelerometer_gain : (2,)
         Ratio of true to configured sensitivity, without damage.
-    gap_gain : (2,)
-        Gain of the shaft displacement measured by all probes of a direction.
     ln_k_error : (2, n)
         Logarithmic stiffness error, correlated over hours and days.
     position_error_um : (2, n)
-        Error of the measured shaft position.
     oil_error_c : (n,)
-        Error of the oil temperature.
     runout_um_pk : (2,)
         Phasors of the residual runout.
     evidence : (2, n)
@@ -131,7 +127,7 @@ def _is_out_of_order(random: np.random.Generator, n: int, step_s: float) -> npt.
 
 @dataclass(frozen=True, eq=False)
 class BearingMoments:
-    """True state of one bearing over time, without stiffness and response at 1×.
+    """True state of one bearing at each row.
 
     Parameters
     ----------
@@ -140,7 +136,6 @@ class BearingMoments:
     centre_um : (2, n)
         Position of the shaft centre relative to the bearing centre.
     oil_temperature_c : (n,)
-        True oil temperature.
     altered
         Effect of damage on film, bracket and transducers.
     chain
@@ -157,16 +152,14 @@ class BearingMoments:
 
 @dataclass(frozen=True, eq=False)
 class BearingLifeTruth(BearingMoments):
-    """True state of one bearing at the rows of its readings, with stiffness and response at 1×.
+    """True state of one bearing at the rows of its readings, with stiffness and 1x response.
 
     Parameters
     ----------
-    ln_k : (2, n)
-        Natural logarithm of the film stiffness in N/m, with damage.
-    ln_k_healthy : (2, n)
-        Natural logarithm of the film stiffness in N/m that the film would have without damage.
+    ln_k, ln_k_healthy : (2, n)
+        Logarithm of the film stiffness, with and without damage.
     order1_um_pk : (4, n)
-        Phasors at 1×: shaft relative to bearing u_x, u_y, and bearing x_b, y_b.
+        Phasors of u_x, u_y, x_b, y_b at 1×.
     """
 
     ln_k: FloatArray
@@ -175,7 +168,7 @@ class BearingLifeTruth(BearingMoments):
 
     @property
     def eccentricity_ratio(self) -> FloatArray:
-        """Ratio of the shaft centre displacement to the true mean clearance, (n,)."""
+        """Ratio of the shaft centre displacement to the true clearance, (n,)."""
         return np.asarray(np.hypot(*self.centre_um) / self.clearance_um)
 
     @property
@@ -192,10 +185,8 @@ class UnitLife:
     ----------
     operation
         Operation at the rows of the readings, while the shaft turns; unevenly spaced.
-    grade_mm_s : (n,)
-        Residual unbalance at these rows, as an ISO balance grade.
-    water_c : (n,)
-        Cooling water temperature at these rows.
+    grade_mm_s, water_c : (n,)
+        Residual unbalance and cooling water temperature at these rows.
     """
 
     unit_seed: int
@@ -208,7 +199,7 @@ class UnitLife:
     changes: tuple[ConditionChange, ...]
 
     def is_damaged(self) -> npt.NDArray[np.bool_]:
-        """Return whether any damage has begun at each row, (n,)."""
+        """Return whether any damage has begun, (n,)."""
         time_ns = self.operation.time_ns
         onsets = [damage.onset_ns for damage in self.damage]
         return np.asarray(time_ns >= min(onsets, default=int(time_ns[-1]) + 1))

@@ -1,8 +1,8 @@
 """Transducer chain of a unit: gap, runout, key phase, frequency response, gain and noise.
 
-Accelerometer noise is white with a 1/f rise below a corner frequency, and is integrated in velocity
-channels. A high-pass of order 2 at `FLOOR_HZ` limits this noise, because the power of integrated
-1/f noise is infinite towards 0 Hz, and charge amplifiers do not pass low frequencies either.
+The noise of accelerometers is white with a 1/f rise below a corner frequency; velocity channels
+integrate it. A high-pass of order 2 at `FLOOR_HZ` limits it, because the power of integrated 1/f
+noise is infinite towards 0 Hz, and charge amplifiers do not pass low frequencies either.
 """
 
 import math
@@ -64,7 +64,7 @@ class KeyPhasePulses:
             readings[row] += self._pulse.rest_v + direction * self._pulse.height_v * filled
 
     def _so_far(self, turns: FloatArray) -> FloatArray:
-        """Return the part of the angle from 0 to `turns` that lies within pulses, in turns."""
+        """Return the total angle within pulses from turn 0, in turns."""
         whole = np.floor(turns)
         covered: FloatArray = whole * self._pulse.width_turns
         covered += np.minimum(turns - whole, self._pulse.width_turns)
@@ -73,12 +73,12 @@ class KeyPhasePulses:
 
 FLOOR_HZ = 0.1
 PINK_BAND_HZ = (0.02, 60.0)
-"""Band of the 1/f noise. The noise power is accurate to 2 %, and to 0.3 % from 0.1 to 25 Hz."""
+"""Band of the 1/f noise; its power is accurate to 2 %, and to 0.3 % from 0.1 to 25 Hz."""
 POLES_PER_DECADE = 3
 
 
 class AccelerometerNoise:
-    """Generator of accelerometer noise, continuous from one requested piece to the next.
+    """Generator of continuous accelerometer noise.
 
     Parameters
     ----------
@@ -86,8 +86,6 @@ class AccelerometerNoise:
         (n_channels,) true for velocity channels in mm/s, false for acceleration in m/s².
     density_g_per_sqrt_hz
         One-sided amplitude density above the corner frequency.
-    corner_hz
-        Frequency at which the powers of 1/f noise and white noise are equal.
     """
 
     def __init__(
@@ -126,10 +124,7 @@ class AccelerometerNoise:
 
 
 def _floor(integrates: bool, rate_hz: float) -> FloatArray:
-    """Return a high-pass of order 2 for m/s² as second-order sections.
-
-    With `integrates`, it also integrates, and its output is in mm/s.
-    """
+    """Return a high-pass of order 2 for m/s²; with `integrates`, its output is in mm/s."""
     import scipy.signal  # slow import, not needed at start-up
 
     floor_rad_s = 2.0 * math.pi * FLOOR_HZ
@@ -157,14 +152,12 @@ def _pink(corner_hz: float, rate_hz: float) -> FloatArray:
 
 
 class TransducerChain:
-    """Simulated transducers of all channels of one unit, which convert rotor motion to readings.
+    """Transducers of all channels of one unit: converts motion of the rotor to readings.
 
     Parameters
     ----------
-    white
-        Random generator of the white noise of all channels.
-    own
-        Random generator of the sensor noise of the accelerometers.
+    white, own
+        Random generators of the white noise and of the sensor noise of the accelerometers.
 
     Raises
     ------
@@ -241,7 +234,7 @@ def noise_rms(machine: Unit, noise: TransducerNoise) -> FloatArray:
 def _own_noise(
     machine: Unit, noise: TransducerNoise, random: np.random.Generator
 ) -> tuple[list[int], AccelerometerNoise | None]:
-    """Return the rows of the accelerometers, and their noise generator or None without noise."""
+    """Return the rows of the accelerometers and their noise generator; None without noise."""
     integrated = {Measurand.VELOCITY_MM_S: True, Measurand.ACCELERATION_M_S2: False}
     rows = [r for r, channel in enumerate(machine.channels) if channel.measurand in integrated]
     if not rows or noise.accelerometer_g_per_sqrt_hz == 0.0:

@@ -1,4 +1,4 @@
-"""Exact discrete-time model of the rotor, and its simulation in blocks of steps (lifting)."""
+"""Exact time discretization of the rotor, with lifting over blocks of samples."""
 
 from dataclasses import dataclass
 
@@ -17,14 +17,9 @@ class DiscreteRotor:
 
     Parameters
     ----------
-    transition
-        A, (n_states, n_states).
-    input_map
-        B, (n_states, n_forces).
-    output_map
-        C, (n_outputs, n_states).
-    feedthrough
-        D, (n_outputs, n_forces).
+    transition, input_map, output_map, feedthrough
+        A (n_states, n_states), B (n_states, n_forces), C (n_outputs, n_states) and
+        D (n_outputs, n_forces).
     """
 
     transition: FloatArray
@@ -54,19 +49,18 @@ def discretize(
     output_map: FloatArray,
     rate_hz: float,
 ) -> DiscreteRotor:
-    """Return the exact discrete-time rotor for forces that are linear between samples.
+    """Discretize the rotor exactly, for forces that are linear between samples.
 
     The spectrum of a force held over each step has an image near the sampling rate, which aliases.
-    The alias is negligible in displacement and velocity. For a force at 1.5 Hz sampled at 600 Hz,
-    it shifts the phase of the acceleration of a stiff bracket by 1.5° and more. Linear
-    interpolation avoids this error.
+    It is negligible in displacement and velocity, but at 1.5 Hz and 600 Hz it shifts the phase of
+    the acceleration of a stiff bracket by 1.5° and more. Linear interpolation avoids this image.
 
     Parameters
     ----------
     force_map
         (10, n_forces) generalized force per unit of each force.
     output_map
-        (n_outputs, 20) matrix from displacement and velocity to the outputs.
+        (n_outputs, 20) map from displacement and velocity to the outputs.
 
     Raises
     ------
@@ -101,21 +95,17 @@ def _step(
 
 @dataclass(frozen=True)
 class LiftedRotor:
-    """Rotor model in which one step equals `n_steps` steps of a :class:`DiscreteRotor`, a block.
+    """`n_steps` steps of a :class:`DiscreteRotor` combined into one.
 
     Parameters
     ----------
     transition
-        (n_states, n_states) from the state at the start of a block to that at its end.
+        (n_states, n_states) over the whole block.
     input_map
-        (n_states, n_forces * n_steps) from the forces of a block to the state at its end; time is
-        the fastest index.
-    output_map
-        (n_outputs * n_steps, n_states) from the state at the start of a block to its outputs; time
-        is the fastest index.
-    feedthrough
-        (n_outputs * n_steps, n_forces * n_steps) from the forces of a block to its outputs; time is
-        the fastest index.
+        (n_states, n_forces * n_steps); time is the fastest index.
+    output_map, feedthrough
+        (n_outputs * n_steps, n_states) and (n_outputs * n_steps, n_forces * n_steps); time is the
+        fastest index. `feedthrough` maps the forces of the block to the outputs of the block.
     """
 
     n_steps: int
@@ -128,7 +118,7 @@ class LiftedRotor:
 
 
 def lift(rotor: DiscreteRotor, n_steps: int) -> LiftedRotor:
-    """Return a rotor model in which one step equals `n_steps` steps of `rotor`.
+    """Return a rotor that combines `n_steps` steps into one.
 
     Raises
     ------
@@ -167,10 +157,8 @@ def simulate(
 
     Returns
     -------
-    outputs
-        (n_outputs, n_samples) outputs at the samples.
-    state
-        (n_states,) state at the sample after the last.
+    outputs, state
+        (n_outputs, n_samples), and the state at the sample after the last.
 
     Raises
     ------
@@ -200,7 +188,7 @@ def _block_states(
 
 
 def _feedthrough(observed: FloatArray, rotor: DiscreteRotor) -> FloatArray:
-    """Return the matrix from forces to outputs of a block, lower-triangular block Toeplitz."""
+    """Return the map from the forces to the outputs of a block: lower-triangular block Toeplitz."""
     n_outputs, n_steps, _ = observed.shape
     driven = (observed @ rotor.input_map).swapaxes(0, 1)
     impulse = [rotor.feedthrough, *driven[:-1]]
