@@ -116,9 +116,9 @@ class CellTable:
 
     @cached_property
     def node_std(self) -> FloatArray:
-        """Standard uncertainty of the surface at the nodes (NODES, NODES, n_cells).
+        """Standard uncertainty of the surface by eccentricity and temperature node and cell.
 
-        The axes are eccentricity, temperature and cell.
+        Shape (NODES, NODES, n_cells).
         """
         rows = np.array([cell.node_std for cell in self.cells], np.float64)
         return rows.reshape(-1, NODES, NODES).transpose(1, 2, 0)

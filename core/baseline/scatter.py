@@ -130,7 +130,7 @@ def _weight(scatter: FloatArray) -> FloatArray:
 
 
 def _share(mean: FloatArray, stray: FloatArray, stays: FloatArray) -> float:
-    """Return the factor of the passing scatter `stray` that, with `stays`, fits that of the means."""
+    """Return the factor of `stray` (passing scatter) that fits the scatter of the means."""
     least, most = MIN_SHARE, MAX_SHARE
     for _ in range(HALVINGS):
         middle = (least * most) ** 0.5

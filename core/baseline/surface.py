@@ -90,10 +90,7 @@ class SurfaceShape:
 
 
 def attitude_terms(conditions: FilmConditions) -> FloatArray:
-    """Return the attitude terms (4, n): e cos α, e sin α, e² cos 2α, e² sin 2α.
-
-    e is the eccentricity ratio and α the attitude angle.
-    """
+    """Return e cos α, e sin α, e² cos 2α and e² sin 2α (4, n), with attitude α, eccentricity e."""
     angle = np.radians(conditions.attitude_deg)
     once, twice = conditions.eccentricity_ratio, conditions.eccentricity_ratio**2
     return np.stack(
