@@ -70,7 +70,7 @@ class FilmReading:
 def film_reading(
     assessment: Assessment, condition: BearingCondition, estimator: Estimator
 ) -> FilmReading:
-    """Return the film reading of an assessment, without values that are not of good quality."""
+    """Return the film reading of an assessment; stiffness and conditions need good quality."""
     readings = assessment.readings
     eccentricity = readings["eccentricity_ratio"]
     x, y = (_value(readings, estimator, direction) for direction in DIRECTIONS)
