@@ -27,10 +27,8 @@ class Judgement:
     is_known
         Whether the condition could be judged. An unknown condition neither raises nor clears an
         alarm.
-    value
-        Value that was compared with the limit; None for a judgement without numbers.
-    limit
-        Limit of the value; None for a judgement without numbers.
+    value, limit
+        Value, and the limit with which it was compared; both None for a judgement without numbers.
     reason
         Reason as a code word; "ok" if no limit is exceeded.
     suppressed_by
@@ -70,16 +68,13 @@ class Limits:
 
     Parameters
     ----------
-    alert
-        Upper limit for an alert, above zero; None if unused. At least one limit is given.
-    danger
-        Upper limit for a danger, above `alert`; None if unused.
+    alert, danger
+        Upper limits of the two levels, above zero and rising; None if unused. At least one limit,
+        upper or lower, is given.
     deadband
         Distance inside the limit that a value must reach for an active level to end.
-    alert_below
-        Lower limit for an alert; None if unused.
-    danger_below
-        Lower limit for a danger; None if unused.
+    alert_below, danger_below
+        Lower limits of the two levels; None if unused.
     """
 
     alert: float | None = None

@@ -36,10 +36,7 @@ class Arrival:
         return cls(clock.now_ns(), clock.monotonic_s())
 
     def step_s_since(self, before: "Arrival") -> float:
-        """Return the seconds by which the wall clock was set forward (negative: back) since then.
-
-        `before` is an earlier arrival.
-        """
+        """Return the seconds by which the wall clock was set forward after the arrival `before`."""
         return (self.host_ns - before.host_ns) / NS_PER_S - (self.steady_s - before.steady_s)
 
 

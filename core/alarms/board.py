@@ -24,10 +24,8 @@ class AlarmMemory:
         Newest operating point of each bearing and its sample time in ns, by bearing id.
     stop
         Epoch and sample index at the end of the newest judged block; None before the first block.
-    is_connected
-        Whether the link to the device was up.
     link_reason
-        Reason why the link was down; None if unknown or up.
+        Reason why the link to the device was down; None if unknown, or if it was up.
     """
 
     alarms: tuple[Alarm, ...]
@@ -74,7 +72,7 @@ class AlarmBoard:
             self.record(watch.id, condition, now_ns)
 
     def record(self, id_: str, condition: Judgement, now_ns: int) -> None:
-        """Update an alarm with a judgement, even if it stays inactive, so that its value is new."""
+        """Update an alarm with a judgement, even if it stays inactive, to keep its value current."""
         self._note(id_, *update(self._alarms[id_], condition, now_ns, self._rules[id_]))
 
     def pause(self, spared: str | None = None) -> None:

@@ -111,7 +111,7 @@ class OrderVector:
             raise ValueError(f"phase {self.phase_deg:g} must be a number")
 
     def change_um_pk(self, other: "OrderVector") -> float:
-        """Return the length of the vector difference; if a phase is unknown, of the amplitudes."""
+        """Return the length of the vector difference, without a phase the amplitude difference."""
         if self.phase_deg is None or other.phase_deg is None:
             return abs(self.amplitude_um_pk - other.amplitude_um_pk)
         return abs(self.phasor_um_pk - other.phasor_um_pk)
@@ -145,11 +145,11 @@ def vector_judgement(
     point: OperatingPoint,
     held: AlarmLevel | None,
 ) -> Judgement:
-    """Judge the change of a 1× vector from its reference.
+    """Return the judgement of the change of a 1× vector from its reference.
 
     A crack, a loose part or a rub can turn the vector without a change of its amplitude, so the
     length of the complex difference is judged. Without a phase, only the amplitude difference is
-    known. The latter never exceeds the former, so it can raise an alarm but not clear an alarm
+    known. It is never larger than that length, so it can raise an alarm but not clear an alarm
     whose reference has a phase. `watch.source` is the measuring point ("shaft_x").
     """
     place = watch.source

@@ -77,7 +77,7 @@ Action: TypeAlias = (
 
 
 def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
-    """Apply an action of a person at a host time; an action without effect adds no event.
+    """Return the alarm after a person's action at a host time, with its event; none if no effect.
 
     Raises
     ------

@@ -55,7 +55,7 @@ class UnitAlarms(AlarmBoard):
     rows
         Channel id of each row of a block; by default, the unit's channels in order.
     references
-        Reference 1× vectors, at most one entry per bearing and operating state.
+        Reference 1× vectors of bearings, one entry per bearing and operating state.
     """
 
     def __init__(
@@ -135,9 +135,7 @@ class UnitAlarms(AlarmBoard):
         return self.drain_news()
 
     def films(self, conditions: Mapping[str, Judgement], now_ns: int) -> list[AlarmNews]:
-        """Update film-stiffness alarms from judgements by alarm id; return the changed alarms.
-
-        `now_ns` is the sample time.
+        """Update film alarms by judgements of sample time `now_ns`; return the changed alarms.
 
         Raises
         ------

@@ -116,10 +116,7 @@ class CellTable:
 
     @cached_property
     def node_std(self) -> FloatArray:
-        """Standard uncertainty of the surface by eccentricity and temperature node and cell.
-
-        Shape (NODES, NODES, n_cells).
-        """
+        """Surface uncertainty (NODES, NODES, n_cells) by eccentricity and temperature node, cell."""
         rows = np.array([cell.node_std for cell in self.cells], np.float64)
         return rows.reshape(-1, NODES, NODES).transpose(1, 2, 0)
 

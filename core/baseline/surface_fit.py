@@ -112,10 +112,7 @@ class Fit:
 
 
 def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
-    """Return a surface fitted robustly to groups, with their scatter and correlation.
-
-    `bend_std` is `BaselineSettings.bend_std`.
-    """
+    """Return a surface fitted robustly to groups; `bend_std` is that of `BaselineSettings`."""
     offset = float(np.median(groups.value))
     points = _Points.of(groups, shape, offset)
     prior = prior_precision(shape, bend_std)

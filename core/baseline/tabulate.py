@@ -44,9 +44,9 @@ def tabulate(
     fit: Fit,
     settings: BaselineSettings,
 ) -> CellTable:
-    """Return the table of all cells with readings and of cells between cells of own support.
+    """Return the table of cells with readings and of cells between supported ones; `value` is ln k.
 
-    `value` is ln k; the scatter is preliminary.
+    The scatter is preliminary.
     """
     contents = _seen(conditions, value, groups, fit, settings.grid)
     enough = {

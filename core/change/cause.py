@@ -39,8 +39,6 @@ class Attribution:
 
     Parameters
     ----------
-    reason
-        Reason for the reported cause, as text.
     film_share
         Fraction of the change due to the film, if the rest is due to a transducer of the bearing; 0
         to 1 within its uncertainty. None if unknown, or if no such mixture agrees with the motion.
@@ -123,14 +121,12 @@ def attribute(
     readings: UnitReadings,
     bracket_n_per_m: FloatArray | None = None,
 ) -> Attribution:
-    """Return the cause of a change of the measured stiffness of a film.
+    """Return the cause of a change of a film's measured stiffness; unknown without a `response`.
 
     Parameters
     ----------
     film
         Bearing id and direction of the changed film.
-    response
-        Learned response of the shaft; None gives an unknown cause.
     readings
         About `MEAN_READINGS` newest readings for which the film has a deviation.
     bracket_n_per_m : (n_films,), optional
@@ -155,9 +151,9 @@ def attribute(
 
 @dataclass(frozen=True, eq=False)
 class _Residuals:
-    """Residuals (n_films,) of the shaft motion for each possible cause, in standard uncertainties.
+    """Residuals (n_films,) of the shaft motion for each possible cause of the change of film `row`.
 
-    `row` is the row of the changed film.
+    They are divided by their standard uncertainties.
     """
 
     row: int

@@ -91,8 +91,6 @@ class Decision:
         Deviation of the newest counted reading from its baseline, in ln.
     deviation_std
         Standard uncertainty of `deviation`.
-    evidence
-        Mean deviations over all time scales.
     alert, danger
         Delay timers of the levels alert and danger.
     last_ns, last_counted_ns

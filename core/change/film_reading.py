@@ -42,10 +42,7 @@ class FilmValue:
 
 @dataclass(frozen=True)
 class FilmReading:
-    """Stiffness reading of one film, averaged over a few minutes; NaN for missing values.
-
-    `values` are the readings in x and y.
-    """
+    """Stiffness reading of one film in x and y, averaged over minutes; NaN for missing values."""
 
     unit: str
     bearing: str

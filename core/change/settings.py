@@ -40,10 +40,9 @@ class ChangeLimits:
         Running hours with a baseline before a film is reported as normal. A time scale is used
         once it has elapsed.
     on_delay_h
-        Running hours for which a change must be present without interruption for a level to become
-        active.
+        Uninterrupted running hours with a change before a level becomes active.
     off_delay_h
-        Running hours for which it must be absent without interruption for the level to end.
+        Uninterrupted running hours without the change before a level ends.
     """
 
     alert_change: float = 0.035
@@ -74,12 +73,6 @@ class FilmRules:
     ----------
     estimators
         Estimator of the monitored stiffness, by bearing id; other bearings are not monitored.
-    grid
-        Grid of the condition cells.
-    operating
-        Limits of the operating states.
-    change
-        Limits for changes of film stiffness.
     reading_ns
         Interval between readings.
     time_lapse

@@ -35,10 +35,7 @@ NOT_FINITE = VERDICT_OF[bad(Reason.NOT_FINITE)]
 
 @dataclass(frozen=True)
 class ChannelLimits:
-    """Voltage ranges and gains of a device's channels; each field is (n_channels, 1).
-
-    The fields are explained in `ChannelCalibration`.
-    """
+    """Voltage ranges and gains of channels, each (n_channels, 1); see `ChannelCalibration`."""
 
     full_scale_v: FloatArray
     unit_per_v: FloatArray
