@@ -1,1 +1,1 @@
-"""Adapters that convert data of plant protocols to :class:`core.samples.blocks.SampleBlock`."""
+"""Adapters that read plant protocols and return :class:`core.samples.blocks.SampleBlock`."""

@@ -11,7 +11,7 @@ class Clock(Protocol):
     """Clock with wall clock time, monotonic time and sleep."""
 
     def now_ns(self) -> int:
-        """Return the wall clock time in UTC nanoseconds since 1970; it may be set."""
+        """Return the wall clock time in UTC nanoseconds since 1970; the clock may be set."""
         ...
 
     def monotonic_s(self) -> float:
@@ -19,7 +19,7 @@ class Clock(Protocol):
         ...
 
     async def sleep(self, duration_s: float) -> None:
-        """Wait for a duration."""
+        """Suspend the current task for a duration in seconds."""
         ...
 
 
@@ -35,7 +35,7 @@ class SystemClock:
         return time.monotonic()
 
     async def sleep(self, duration_s: float) -> None:
-        """Suspend the current task for a duration."""
+        """Suspend the current task for a duration in seconds of the host."""
         await asyncio.sleep(duration_s)
 
 
@@ -44,6 +44,8 @@ class FastClock:
 
     Parameters
     ----------
+    clock
+        Reference clock.
     speed
         Seconds of this clock per second of the reference clock; above 0.
 
@@ -64,9 +66,9 @@ class FastClock:
         return self._start_ns + ns_from_s(self.monotonic_s())
 
     def monotonic_s(self) -> float:
-        """Return the scaled seconds since creation."""
+        """Return the time since creation, in seconds of this clock."""
         return (self._clock.monotonic_s() - self._start_s) * self._speed
 
     async def sleep(self, duration_s: float) -> None:
-        """Wait for a duration in scaled seconds."""
+        """Suspend the current task for a duration in seconds of this clock."""
         await self._clock.sleep(duration_s / self._speed)

@@ -14,7 +14,7 @@ class AcquisitionError(Exception):
 
 
 class ConfigError(AcquisitionError):
-    """The settings do not match the device, such as wrong magic, version or channel count."""
+    """The settings do not match the device, for example in protocol version or channel count."""
 
 
 class LinkError(AcquisitionError):

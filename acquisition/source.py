@@ -10,8 +10,8 @@ from core.samples.blocks import SampleBlock
 class SampleSource(Protocol):
     """Source of the samples of one unit.
 
-    A source may be reconnected after its context was left; the sample index then contains the gap.
-    A source does not retry and does not log; the runner does both for all sources.
+    A source may be connected again after its context was left; the sample index then shows the
+    gap. A source does not retry and does not log; its caller does both for all sources.
     """
 
     def connect(self) -> AbstractAsyncContextManager[AsyncIterator[SampleBlock]]:
@@ -29,7 +29,7 @@ class SampleSource(Protocol):
 
 @runtime_checkable
 class RefusesFrames(Protocol):
-    """Source that counts the frames that it rejects."""
+    """Sample source that counts the invalid frames that it rejects."""
 
     @property
     def refused_frames(self) -> Mapping[str, int]:
@@ -38,5 +38,5 @@ class RefusesFrames(Protocol):
 
 
 def refused_frames_of(source: SampleSource) -> Mapping[str, int]:
-    """Return the rejected frames of a source by reason; empty if it does not count them."""
+    """Return the numbers of rejected frames of a source by reason; empty if it has no counters."""
     return source.refused_frames if isinstance(source, RefusesFrames) else {}

@@ -1,4 +1,4 @@
-"""Array types. Real signals and complex phasors have different types."""
+"""NumPy array types of samples, real numbers, complex phasors and times."""
 
 from typing import TypeAlias
 
@@ -15,7 +15,7 @@ RawArray: TypeAlias = CountArray | SampleArray
 """Samples as a device delivers them: converter counts, or values in engineering units."""
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
-"""Real numbers for calculations."""
+"""Real numbers in double precision, for calculations."""
 
 ComplexArray: TypeAlias = npt.NDArray[np.complex128]
 """Complex phasors and spectra."""

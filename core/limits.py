@@ -1,4 +1,4 @@
-"""Alarm levels, limits, zones, judgements and delay timers, for alarms and film changes."""
+"""Alarm levels, limits, vibration zones, judgements and delay timers."""
 
 import math
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from core.quality import Reading, Reason
 
 
 class AlarmLevel(IntEnum):
-    """Priority of an alarm."""
+    """Severity of an active alarm, in rising order."""
 
     ALERT = 1
     DANGER = 2
@@ -18,22 +18,23 @@ class AlarmLevel(IntEnum):
 
 @dataclass(frozen=True)
 class Judgement:
-    """Judgement of the condition that an alarm monitors, at one time.
+    """Result of checking the condition that an alarm monitors, at one time.
 
     Parameters
     ----------
     level
         Level whose limit is exceeded, or None. For an unknown condition, the last known level.
     is_known
-        Whether the condition could be judged; an unknown condition neither raises nor clears.
+        Whether the condition could be judged. An unknown condition neither raises nor clears an
+        alarm.
     value, limit
-        Value and the limit it was compared with; None for a judgement without numbers.
+        Value, and the limit with which it was compared; both None for a judgement without numbers.
     reason
         Reason as a code word; "ok" if no limit is exceeded.
     suppressed_by
         Reason why the alarm is suppressed by design; None if it is not suppressed.
     point
-        Operating condition under which a limit was exceeded, if known.
+        Operating point at which a limit was exceeded; None if unknown or not exceeded.
     """
 
     level: AlarmLevel | None = None
@@ -46,7 +47,7 @@ class Judgement:
 
 
 WITHIN = Judgement()
-"""Judgement within limits, without a value."""
+"""Judgement that no limit is exceeded, without a value."""
 
 
 NEVER_JUDGED = Judgement(is_known=False, reason="waiting_for_data")
@@ -58,7 +59,7 @@ def unknown(reason: str, suppressed_by: str | None = None) -> Judgement:
 
 
 MAYBE_TOO_LOW = (Reason.SPEED_IMPLAUSIBLE,)
-"""Reasons for which a reading may be too low: the 1× bin of a wrong speed misses the line."""
+"""Reasons why a reading may be too low: with a wrong speed, the 1× bin misses the spectral line."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +69,12 @@ class Limits:
     Parameters
     ----------
     alert, danger
-        Upper limits, above zero and rising; None if unused. At least one limit is given.
+        Upper limits of the two levels, above zero and rising; None if unused. At least one limit,
+        upper or lower, is given.
     deadband
         Distance inside the limit that a value must reach for an active level to end.
     alert_below, danger_below
-        Lower limits; None if unused.
+        Lower limits of the two levels; None if unused.
     """
 
     alert: float | None = None
@@ -91,12 +93,15 @@ class Limits:
         return max(low, default=None)
 
     def is_within(self, value: float) -> bool:
-        """Whether a value exceeds no limit."""
+        """Whether a value is within all upper and lower limits; a value on a limit is within."""
         high, low = self._lowest_high, self._highest_low
         return (high is None or value <= high) and (low is None or value >= low)
 
     def passed(self, value: float, held: AlarmLevel | None) -> AlarmLevel | None:
-        """Return the worst exceeded level; a held level ends only beyond the deadband."""
+        """Return the highest level whose limit a value exceeds, or None if it exceeds none.
+
+        The level `held` before, and those below it, end only inside the limit by the deadband.
+        """
         levels = [
             level
             for level, high, low in zip(
@@ -121,7 +126,7 @@ class Limits:
         return value < (self._highest_low + self._lowest_high) / 2.0
 
     def of(self, level: AlarmLevel | None, value: float = math.inf) -> float | None:
-        """Return a level's limit on the side of a value; without a level, the first limit."""
+        """Return the limit of a level (alert for None): a lower limit if the value is low."""
         if self.is_low(value):
             alert, danger = self.alert_below, self.danger_below
         else:
@@ -131,14 +136,14 @@ class Limits:
         return danger if level is AlarmLevel.DANGER else alert
 
     def reason(self, level: AlarmLevel | None, value: float) -> str:
-        """Return the reason of a level as a code word."""
+        """Return the code word "ok", "below_limit" or "above_limit" for a level and its value."""
         if level is None:
             return "ok"
         return "below_limit" if self.is_low(value) else "above_limit"
 
 
 def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Judgement:
-    """Compare a reading with limits; `held` is the level of the previous judgement.
+    """Return the judgement of a reading by limits; `held` is the level of the previous judgement.
 
     A reading at an implausible speed may be too low: it can raise an alarm but not clear it. At
     standstill the alarms are suppressed but not cleared, because the speed reading may be wrong.
@@ -165,7 +170,7 @@ class ZoneLimits(Limits):
     zone_b: float = 0.0
 
     def reason(self, level: AlarmLevel | None, value: float) -> str:
-        """Return the name of the zone."""
+        """Return the name of the zone of a value, "zone_a" to "zone_d"."""
         if level is None:
             return "zone_a" if value <= self.zone_b else "zone_b"
         return ZONES[level]
@@ -177,6 +182,8 @@ class DelayTimer:
 
     Parameters
     ----------
+    is_on
+        Whether the level is active.
     opposed_ns
         Accumulated known time for which the condition has differed from `is_on`.
     last_ns
@@ -195,10 +202,10 @@ class DelayTimer:
         off_delay_ns: int,
         elapsed_ns: int | None = None,
     ) -> "DelayTimer":
-        """Return the timer updated with the present condition `wanted`.
+        """Return the timer updated at a time; `wanted` is whether the condition is present.
 
-        Each call with a differing condition adds `elapsed_ns`, by default the time since the
-        previous such call, or 0 if the clock was set back.
+        Each call with `wanted` different from `is_on` adds `elapsed_ns`, by default the time since
+        the previous such call, or 0 if the clock was set back.
         """
         if wanted == self.is_on:
             return ON if wanted else INACTIVE

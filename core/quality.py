@@ -68,7 +68,7 @@ def bad(reason: Reason) -> Quality:
 
 
 def worst(qualities: Iterable[Quality]) -> Quality:
-    """Return the worst quality, the first one on a tie; good if there are none."""
+    """Return the worst quality, the first of equally bad ones; good if `qualities` is empty."""
     return max(qualities, key=lambda quality: quality.level, default=GOOD)
 
 
@@ -103,7 +103,7 @@ class Reading:
 
 
 def missing(reason: Reason) -> Reading:
-    """Return a bad reading without a value, for a reason."""
+    """Return a bad reading without a value; `reason` states why the value is missing."""
     return Reading(None, bad(reason))
 
 
@@ -114,7 +114,8 @@ NOT_MEASURED = missing(Reason.NOT_MEASURED)
 def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = None) -> Reading:
     """Return the mean of the usable readings, or the newest unusable one if most are unusable.
 
-    The weights, such as numbers of samples, are equal by default. Readings count by weight.
+    The weights, such as numbers of samples, are equal by default; "most" is more than half of the
+    total weight.
     """
     weights = [1.0] * len(readings) if weights is None else weights
     counted = [
@@ -134,7 +135,7 @@ def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = 
 def current_mean(readings: Sequence[Reading], *, is_grazed: bool = False) -> Reading:
     """Return the mean of the usable readings, or the newest reading if it is unusable.
 
-    For readings over minutes that are shown as present values. A channel that has just failed has
+    For averages over minutes that are shown as present values. A channel that has just failed has
     no value, unless only a few clipped samples made its newest reading unusable (`is_grazed`).
     """
     newest = readings[-1]

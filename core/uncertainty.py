@@ -27,7 +27,7 @@ class Distribution(StrEnum):
 
 
 class Kind(StrEnum):
-    """Kind of contribution: random between averaging times, or systematic (constant)."""
+    """Kind of contribution: random from one averaging time to the next, or systematic."""
 
     RANDOM = "random"
     SYSTEMATIC = "systematic"
@@ -97,7 +97,7 @@ class Budget:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % coverage interval."""
+        """95 % coverage interval of the result: lower and upper end."""
         return self.bounded_interval or _interval(self.value, self.lines)
 
     def reading(self, quality: Quality) -> Reading:
@@ -111,7 +111,7 @@ class Budget:
 
 
 def random_line(name: str, standard: float, freedoms: float = math.inf) -> BudgetLine:
-    """Return a random, normal contribution in the unit of the result."""
+    """Return a random, normally distributed contribution; `standard` is in the result's unit."""
     return BudgetLine(name, Kind.RANDOM, Distribution.NORMAL, standard, 1.0, freedoms)
 
 
@@ -144,7 +144,7 @@ def _half_width(parts: Sequence[tuple[float, float]]) -> float:
 
 
 def proportional(value: float, budget: Budget) -> Budget:
-    """Return the budget of a value that is exactly proportional to the result of a budget."""
+    """Return the budget of a value that is exactly proportional to the result of `budget`."""
     factor = value / budget.value
     lines = (line._replace(sensitivity=factor * line.sensitivity) for line in budget.lines)
     return Budget(value, tuple(lines))
@@ -186,12 +186,23 @@ def mean_budget(
     systematic: tuple[BudgetLine, ...] = (),
     sensitivity: float = 1.0,
 ) -> Budget | None:
-    """Return the budget of a mean of values (n,), oldest first, or of a result derived from it.
+    """Return the budget of a mean of correlated values, or of a result derived from the mean.
+
+    Parameters
+    ----------
+    value
+        The mean, or the derived result.
+    values : (n,)
+        Averaged values, oldest first.
+    systematic
+        Systematic contributions to add.
+    sensitivity
+        Change of `value` per unit of the mean.
 
     Returns
     -------
-    None for fewer than two values, and for constant values: the repeated value of a transmitter
-    contains no information about its uncertainty.
+    Budget; None for fewer than two values, and for constant values: the repeated value of a
+    transmitter contains no information about its uncertainty.
     """
     known = np.asarray(values, dtype=np.float64)
     if known.size < MIN_EFFECTIVE or not np.ptp(known) > 0.0:
@@ -202,7 +213,7 @@ def mean_budget(
 
 
 def numbers(readings: Sequence[Reading]) -> FloatArray:
-    """Return the values of the readings that have a value (n,)."""
+    """Return the values of readings (n,), without the readings that have no value."""
     return np.array([r.value for r in readings if r.value is not None], np.float64)
 
 
@@ -210,11 +221,14 @@ Budgeted = tuple[Reading, Budget | None]
 """Reading with its budget; the budget is None if the uncertainty is unknown."""
 
 Found = tuple[dict[str, Reading], dict[str, Budget]]
-"""Readings with their uncertainties, and the known budgets, both by quantity."""
+"""Readings with their uncertainties, and the known uncertainty budgets, both by quantity."""
 
 
 def with_budgets(found: Mapping[str, Budgeted], prefix: str = "") -> Found:
-    """Return readings with uncertainties from their budgets, and the budgets, by prefixed name."""
+    """Return readings with the uncertainties of their budgets, and the budgets, by quantity.
+
+    `prefix` is added to the names of the quantities.
+    """
     readings: dict[str, Reading] = {}
     budgets: dict[str, Budget] = {}
     for name, (reading, budget) in found.items():

@@ -8,17 +8,17 @@ DAY_NS = 86_400 * NS_PER_S
 
 
 def hz_from_rpm(speed_rpm: float) -> float:
-    """Return the 1× frequency of a running speed."""
+    """Return the 1× frequency, in Hz, of a running speed in r/min."""
     return speed_rpm / 60.0
 
 
 def rpm_from_hz(frequency_hz: float) -> float:
-    """Return the running speed for a 1× frequency."""
+    """Return the running speed, in r/min, of a 1× frequency in Hz."""
     return frequency_hz * 60.0
 
 
 def rad_s_from_rpm(speed_rpm: float) -> float:
-    """Return the angular speed of a shaft, rad/s."""
+    """Return the angular speed, in rad/s, of a running speed in r/min."""
     return speed_rpm * 2.0 * math.pi / 60.0
 
 
@@ -28,7 +28,7 @@ def um_from_m(length_m: float) -> float:
 
 
 def s_from_ns(duration_ns: int) -> float:
-    """Convert a duration from nanoseconds to seconds; a float is too inexact for dates."""
+    """Convert a duration from nanoseconds to seconds; a float is too inexact for absolute times."""
     return duration_ns / NS_PER_S
 
 

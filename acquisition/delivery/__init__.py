@@ -1,1 +1,1 @@
-"""Shared parts of all adapters after decoding: blocks, time stamps, polling, units."""
+"""Parts that all adapters share: sample blocks, time stamps, polling, units."""

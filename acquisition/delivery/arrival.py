@@ -36,16 +36,16 @@ class Arrival:
         return cls(clock.now_ns(), clock.monotonic_s())
 
     def step_s_since(self, before: "Arrival") -> float:
-        """Return the seconds by which the wall clock was set forward since another arrival."""
+        """Return the seconds by which the wall clock was set forward after the arrival `before`."""
         return (self.host_ns - before.host_ns) / NS_PER_S - (self.steady_s - before.steady_s)
 
 
 _MAX_RISE_S = 1.0
-"""Longest elapsed time that increases the smallest delay in one step."""
+"""Longest elapsed time for which one update increases the stored smallest delay."""
 
 
 class LeastDelay:
-    """Smallest transmission delay of samples, the zero point of their lateness.
+    """Estimator of the smallest transmission delay of samples, which counts as no lateness.
 
     The stored minimum increases with time by the largest clock drift.
 
@@ -66,7 +66,7 @@ class LeastDelay:
         self.least_s: float | None = None
 
     def late_s(self, delay_s: float, now_s: float) -> float:
-        """Add a delay; return its excess over the previous minimum, negative for a new minimum."""
+        """Add a delay at a monotonic time; return its excess over the previous minimum, seconds."""
         if self.least_s is None:
             self.least_s, self._at_s = delay_s, now_s
         passed_s = min(max(0.0, now_s - self._at_s), _MAX_RISE_S)
@@ -77,7 +77,8 @@ class LeastDelay:
 
 _BIN_S = 10.0
 _MAX_BINS = 360
-"""One hour: long compared with poll jitter, short compared with daily temperature changes."""
+"""Number of bins of `_BIN_S`, one hour in all: long compared with poll jitter, short compared with
+daily temperature changes."""
 
 _MIN_BINS = 6
 
@@ -109,12 +110,12 @@ class ArrivalModel:
         self._drift: tuple[float, float] | None = None
 
     def add(self, epoch: int, stop_index: int, stop_ns: int | None, arrived: Arrival) -> None:
-        """Add the arrival of all samples before an index.
+        """Add the arrival of all samples before `stop_index`.
 
         Parameters
         ----------
         stop_ns
-            Time of that index by the device stamps; None without device stamps.
+            Time of `stop_index` by the device stamps; None without device stamps.
         """
         if epoch != self._epoch or self._was_set(arrived):
             self._begin(epoch, stop_index, arrived.steady_s)
@@ -135,7 +136,7 @@ class ArrivalModel:
                 self._offset_ns[-1] = max(self._offset_ns[-1], offset_ns)
 
     def device_clock(self, n_faults: int = 0) -> DeviceClock:
-        """Return the present offset and drift of the device clock; None if unknown."""
+        """Return the present offset and drift of the device clock; unknown fields are None."""
         offset_ns = max(list(self._offset_ns)[-_MIN_BINS:], default=None)
         drift = None if self._drift is None else -1e6 * self._drift[0]
         return DeviceClock(
@@ -156,7 +157,7 @@ class ArrivalModel:
 
 
 def _slope(points: deque[tuple[float, float]]) -> tuple[float, float] | None:
-    """Return the least-squares slope of a line and its standard uncertainty."""
+    """Return the least-squares slope and its standard uncertainty; None with few points."""
     if len(points) < _MIN_BINS:
         return None
     host_s, delay_s = np.array(points).T
@@ -171,7 +172,7 @@ _MAX_SLEW = 200e-6
 """Largest relative rate change of host stamps: twice the error of a poor crystal."""
 
 _STEP_NS = NS_PER_S
-"""Error of a stamp above which drift is excluded: the host clock was set."""
+"""Error of a host stamp that drift cannot explain: above it, the host clock was set."""
 
 
 class HostStamps:
@@ -197,7 +198,7 @@ class HostStamps:
         self._least_delay_ns: int | None = None
 
     def add(self, epoch: int, stop_index: int, arrived_ns: int) -> None:
-        """Add the arrival of the samples before an index; call it before `start_ns`."""
+        """Add the arrival of the samples before `stop_index`; call it before `start_ns`."""
         delay_ns = arrived_ns - self.start_ns(stop_index)
         if epoch != self._epoch or delay_ns < -_STEP_NS:
             self._begin(epoch, stop_index, arrived_ns)
@@ -236,12 +237,12 @@ _MAX_LATE_S = 5.0
 """Delay of a frame above which the interface clock counts as set."""
 
 _MAX_STILL_S = 0.05
-"""Longest time between reading frames with the same stamp."""
+"""Longest time between the reading of two frames that may have the same stamp."""
 
 
 @dataclass(frozen=True)
 class _Pair:
-    """Interface stamp of a frame and the time when the frame was read."""
+    """Interface stamp of a frame, seconds, and the time when the frame was read."""
 
     stamp_s: float
     read: Arrival
@@ -252,7 +253,7 @@ class _Pair:
 
 
 class InterfaceClock:
-    """Conversion of the stamps of an interface, with arbitrary start, to the host clocks.
+    """Converter of the stamps of a CAN interface, which start at any value, to host time.
 
     The smallest difference between reading time and stamp counts as zero delay. A stamp that
     regresses, repeats or jumps is replaced by the reading time. Two consecutive such stamps that

@@ -1,4 +1,4 @@
-"""Last stage of every adapter: checking of time stamps and assembly of sample blocks."""
+"""Check of device time stamps, and assembly of sample blocks: the last stage of every adapter."""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -26,8 +26,8 @@ MIN_BLOCK_S = 0.25
 """Minimum length of blocks without missing samples or pauses."""
 
 _STAMP_NS = 1000
-"""Resolution of a time stamp. All protocols can transfer this resolution, and slow values in single
-precision, so that replays of a recording over any protocol have equal values."""
+"""Resolution of time stamps. All protocols can transfer this resolution, and slow values in single
+precision, so a recording replayed over any protocol gives equal values."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class RawBlock:
 
 
 def sample_block(raws: Sequence[RawBlock], calibration: UnitCalibration) -> SampleBlock:
-    """Return consecutive raw blocks as one sample block with a cell for each."""
+    """Return one sample block of consecutive raw blocks, with one cell per raw block."""
     first = raws[0]
     if len(raws) == 1:
         counts, side = first.counts, SideValues.of(first.start_ns, first.ok, first.slow)
@@ -91,7 +91,7 @@ def sample_block(raws: Sequence[RawBlock], calibration: UnitCalibration) -> Samp
 
 
 def cells_of(block: SampleBlock) -> Iterator[RawBlock]:
-    """Yield the cells of a block as raw blocks, without slow values of other devices."""
+    """Yield each cell of a sample block as a raw block, without slow values of other devices."""
     side = block.side
     stops = [*side.starts[1:].tolist(), block.n_samples]
     columns = (side.starts.tolist(), stops, side.start_ns.tolist(), side.ok.T.tolist())
@@ -109,7 +109,7 @@ def cells_of(block: SampleBlock) -> Iterator[RawBlock]:
 
 
 class BlockJoiner:
-    """Joiner of consecutive blocks into cells that start at multiples of the cell length.
+    """Joiner of sample blocks, with cells that start at multiples of the cell length.
 
     The cells do not depend on the block lengths of the protocol. A cell is shorter only where
     samples are missing or the device restarted. A channel of a cell is OK if it is OK in all parts;
@@ -120,7 +120,8 @@ class BlockJoiner:
     cell_samples
         Number of samples per channel in a cell.
     min_samples
-        Minimum number of samples of a block; fewer are held until more follow, or `release`.
+        Minimum number of samples of a returned block; fewer are held until more samples follow, or
+        until `release`.
     """
 
     def __init__(self, cell_samples: int, min_samples: float = 0.0) -> None:
@@ -142,7 +143,7 @@ class BlockJoiner:
         return max(0, stop_index - stop_index % self._cell - self._parts[0].first_index)
 
     def release(self) -> list[SampleBlock]:
-        """Return the held complete cells; for a pause in the data."""
+        """Return the complete cells held so far, as at most one block; for a pause in the data."""
         n_whole = self.n_whole
         if not n_whole:
             return []
@@ -196,8 +197,8 @@ _POSSIBLE_NS = range(946_684_800 * NS_PER_S, 4_102_444_800 * NS_PER_S)
 class StampCheck:
     """Check of time stamps against the sample index, which is exact.
 
-    A wrong stamp is replaced by extrapolation from the last good stamp, and the block states the
-    fault. Two consecutive wrong stamps that agree with each other indicate that the device clock
+    A wrong stamp is replaced by extrapolation from the last good stamp, and the fault is
+    returned. Two consecutive wrong stamps that agree with each other indicate that the device clock
     was set: they are accepted, unless they leave the years 2000 to 2100.
 
     Attributes
@@ -212,7 +213,7 @@ class StampCheck:
         self.n_faults = 0
 
     def check(self, block: SampleBlock) -> tuple[SampleBlock, StampFault | None]:
-        """Return the block with corrected stamps, and the first fault of its own stamps or None."""
+        """Return the block with corrected stamps, and the fault of the first wrong one or None."""
         side, index = block.side, block.first_index + block.side.starts
         if side.n_cells > 1 and self._all_fit(block, index):
             return block, None
@@ -226,7 +227,7 @@ class StampCheck:
         return replace(block, side=side), faults[0]
 
     def _checked(self, stamp: "_Stamp") -> tuple[int, StampFault | None]:
-        """Return the time of a cell, and the fault of its own stamp or None."""
+        """Return the corrected time of a stamp, ns, and the fault of the stamp or None."""
         good, doubted = self._good, self._doubted
         if good is None or stamp.epoch != good.epoch:
             self._believe(stamp)
@@ -320,7 +321,7 @@ class BlockAssembler:
         self._fault: StampFault | None = None
 
     def note_fault(self, fault: StampFault) -> None:
-        """Count a fault of a stamp other than a sample stamp; mark the next block with it."""
+        """Count the fault of a stamp other than a sample stamp, and report it in the next block."""
         self._stamps.n_faults += 1
         self._fault = fault
 
@@ -349,12 +350,12 @@ class BlockAssembler:
     def take_together(
         self, raws: Sequence[RawBlock], arrived: Arrival | None = None, read_for_s: float = 0.0
     ) -> list[SampleBlock]:
-        """Add raw blocks that arrived together; the device held earlier blocks for longer.
+        """Add raw blocks that arrived together, oldest first; return the completed sample blocks.
 
         Parameters
         ----------
         read_for_s
-            Time since the device reported the newest block.
+            Time for which the device had held the newest block before its arrival.
         """
         blocks: list[SampleBlock] = []
         n_after = sum(raw.n_samples for raw in raws)
@@ -373,11 +374,11 @@ class BlockAssembler:
         return self._joiner.n_whole > 0
 
     def release(self) -> list[SampleBlock]:
-        """Return the held complete cells; for a pause of the device or a lost link."""
+        """Return the complete cells held so far; for a pause of the device or a lost link."""
         return self._with_clock(self._joiner.release())
 
     def flush(self) -> list[SampleBlock]:
-        """Return all held samples; for the end of the data, as of a recording."""
+        """Return all held samples, with an incomplete last cell; for the end of a recording."""
         return self._joiner.flush()
 
     def _checked(

@@ -67,7 +67,7 @@ class JoinedSource:
 
 
 def only_slow(calibration: UnitCalibration, ids: frozenset[str]) -> UnitCalibration:
-    """Return the calibration of only the slow channels `ids`, which a second device measures."""
+    """Return the calibration of the slow-value device: only the slow channels `ids`."""
     slow = tuple(channel for channel in calibration.slow if channel.id in ids)
     return replace(calibration, channels=(), slow=slow)
 

@@ -1,4 +1,4 @@
-"""Host name resolution and task cancellation that name servers or libraries cannot block.
+"""Host name resolution that cannot block the event loop, and reliable task cancellation.
 
 The name resolution of the event loop occupies a thread of the default pool, which the database also
 uses, until the name servers time out, even after its caller was cancelled.
@@ -21,7 +21,7 @@ class NameLookUp:
         self._asking: asyncio.Future[list[str]] | None = None
 
     async def addresses(self) -> list[str]:
-        """Return the addresses in the order in which to try them.
+        """Return the IP addresses of the host, in the order in which to try them.
 
         Raises
         ------
@@ -51,7 +51,7 @@ class KnownAddresses:
         self._found: list[str] = []
 
     async def within(self, limit_s: float) -> list[str]:
-        """Return the addresses within a time limit; the last known ones if resolution fails.
+        """Return the IP addresses within a time limit; if resolution fails, the last known ones.
 
         Raises
         ------
@@ -119,7 +119,7 @@ def n_stops() -> int:
 
 
 def let_stop_through(n_before: int = 0) -> None:
-    """Raise a cancellation that a library has suppressed.
+    """Raise `asyncio.CancelledError` if a library has suppressed a cancellation of this task.
 
     Before Python 3.12, `asyncio.wait_for` loses a cancellation if the awaited result arrives at the
     same time (CPython issue 86296), so the task would never end. Call this function after every

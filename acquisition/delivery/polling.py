@@ -13,7 +13,7 @@ _SHARES: tuple[float, float] = ((3.0 - 5.0**0.5) / 2.0, (5.0**0.5 - 1.0) / 2.0)
 
 
 class PollClock:
-    """Clock of poll ticks at multiples of a period since the first tick, across connections.
+    """Timer for polls at multiples of a period since the first poll, also across reconnections.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class PollClock:
         self.epoch = 0
 
     async def next(self) -> int:
-        """Wait for the next tick and return its number; the first tick is immediate.
+        """Wait for the next tick and return its number, from 0; the first tick is immediate.
 
         Ticks whose time has passed are skipped, so that polls do not accumulate. The gap in the
         numbers is the number of missed ticks.
@@ -55,7 +55,7 @@ class PollClock:
 
 
 def incommensurate_period_s(longest_s: float, slot_s: float) -> float:
-    """Return the longest poll period up to a limit that is incommensurate with the slot duration.
+    """Return the longest poll period up to `longest_s` with no simple ratio to the slot duration.
 
     A poll of a ring buffer measures the time of a slot's last sample only if it coincides with the
     end of the slot. If period and slot have a simple ratio, as 0.25 s and 50 samples at 600 Hz,
@@ -78,14 +78,14 @@ def _golden_from(ratio: float) -> float:
 
 
 class Freshness:
-    """Watchdog for a value of a device that must change, such as a heartbeat.
+    """Watchdog for a device value that must keep changing, such as a heartbeat.
 
     Parameters
     ----------
     what
         Name of the value for messages; example: "the heartbeat".
     stale_after_s
-        Longest time without a change.
+        Longest accepted time without a change of the value.
     """
 
     def __init__(self, what: str, stale_after_s: float) -> None:
@@ -95,12 +95,12 @@ class Freshness:
         self._stood_still = False
 
     def opened(self, now_s: float) -> None:
-        """Restart the timeout for a new connection, unless stale data ended the previous one."""
+        """Restart the timeout for a new connection, unless stale data ended the last connection."""
         if not self._stood_still:
             self._since_s = now_s
 
     def note(self, alive: bytes, now_s: float) -> None:
-        """Update the watchdog with the present value.
+        """Update the watchdog with the present value `alive` at a monotonic time.
 
         Raises
         ------

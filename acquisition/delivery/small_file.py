@@ -6,13 +6,13 @@ from pathlib import Path
 
 
 def read_small_file(path: Path, max_bytes: int) -> bytes:
-    """Return the content of a file of limited size.
+    """Return the content of a regular file of at most `max_bytes`.
 
     Raises
     ------
     OSError
-        If the file cannot be read, is not a regular file (reading a pipe would block), or is larger
-        than `max_bytes`; `strerror` states the reason.
+        If the file cannot be read, is not a regular file (reading a pipe would block), or is too
+        large; `strerror` states the reason.
     """
     mode = path.stat().st_mode
     if stat.S_ISDIR(mode):

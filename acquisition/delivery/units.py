@@ -1,4 +1,4 @@
-"""Spellings of units in files and DBC files, and conversion to the units of channels."""
+"""Spellings of units in measurement and DBC files, and conversion to the units of channels."""
 
 import re
 from collections.abc import Iterable
@@ -56,7 +56,7 @@ _SLOW: dict[str, dict[str, tuple[float, float]]] = {
 
 
 def canonical(unit: str) -> str:
-    """Return the canonical spelling of a unit; an unknown unit is only stripped of spaces."""
+    """Return the canonical spelling of a unit; an unknown unit is returned without outer spaces."""
     return _CANONICAL.get(unit.strip(), unit.strip())
 
 
@@ -66,12 +66,12 @@ def known_unit(spelling: str) -> str | None:
 
 
 def spellings(unit: str) -> str:
-    """Return all spellings of a unit as text for a message."""
+    """Return all accepted spellings of a unit, quoted and separated by commas, for a message."""
     return ", ".join(f'"{spelling}"' for spelling in _SAME[unit])
 
 
 def waveform_factor(measurand: Measurand, unit: str, unit_per_v: float) -> float:
-    """Return the factor from the unit of a file to the engineering unit of a channel.
+    """Return the factor that converts the unit of a file to the engineering unit of a channel.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def waveform_factor(measurand: Measurand, unit: str, unit_per_v: float) -> float
 
 
 def slow_conversion(channel_unit: str, unit: str) -> tuple[float, float]:
-    """Return factor and offset from the unit of a file to the unit of a slow channel.
+    """Return factor and offset that convert a file's unit to a slow channel's: factor · x + offset.
 
     Raises
     ------
@@ -104,13 +104,13 @@ def slow_conversion(channel_unit: str, unit: str) -> tuple[float, float]:
 
 
 def unit_in(heading: str) -> str | None:
-    """Return the unit in brackets at the end of a heading, as in ``shaft x [um]``, or None."""
+    """Return the known unit in brackets at the end of a heading, ``shaft x [um]``; else None."""
     found = re.search(r"\[([^\[\]]{1,16})\]\s*$", heading)
     return found[1] if found and found[1].strip() in _CANONICAL else None
 
 
 def require_unit(place: object, found: str | None, mapped: str) -> None:
-    """Check that the unit of a column, if stated, equals the unit in the mapping.
+    """Check that a column's unit, if its file states one, equals the unit in the import mapping.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from core.limits import INACTIVE, NEVER_JUDGED, AlarmLevel, DelayTimer, Judgemen
 
 
 class AlarmState(StrEnum):
-    """State of an alarm in its life cycle (ISA-18.2, 5.4: states A to H, except latched states)."""
+    """Life-cycle state of an alarm: states A to H of ISA-18.2, 5.4, without the latched states."""
 
     NORMAL = "normal"
     UNACKNOWLEDGED = "unacknowledged"
@@ -22,7 +22,7 @@ class AlarmState(StrEnum):
 
 
 PLANT = "plant"
-"""Unit name of alarms about the service. No generating unit may have this name."""
+"""Unit id of alarms about the service itself. No generating unit may have this id."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,16 @@ class AlarmIdentity:
 
 @dataclass(frozen=True)
 class Hold:
-    """Person who shelved an alarm or took it out of service, with reason and time.
+    """Record that a person shelved an alarm or took it out of service.
 
     Parameters
     ----------
+    actor
+        Name of the person.
+    since_ns
+        Host time of the action.
     until_ns
-        Host time at which the hold expires; None if it does not expire.
+        Host time at which shelving expires; None for an alarm out of service.
     """
 
     actor: str
@@ -71,9 +75,11 @@ class AlarmRule:
 
     Parameters
     ----------
-    on_delay_ns, off_delay_ns
+    on_delay_ns
         Time for which the condition must be present without interruption before a level becomes
-        active, or absent before it ends. Time with unknown condition does not count.
+        active. Time with unknown condition does not count.
+    off_delay_ns
+        Time for which the condition must be absent before a level ends; counted likewise.
     is_latching
         Whether the alarm stays active after its condition has ended, until it is reset.
     """
@@ -92,25 +98,27 @@ class Alarm:
     level
         Level after delays and latch; None if the alarm is inactive.
     occurrence
-        Number of times that the alarm was raised or escalated. Acknowledging refers to it.
+        Number of the newest occurrence: how often the alarm was raised or escalated so far.
     is_acknowledged
-        Whether this occurrence is acknowledged.
+        Whether the newest occurrence is acknowledged.
     raised_ns
-        Start time of this occurrence.
+        Start time of the newest occurrence; None before the first.
     raised_at
-        Operating condition at the start of this occurrence, if known.
+        Operating point at the start of the newest occurrence; None if unknown.
     n_events
         Number of events of the alarm, equal to the number of the newest event.
     condition
-        Newest judgement.
+        Newest judgement of the alarm's condition.
     suppressed_by
         Reason why the alarm is suppressed by design; None if it is not suppressed.
-    shelf, outage
-        Hold of a shelved alarm, and of an alarm that is out of service; else None.
+    shelf
+        Record of the shelving; None if the alarm is not shelved.
+    outage
+        Record of the removal from service; None if the alarm is in service.
     is_latched
         Whether the alarm is active only because of its latch.
     timers
-        Delay timers of the levels alert and danger.
+        Delay timers of the levels alert and danger, in this order.
     """
 
     identity: AlarmIdentity
@@ -129,7 +137,7 @@ class Alarm:
 
     @property
     def state(self) -> AlarmState:
-        """State in the life cycle; out of service, shelved and suppressed take precedence."""
+        """Life-cycle state; out of service, then shelved, then suppressed take precedence."""
         if self.outage is not None:
             return AlarmState.OUT_OF_SERVICE
         if self.shelf is not None:
@@ -143,7 +151,7 @@ class Alarm:
 
     @cached_property
     def is_settled_inactive(self) -> bool:
-        """Whether another known condition within limits leaves the alarm unchanged."""
+        """Whether the alarm is inactive, and a further judgement within limits changes nothing."""
         return (
             self.level is None
             and self.condition.is_known
@@ -154,7 +162,7 @@ class Alarm:
 
 
 class AlarmChange(StrEnum):
-    """Kind of change in an alarm's history."""
+    """Kind of event in the history of an alarm."""
 
     RAISED = "raised"
     ESCALATED = "escalated"
@@ -175,7 +183,7 @@ class AlarmChange(StrEnum):
 
 
 ANNOUNCED = (AlarmChange.RAISED, AlarmChange.ESCALATED)
-"""Changes that start a new occurrence."""
+"""Kinds of events that start a new occurrence of an alarm."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +201,7 @@ class AlarmEvent:
     actor
         Person who performed the action; empty for automatic events.
     reason
-        Reason as a code word, or in the words of the actor.
+        Reason as a code word or as text, such as the comment of the actor.
     """
 
     identity: AlarmIdentity
@@ -213,7 +221,7 @@ class AlarmEvent:
 
 @dataclass(frozen=True)
 class AlarmNews:
-    """Changed alarm with the events that changed it."""
+    """Alarm after an update or an action, with the events that the update or action caused."""
 
     alarm: Alarm
     events: Sequence[AlarmEvent]
@@ -227,7 +235,7 @@ def changed(
     actor: str = "",
     reason: str = "",
 ) -> tuple[Alarm, AlarmEvent]:
-    """Return the alarm after a change, with its event count incremented, and the event."""
+    """Return the alarm `after` with its event count incremented, and the event of the change."""
     after = replace(after, n_events=before.n_events + 1)
     event = AlarmEvent(
         identity=after.identity,

@@ -1,4 +1,4 @@
-"""`AlarmBoard`: alarms with their rules. `AlarmMemory`: alarm state saved for a restart."""
+"""`AlarmBoard`: set of alarms with their rules. `AlarmMemory`: alarm state saved for a restart."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,16 +14,18 @@ from core.quality import Reason
 
 @dataclass(frozen=True)
 class AlarmMemory:
-    """State of the alarms of a unit, with their delay timers, for continuing in another process.
+    """State of a unit's alarms and delay timers, from which another process continues.
 
     Parameters
     ----------
     segment_faults
-        Channel faults that were detected from segments, by channel.
+        Channel faults that were detected from segments, by channel id.
     points
-        Newest operating condition of each bearing and its time, by bearing.
+        Newest operating point of each bearing and its sample time in ns, by bearing id.
     stop
         Epoch and sample index at the end of the newest judged block; None before the first block.
+    link_reason
+        Reason why the link to the device was down; None if unknown, or if it was up.
     """
 
     alarms: tuple[Alarm, ...]
@@ -43,7 +45,7 @@ RESTARTED, NO_LONGER_WATCHED = "restarted", "no_longer_watched"
 
 
 class AlarmBoard:
-    """Set of alarms with their rules, initially inactive; records all events in order."""
+    """Set of alarms with their rules. All alarms are inactive at first; all events are recorded."""
 
     def __init__(self, watched: Iterable[Watch] = ()) -> None:
         watches = list(watched)
@@ -53,7 +55,7 @@ class AlarmBoard:
 
     @property
     def alarms(self) -> Sequence[Alarm]:
-        """All alarms, in any state."""
+        """All alarms of the board, including inactive and hidden alarms."""
         return list(self._alarms.values())
 
     def __contains__(self, id_: str) -> bool:
@@ -64,19 +66,19 @@ class AlarmBoard:
         return self._alarms[id_]
 
     def update(self, watch: Watch, condition: Judgement, now_ns: int) -> None:
-        """Update an alarm; an inactive alarm that stays inactive is unchanged."""
+        """Update an alarm with a judgement; skip an inactive alarm that would stay inactive."""
         is_within = condition.level is None and condition.is_known
         if not (is_within and self._alarms[watch.id].is_settled_inactive):
             self.record(watch.id, condition, now_ns)
 
     def record(self, id_: str, condition: Judgement, now_ns: int) -> None:
-        """Update an alarm in every case, so that it also stores the value within limits."""
+        """Update an alarm with a judgement, even if it stays inactive, to keep its value current."""
         self._note(id_, *update(self._alarms[id_], condition, now_ns, self._rules[id_]))
 
     def pause(self, spared: str | None = None) -> None:
-        """Pause all delay timers, except those of the alarm kind `spared`.
+        """Pause the delay timers of all alarms, except those of the alarm kind `spared`.
 
-        Call it when samples are missing or the clock was set, so that the elapsed time is unknown.
+        For times when samples are missing or the clock was set, and the elapsed time is unknown.
         """
         self._alarms = {
             id_: alarm if alarm.identity.kind == spared else interrupted(alarm)
@@ -84,14 +86,14 @@ class AlarmBoard:
         }
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Unshelve alarms with expired shelving; return the changed alarms with their events."""
+        """End the shelving that has expired at a host time; return the changed alarms."""
         for id_, alarm in self._alarms.items():
             if alarm.shelf is not None:
                 self._note(id_, *expire(alarm, host_ns))
         return self.drain_news()
 
     def operate(self, id_: str, action: Action, host_ns: int) -> list[AlarmNews]:
-        """Apply an action of a person; return the changed alarm with its events.
+        """Apply an action of a person at a host time; return the changed alarm with its events.
 
         Raises
         ------
@@ -115,7 +117,7 @@ class AlarmBoard:
         stored
             Alarms as stored with their newest events.
         memory
-            State at the last block, if no samples have been lost since. Its conditions and delay
+            State at the last block; None if samples were lost since then. Its conditions and delay
             timers continue. A stored alarm may be newer than the memory because of an action or
             a link event. Alarms in the memory that have no rule are ignored.
         """
@@ -149,7 +151,7 @@ class AlarmBoard:
 
 
 def _merged(kept: Alarm, stored: Alarm) -> Alarm:
-    """Return an alarm from the memory, updated from the stored alarm if that has newer events."""
+    """Return the alarm of the memory, updated from the stored alarm if this has more events."""
     if stored.n_events <= kept.n_events:
         return kept
     if stored.identity.kind == LINK_LOST and not is_same_occurrence(kept, stored):

@@ -1,4 +1,4 @@
-"""Judgements of channels, of 1× vectors and of the device clock."""
+"""Alarm judgements of channel faults, changes of 1× vectors, and the device clock."""
 
 import cmath
 import math
@@ -21,19 +21,23 @@ SENSOR_FAULTS = (Reason.DEAD, Reason.STUCK, Reason.CLIPPED)
 
 
 def fault_judgement(fault: str | None) -> Judgement:
-    """Return an alert if there is a fault, otherwise a judgement within limits."""
+    """Return an alert with the fault as its reason; a judgement within limits for None."""
     return WITHIN if fault is None else Judgement(AlarmLevel.ALERT, reason=fault)
 
 
 def channel_judgement(
     quality: Quality, segment_fault: Reason | None, clipped_percent: float | None = None
 ) -> Judgement:
-    """Judge a waveform channel by the quality of its newest samples and its newest segment.
+    """Return the judgement of a waveform channel: an alert if samples or segments show a fault.
 
     Parameters
     ----------
+    quality
+        Quality of the newest samples.
+    segment_fault
+        Fault detected from segments, or None; used if the newest samples are good.
     clipped_percent
-        Percentage of clipped samples in the newest segment.
+        Percentage of clipped samples in the newest segment; None if none or unknown.
     """
     fault = segment_fault if quality.level is Level.GOOD else quality.reason
     found = fault_judgement(fault)
@@ -49,6 +53,8 @@ def fault_after_segment(
 
     Parameters
     ----------
+    fault
+        Fault before the segment, or None.
     amplitude
         1× amplitude of the channel in that segment.
     has_wrong_sign
@@ -64,30 +70,30 @@ def fault_after_segment(
 
 
 def offset_reading(clock: DeviceClock | None) -> Reading:
-    """Return the absolute offset of the device time stamps from the host clock, s."""
+    """Return the absolute offset of the device time stamps from the host clock in seconds."""
     if clock is None or clock.offset_s is None:
         return NOT_MEASURED
     return Reading(abs(clock.offset_s))
 
 
 def drift_reading(clock: DeviceClock | None) -> Reading:
-    """Return the part of the absolute sampling-rate drift that exceeds its uncertainty, ppm."""
+    """Return the excess of the absolute sampling-rate drift over its 95 % uncertainty in ppm."""
     if clock is None or clock.drift_ppm is None or clock.u_drift_ppm is None:
         return missing(Reason.WAITING_FOR_DATA)
     return Reading(max(0.0, abs(clock.drift_ppm) - COVERAGE * clock.u_drift_ppm))
 
 
 CLOCK_READINGS = {"clock_offset": offset_reading, "clock_drift": drift_reading}
-"""Function that returns the judged reading of the device clock, by alarm rule."""
+"""Functions that return the monitored reading of the device clock, by name of the alarm rule."""
 
 NO_REFERENCE, NO_PHASE = "no_reference", "no_phase"
 AMPLITUDE_ONLY = {"ok": "amplitude_change_only", "above_limit": "amplitude_change_above_limit"}
-"""Reasons of a judgement by amplitude only, by the reason of the comparison with the limits."""
+"""Reason code for a judgement by amplitude only, by reason code of a judgement with phase."""
 
 
 @dataclass(frozen=True)
 class OrderVector:
-    """1× vector; the phase is the lead over the key-phase pulse, None if unknown.
+    """1× vibration vector: amplitude, and phase lead over the key-phase pulse (None if unknown).
 
     Raises
     ------
@@ -105,7 +111,7 @@ class OrderVector:
             raise ValueError(f"phase {self.phase_deg:g} must be a number")
 
     def change_um_pk(self, other: "OrderVector") -> float:
-        """Return the length of the vector difference; without a phase, the amplitude difference."""
+        """Return the length of the vector difference, without a phase the amplitude difference."""
         if self.phase_deg is None or other.phase_deg is None:
             return abs(self.amplitude_um_pk - other.amplitude_um_pk)
         return abs(self.phasor_um_pk - other.phasor_um_pk)
@@ -139,12 +145,12 @@ def vector_judgement(
     point: OperatingPoint,
     held: AlarmLevel | None,
 ) -> Judgement:
-    """Judge the change of a 1× vector from its reference.
+    """Return the judgement of the change of a 1× vector from its reference.
 
     A crack, a loose part or a rub can turn the vector without a change of its amplitude, so the
     length of the complex difference is judged. Without a phase, only the amplitude difference is
-    known. It never exceeds the length of the complex difference, so it can raise an alarm but not
-    clear an alarm whose reference has a phase. `watch.source` is the measuring point ("shaft_x").
+    known. It is never larger than that length, so it can raise an alarm but not clear an alarm
+    whose reference has a phase. `watch.source` is the measuring point ("shaft_x").
     """
     place = watch.source
     amplitude = readings[f"order1_{place}_um_pk"]

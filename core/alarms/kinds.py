@@ -1,4 +1,4 @@
-"""`ALARM_KINDS`: table of the alarm kinds of a unit. `watches_of`: alarms that a unit has."""
+"""`ALARM_KINDS`: table of all alarm kinds of units. `watches_of`: alarm definitions of a unit."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ CHANNEL_NOT_OK, LINK_LOST = "channel_not_ok", "link_lost"
 """Names of alarm kinds that other modules refer to."""
 
 OIL_TEMPERATURE, TIME_STAMPS = "oil_temperature", "time_stamps"
-"""Names that an alarm kind and its rule share."""
+"""Names of alarm kinds that are also the names of their rules."""
 
 CHANNEL, BEARING, DEVICE, LINK = "channel", "bearing", "device", "link"
 """Subject types of alarms: a channel or bearing, given by its id, or a unit's device or link."""
@@ -24,7 +24,7 @@ CHANNEL, BEARING, DEVICE, LINK = "channel", "bearing", "device", "link"
 
 @dataclass(frozen=True)
 class AlarmKind:
-    """Kind of alarm. Rules, API, plant file, mail and dashboard use its fields.
+    """Kind of alarm, such as "oil temperature": what it monitors, and how it is displayed.
 
     Parameters
     ----------
@@ -39,8 +39,8 @@ class AlarmKind:
     rule
         Name of the rule: a key of `BearingRules`, or a field of `UnitRules`.
     reading
-        Name of the assessed reading that is compared with limits; for a 1× vector, its measuring
-        point.
+        Name of the reading of an `Assessment` that is compared with limits; for a 1× vector, its
+        measuring point. None if the alarm is judged in another way.
     needs
         Field of `Bearing` that must not be None for the bearing to have this alarm.
     advice
@@ -63,7 +63,7 @@ def kind_table(*kinds: AlarmKind) -> Mapping[str, AlarmKind]:
 
 
 def _pair(rule: str, unit: str, *texts: str) -> Iterable[AlarmKind]:
-    """Yield the kinds for x and for y; braces in the texts are replaced by the axis."""
+    """Yield the alarm kinds for x and for y; braces in the texts are replaced by the axis."""
     for axis in "xy":
         name, label, *rest = (text.format(axis) for text in texts)
         yield AlarmKind(name, label, unit, BEARING, rule, *rest)
@@ -159,13 +159,14 @@ ALARM_KINDS = kind_table(
 """All alarm kinds of a unit. The alarms of a bearing are judged in this order."""
 
 FILM_KINDS = tuple(kind.name for kind in ALARM_KINDS.values() if kind.rule == "films")
-"""Names of the film-stiffness alarm kinds, in the order of a film's findings: x, y."""
+"""Names of the two film-stiffness alarm kinds: for direction x, then for direction y."""
 
 FAST = ("shaft_order1", "shaft_overall", "bearing_overall")
-"""Rules for values that can change within seconds. Zones need steady operation (ISO 20816-1)."""
+"""Rules judged on every recent segment, because vibration can change within seconds. Vibration
+zones are not among them, because they need steady operation (ISO 20816-1)."""
 
 VECTORS = ("shaft_change", "bearing_change")
-"""Rules that compare 1× vectors with references."""
+"""Rules that compare 1× vectors with reference vectors."""
 
 WAVEFORM_CHANNEL, SLOW_CHANNEL = "channel", "slow_channel"
 """Rules of the kind "channel_not_ok" for waveform channels and for slow channels."""
@@ -173,7 +174,7 @@ WAVEFORM_CHANNEL, SLOW_CHANNEL = "channel", "slow_channel"
 
 @dataclass(frozen=True)
 class Watch:
-    """Definition of an alarm that a unit or the service can have.
+    """Definition of one alarm of a unit or of the service.
 
     Parameters
     ----------
@@ -181,6 +182,8 @@ class Watch:
         Name of the judged channel, reading or measuring point, or the subject itself.
     group
         Name of the rule; alarms with the same rule are judged together.
+    limits
+        Limits by operating condition; None for an alarm without limits.
     """
 
     identity: AlarmIdentity
@@ -211,7 +214,7 @@ def watch(
 
 
 def watches_of(unit: Unit, rules: UnitRules) -> list[Watch]:
-    """Return the definitions of all alarms of a unit for its rules, without duplicates."""
+    """Return the definitions of all alarms that the rules give a unit, without duplicates."""
     watches: list[Watch] = []
 
     def add(kind: AlarmKind, subject: str, source: str, group: str, own: BearingRules) -> None:

@@ -63,12 +63,12 @@ def update(
 
 
 def interrupted(alarm: Alarm) -> Alarm:
-    """Return the alarm with paused delays, for a gap in the samples."""
+    """Return the alarm with paused delay timers, for a gap in the samples."""
     return replace(alarm, timers=_paused(alarm.timers))
 
 
 def shown_again(alarm: Alarm) -> Alarm:
-    """Return an alarm after hiding has ended; unacknowledged if active (ISA-18.2, G/H to B)."""
+    """Return an alarm that is no longer hidden: unacknowledged if active (ISA-18.2, G/H to B)."""
     return replace(alarm, is_acknowledged=alarm.is_acknowledged and alarm.level is None)
 
 
@@ -80,7 +80,7 @@ def restored(alarm: Alarm) -> Alarm:
 
 
 def standing_level(timers: Timers) -> AlarmLevel | None:
-    """Return the worst level whose delay timer is on, regardless of the latch."""
+    """Return the highest level whose delay timer is on, regardless of the latch; None without."""
     return max((n for n, t in zip(AlarmLevel, timers, strict=True) if t.is_on), default=None)
 
 

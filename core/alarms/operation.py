@@ -8,17 +8,17 @@ from core.alarms.life_cycle import shown_again, standing_level
 from core.units import NS_PER_S
 
 CLOCK_MARGIN_NS = 60 * NS_PER_S
-"""Largest accepted step back of the clock behind the time of shelving. Clock differences between
-hosts and steps by NTP are smaller."""
+"""Time by which the host clock may be earlier than the time of shelving before the clock counts as
+set back. Clock differences between hosts and steps by NTP are smaller."""
 
 
 class ActionRefusedError(ValueError):
-    """Error for an action that does not fit the alarm's state; the message states the reason."""
+    """An action does not fit the state of the alarm; the message states the reason."""
 
 
 @dataclass(frozen=True)
 class Acknowledge:
-    """Acknowledge one occurrence; a newer occurrence stays unacknowledged."""
+    """Acknowledge an occurrence of an alarm; refused if the alarm has a newer occurrence."""
 
     actor: str
     occurrence: int
@@ -27,7 +27,7 @@ class Acknowledge:
 
 @dataclass(frozen=True)
 class Shelve:
-    """Remove an alarm from the list until a given time."""
+    """Shelve an alarm: remove it from the alarm list until host time `until_ns`."""
 
     actor: str
     reason: str
@@ -43,7 +43,7 @@ class Unshelve:
 
 @dataclass(frozen=True)
 class TakeOutOfService:
-    """Remove an alarm from the list without an end time, for example for maintenance."""
+    """Remove an alarm from the alarm list without an end time, for example for maintenance."""
 
     actor: str
     reason: str
@@ -51,7 +51,7 @@ class TakeOutOfService:
 
 @dataclass(frozen=True)
 class ReturnToService:
-    """Return an alarm that is out of service to the list."""
+    """Put an alarm that is out of service back on the alarm list."""
 
     actor: str
 
@@ -65,7 +65,7 @@ class Reset:
 
 @dataclass(frozen=True)
 class Comment:
-    """Add a comment without a change of the alarm's state."""
+    """Add a comment to the history of an alarm without a change of its state."""
 
     actor: str
     text: str
@@ -77,7 +77,7 @@ Action: TypeAlias = (
 
 
 def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
-    """Apply an action of a person at a host time; an action without effect adds no event.
+    """Return the alarm after a person's action at a host time, with its event; none if no effect.
 
     Raises
     ------

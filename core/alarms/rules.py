@@ -22,7 +22,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Region:
-    """Operating states, and ranges of the operating condition; None for an unrestricted range.
+    """Set of operating points: operating states, and ranges of values; None for no restriction.
 
     A condition cell is a region with the bounds of the cell. Attitude angles are within 0° to 360°.
     """
@@ -33,7 +33,7 @@ class Region:
     attitude_deg: Range | None = None
 
     def holds(self, point: OperatingPoint) -> bool | None:
-        """Whether the region contains an operating point; None if unknown."""
+        """Whether the region contains an operating point; None if an unknown value decides."""
         is_inside = point.state in self.states
         is_known = is_inside or point.state is not OperatingState.UNKNOWN
         inside: list[bool | None] = [is_inside if is_known else None]
@@ -45,7 +45,7 @@ class Region:
         return None if None in inside and False not in inside else all(inside)
 
     def overlaps(self, other: "Region") -> bool:
-        """Whether this region and another have common operating points."""
+        """Whether this region and the other region have operating points in common."""
         both = zip(self.ranges, other.ranges, strict=True)
         return bool(self.states & other.states) and all(
             one is None or two is None or (one[0] < two[1] and two[0] < one[1]) for one, two in both
@@ -71,8 +71,8 @@ class LimitRule:
     Parameters
     ----------
     limits
-        Limits in the given states outside the regions of `tables`; None if only `tables` apply,
-        as for zones.
+        Limits in the operating states `states`, outside the regions of `tables`; None if only
+        `tables` apply, as for zones.
     states
         Operating states in which `limits` are valid.
     tables
@@ -97,7 +97,7 @@ class LimitRule:
         return (*possible, self.limits) if counts and self.limits is not None else possible
 
     def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
-        """Return the worst judgement by the limits that may be valid; of equal ones, the strictest.
+        """Return the worst judgement by all limits that may be valid; on a tie, the lowest limit's.
 
         Without valid limits the condition is unknown, so a suppressed alarm does not return.
         """
@@ -110,7 +110,7 @@ class LimitRule:
 
 
 def point_of(assessment: Assessment) -> OperatingPoint:
-    """Return the operating point of an assessment of any quality.
+    """Return the operating point of an assessment; missing readings are None.
 
     Standstill is also derived from the speed reading if the operating state is unknown.
     """
@@ -133,15 +133,18 @@ class UnitRules:
 
     Parameters
     ----------
+    channel
+        Rule for faults of waveform channels.
     slow_channel
-        Rule for slow channels that a limit needs. Another device may deliver them with a delay.
+        Rule for faults of slow channels that have limits. Another device may deliver them late.
     bearings
-        Limit rules by bearing.
+        Limit rules by bearing id.
     films
         Rule for changes of film stiffness, which `core.change` detects.
-    clock_offset, clock_drift
-        Limits of the offset of the device time stamps from host time, s, and of the sampling-rate
-        drift, ppm.
+    clock_offset
+        Limits, in seconds, of the offset of the device time stamps from host time.
+    clock_drift
+        Limits, in ppm, of the sampling-rate drift.
     time_stamps
         Rule for time stamps of the device that do not match the sample index.
     link

@@ -18,7 +18,7 @@ SHOWN_NS = 600 * NS_PER_S
 
 @dataclass(frozen=True)
 class ChatterRule:
-    """Number of activations within a time window that define a chattering alarm.
+    """Definition of chattering: number of activations of an alarm within a time window.
 
     An alarm that is active for less than the window counts as fleeting.
     """
@@ -36,7 +36,7 @@ class ChatterWatch:
         self._chattered: dict[str, int] = {}
 
     def note(self, event: AlarmEvent, seen_ns: int) -> None:
-        """Add an event, received at host time `seen_ns`; its own time may be an old sample time."""
+        """Add an event received at host time `seen_ns`, which may be later than the event time."""
         if event.change not in ANNOUNCED:
             return
         n_wanted = self._rule.n_activations
@@ -66,7 +66,7 @@ HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 
 @dataclass(frozen=True)
 class Frequent:
-    """Frequent alarm: its number of announcements, and their share of all announcements."""
+    """Frequent alarm: its id, number of announcements, and fraction of all announcements."""
 
     alarm: str
     n_alarms: int
@@ -114,7 +114,7 @@ def is_announced(event: AlarmEvent) -> bool:
 def figures_of(
     events: Iterable[AlarmEvent], start_ns: int, end_ns: int, rule: ChatterRule
 ) -> AlarmFigures:
-    """Return the metrics of the events from a start up to, but not including, an end.
+    """Return the metrics of a period; `events` outside it, or exactly at its end, do not count.
 
     Raises
     ------

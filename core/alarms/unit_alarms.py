@@ -54,6 +54,8 @@ class UnitAlarms(AlarmBoard):
         Alarm rules; a stored alarm whose rule has been removed can only be acknowledged.
     rows
         Channel id of each row of a block; by default, the unit's channels in order.
+    references
+        Reference 1× vectors of bearings, one entry per bearing and operating state.
     """
 
     def __init__(
@@ -94,17 +96,20 @@ class UnitAlarms(AlarmBoard):
         return self._link[0]
 
     def reference(self, bearing: str, state: OperatingState) -> VectorReference | None:
-        """Return the reference 1× vectors of a bearing in an operating state, or None."""
+        """Return the reference 1× vectors of a bearing in an operating state; None if not set."""
         return self._references.get((bearing, state))
 
     def refer_to(self, reference: VectorReference) -> None:
-        """Set the reference of the 1× vectors, effective from the next assessment on."""
+        """Set the reference 1× vectors of a bearing and state, from the next assessment on."""
         self._references[reference.bearing, reference.state] = reference
 
     def take(
         self, block: SampleBlock, assessments: Iterable[Assessment], host_ns: int
     ) -> list[AlarmNews]:
-        """Judge new assessments, the channels of a block and the device clock; return changes."""
+        """Update all alarms from a block and new assessments; return the changed alarms.
+
+        A block without new samples has no effect.
+        """
         if self._is_repeated(block):
             return []
         for points in self._points.values():
@@ -130,7 +135,7 @@ class UnitAlarms(AlarmBoard):
         return self.drain_news()
 
     def films(self, conditions: Mapping[str, Judgement], now_ns: int) -> list[AlarmNews]:
-        """Update the film-stiffness alarms from judgements by alarm id, at a sample time.
+        """Update film alarms by judgements of sample time `now_ns`; return the changed alarms.
 
         Raises
         ------
@@ -144,7 +149,7 @@ class UnitAlarms(AlarmBoard):
         return self.drain_news()
 
     def link(self, is_connected: bool, reason: str | None, host_ns: int) -> list[AlarmNews]:
-        """Update the link alarm; return the changed alarm with its events."""
+        """Update the link alarm with the state of the link; return the changed alarm."""
         self._link = (is_connected, reason)
         self._take_link(host_ns)
         return self.drain_news()
@@ -177,7 +182,7 @@ class UnitAlarms(AlarmBoard):
 
     @property
     def memory(self) -> AlarmMemory:
-        """State for continuing in another process, in addition to the stored alarm events."""
+        """State from which another process continues, in addition to the stored alarm events."""
         return AlarmMemory(
             tuple(self.alarms),
             dict(self._segment_faults),
@@ -223,9 +228,10 @@ class UnitAlarms(AlarmBoard):
                 self.record(watch.id, _at(point, condition), then_ns)
 
     def _recent_point(self, subject: str, now_ns: int) -> OperatingPoint:
-        """Return the newest operating point of a bearing up to a time; others have only a state.
+        """Return the newest operating point of a bearing up to a time, if it is recent enough.
 
-        The newest result of a block may be later than the time of a fault within it.
+        For other subjects, return only the operating state of the unit. If all known points are
+        later than the time, the first is used.
         """
         own = self._points.get(subject)
         points = own or sorted(chain(*self._points.values()), key=itemgetter(1))
@@ -278,9 +284,9 @@ class UnitAlarms(AlarmBoard):
 
 
 def _judged(watch: Watch, assessment: Assessment) -> list[tuple[int, Reading]]:
-    """Return the readings that an alarm is judged by, with their times.
+    """Return the readings that an alarm is judged by, with their times in ns.
 
-    Fast rules use the readings of recent segments, other rules the averaged reading.
+    The rules `FAST` use the readings of recent segments, other rules the averaged reading.
     """
     source = watch.source
     recent = assessment.recent if watch.group in FAST else ()

@@ -1,4 +1,4 @@
-"""Checks of a learned baseline: agreement of two baselines, drift during learning, outliers."""
+"""Checks of learned baselines: difference of two baselines, drift during learning, outliers."""
 
 import math
 from dataclasses import dataclass
@@ -39,12 +39,13 @@ def mean_difference(first: BearingBaseline, second: BearingBaseline) -> dict[str
 
 
 SPELL_DAYS = 8
-"""Block length in days for standard errors; longer than the correlation of healthy readings."""
+"""Length in days of the time blocks for standard errors; longer than the correlation time of
+healthy readings."""
 
 MIN_SPELLS = 3
 
 OUTLIER_STDS = 4.0
-"""Number of standard deviations at which residuals are clipped."""
+"""Number of standard deviations at which the residuals of the drift fit are clipped."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,10 @@ class Drift:
 def learning_drift(
     history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], baseline: QuantityBaseline
 ) -> Drift | None:
-    """Return the drift of the learning readings; None if too few conditions recur."""
+    """Return the drift of ln stiffness about the baseline during the learning period.
+
+    `is_settled` (n,) selects the readings. None if too few recur under equal conditions.
+    """
     conditions, value = history.conditions, history.ln_k[DIRECTIONS.index(baseline.direction)]
     usable = is_settled & baseline.is_known(conditions) & np.isfinite(value)
     if not usable.any():
@@ -73,7 +77,10 @@ def learning_drift(
 def drift_within(
     day: npt.NDArray[np.int64], value: FloatArray, cell: npt.NDArray[np.int64]
 ) -> Drift | None:
-    """Return the drift of values over days, compared within cells; all arrays are (n,)."""
+    """Return the drift of values over days from comparisons within each cell; arrays are (n,).
+
+    None if fewer than `MIN_SPELLS` time blocks contain values that can be compared.
+    """
     since = (day - day.min()) / max(int(np.ptp(day)), 1)
     time, value = _within(since, cell), _within(value, cell)
     spell = (day - day.min()) // SPELL_DAYS
@@ -89,7 +96,7 @@ def drift_within(
 
 
 def _within(x: FloatArray, cell: npt.NDArray[np.int64]) -> FloatArray:
-    """Return the differences from the mean of each cell."""
+    """Return the differences (n,) of the values from the mean of their cell."""
     _, number = np.unique(cell, return_inverse=True)
     mean = np.bincount(number, weights=x) / np.bincount(number)
     return np.asarray(x - mean[number])
@@ -108,9 +115,10 @@ stiffness of warm films at the same eccentricity and oil temperature differs by 
 def far_readings(
     history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], baseline: BearingBaseline
 ) -> str | None:
-    """Return a warning if settled readings are at least twice or at most half the baseline.
+    """Return a warning text if settled readings are at least twice or at most half the baseline.
 
-    The robust fit rejects such readings, so the baseline itself does not show them.
+    None if there are no such readings. The robust fit rejects them, so the baseline itself does not
+    show them.
     """
     counts = []
     for learned in baseline.quantities:

@@ -19,6 +19,8 @@ class TimeScatter:
 
     Parameters
     ----------
+    time_scale_h
+        Averaging time in running hours.
     share
         Standard deviation of the mean divided by that of single readings; 1 if fully correlated.
     """
@@ -56,20 +58,22 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class Deviations:
-    """Deviations of readings from their baseline; `place` is -1 for readings without comparison.
+    """Deviations of n readings of ln stiffness from their baseline.
 
     Parameters
     ----------
     is_known : (n,)
         Whether all conditions that the baseline depends on are known.
     place : (n,)
-        Row of the cell in the table, or -1.
+        Row of the reading's cell in the table; -1 if the reading cannot be compared.
     deviation : (n,)
         ln of the measured stiffness over the learned stiffness.
     weight : (n,)
         Weight of the reading: 1 for typical noise, less for a noisier reading.
-    scatter, lasting : (n,)
-        Scatter of readings in the cell: the part that averaging reduces, and the remaining part.
+    scatter : (n,)
+        Part of the scatter of readings in the cell that averaging reduces.
+    lasting : (n,)
+        Part of the scatter of readings in the cell that averaging does not reduce.
     surface_std : (n,)
         Standard uncertainty of the surface at the reading.
     """
@@ -84,7 +88,7 @@ class Deviations:
 
     @property
     def offset_std(self) -> FloatArray:
-        """Standard uncertainty that averaging does not reduce (n,)."""
+        """Part of the deviations' standard uncertainty that averaging does not reduce (n,)."""
         return np.asarray(np.sqrt(self.surface_std**2 + self.lasting**2))
 
 
@@ -100,13 +104,14 @@ class QuantityBaseline:
         Covariance of the attitude terms of the surface; empty without attitude terms.
     max_surface_std
         Standard uncertainty of the surface above which readings are not compared.
-    scatter, u_random
-        Typical scatter of single readings about the surface over all cells, and the typical
-        random uncertainty included in it.
+    scatter
+        Typical scatter of single readings about the surface over all cells.
+    u_random
+        Typical random uncertainty of a reading, which `scatter` includes.
     reading_h
-        Running hours per reading.
+        Interval between readings in running hours.
     time_scatter
-        Scatter over each time scale, the shortest first.
+        Relative scatter of means over each time scale, the shortest time scale first.
     rejected_share
         Fraction of the learning groups that the robust fit rejected.
     """
@@ -174,7 +179,7 @@ class QuantityBaseline:
         return conditions.is_known(self.grid.has_attitude or self.surface.shape.has_attitude)
 
     def eccentricity_rise(self, conditions: FilmConditions) -> FloatArray:
-        """Return d ln(stiffness) / d ln(eccentricity ratio) (n,); NaN for unknown conditions."""
+        """Return d ln(stiffness) / d ln(eccentricity ratio) at n conditions; NaN if unknown."""
         known = self.is_known(conditions)
         rise = np.full(known.size, np.nan)
         here = conditions.rows(known)
@@ -182,7 +187,7 @@ class QuantityBaseline:
         return rise
 
     def _surface_std(self, conditions: FilmConditions, cell: npt.NDArray[np.int64]) -> FloatArray:
-        """Return the uncertainty of the surface (n,), including the attitude difference."""
+        """Return the uncertainty of the surface (n,), with that of the attitude terms."""
         std = self._between_nodes(conditions, cell)
         if not self.surface.shape.has_attitude:
             return std
@@ -204,7 +209,7 @@ class QuantityBaseline:
 
 
 def _steps(x: FloatArray, width: float) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Return the lower node of each x in its cell, and the fraction of the step above the node."""
+    """Return the index of the next lower node of each x, and the fraction of the step above it."""
     steps = x / width % 1.0 * (NODES - 1)
     node = np.minimum(np.floor(steps), NODES - 2)
     return node.astype(np.int64), steps - node
@@ -224,5 +229,5 @@ class BearingBaseline:
     quantities: tuple[QuantityBaseline, ...]
 
     def of(self, direction: str) -> QuantityBaseline | None:
-        """Return the baseline in a direction, or None if none was learned."""
+        """Return the baseline of direction "x" or "y"; None if it was not learned."""
         return next((each for each in self.quantities if each.direction == direction), None)

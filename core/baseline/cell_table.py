@@ -12,11 +12,14 @@ from core.arrays import FloatArray
 from core.condition.cells import Cell, CellArray, FilmConditions
 
 NODES = 3
-"""Number of nodes along each axis of a cell, edges included."""
+"""Number of grid points along each axis of a cell, including both edges."""
 
 
 class Support(StrEnum):
-    """Support of a cell by learning readings; without support, readings are not judged."""
+    """Support of a cell: enough own readings, readings of nearby cells (borrowed), or none.
+
+    New readings in a cell without support are not judged.
+    """
 
     NONE = "none"
     BORROWED = "borrowed"
@@ -35,15 +38,15 @@ class CellStatistics:
         Robust standard deviation of readings about the surface. With few days it is shrunk towards
         a model over all cells.
     lasting
-        Part of the scatter that averaging does not reduce. It is caused by errors of the shaft
-        position, which last for weeks, where the surface is steep.
+        Part of the scatter that averaging does not reduce. Errors of the shaft position cause it:
+        they last for weeks, and change the expected stiffness where the surface is steep.
     surface_std
         Standard uncertainty of the surface at the median condition of the cell's readings.
     node_std
-        Standard uncertainty of the surface at `NODES` by `NODES` nodes, temperatures of the lowest
-        eccentricity first. It is larger at the edges of a cell that have no readings nearby.
+        Standard uncertainty of the surface at `NODES` by `NODES` nodes: all temperatures at the
+        lowest eccentricity first. It is larger at edges that have no readings nearby.
     eccentricity_ratio, oil_temperature_c, attitude_deg
-        Median condition; an unknown attitude is 0.
+        Medians over the cell's readings; an unknown attitude counts as 0.
     """
 
     cell: Cell
@@ -74,7 +77,7 @@ class CellStatistics:
 
 @dataclass(frozen=True)
 class CellTable:
-    """Table of the cells of a baseline."""
+    """Table of the condition cells of a baseline, one row per cell."""
 
     cells: tuple[CellStatistics, ...]
 
@@ -86,7 +89,7 @@ class CellTable:
             raise ValueError("cells: not all have as many axes")
 
     def find(self, cells: CellArray) -> npt.NDArray[np.int64]:
-        """Return the row of each cell in the table (n,); -1 for a missing or unsupported cell."""
+        """Return the table row of each of n cells; -1 for a missing or unsupported cell."""
         if not self.cells:
             return np.full(cells.shape[1], -1)
         low, places = self._places
@@ -113,7 +116,7 @@ class CellTable:
 
     @cached_property
     def node_std(self) -> FloatArray:
-        """Uncertainty at the eccentricity and temperature nodes (NODES, NODES, n_cells)."""
+        """Surface uncertainty (NODES, NODES, n_cells) by eccentricity and temperature node, cell."""
         rows = np.array([cell.node_std for cell in self.cells], np.float64)
         return rows.reshape(-1, NODES, NODES).transpose(1, 2, 0)
 
@@ -140,6 +143,8 @@ def cells_between(own: frozenset[Cell], reach: int) -> frozenset[Cell]:
 
     Parameters
     ----------
+    own
+        Cells of own support.
     reach
         Largest number of cells between two cells of own support.
     """
@@ -154,7 +159,7 @@ def cells_between(own: frozenset[Cell], reach: int) -> frozenset[Cell]:
 
 
 def neighbourhood(cell: Cell) -> tuple[Cell, ...]:
-    """Return a cell and its neighbours, including diagonal neighbours."""
+    """Return a cell and all cells that touch it, including diagonal neighbours."""
     steps = itertools.product((-1, 0, 1), repeat=len(cell))
     return tuple(tuple(i + step for i, step in zip(cell, by, strict=True)) for by in steps)
 

@@ -1,4 +1,4 @@
-"""Grouping of readings by day and condition; robust scales, medians and moving averages."""
+"""Grouping of readings by day and condition; robust standard deviations, medians, averages."""
 
 import math
 from dataclasses import dataclass, replace
@@ -13,7 +13,10 @@ from core.units import DAY_NS
 
 @dataclass(frozen=True, eq=False)
 class Groups:
-    """Groups of readings (n,) for the surface fit: medians, number of readings and day."""
+    """Groups of readings for the surface fit: median condition, median value, number and day.
+
+    Each column is (n_groups,); days are counted from 1970.
+    """
 
     conditions: FilmConditions
     value: FloatArray
@@ -21,7 +24,7 @@ class Groups:
     day: npt.NDArray[np.int64]
 
     def rows(self, wanted: npt.NDArray[np.bool_]) -> "Groups":
-        """Return the groups selected by a mask (n,)."""
+        """Return the groups selected by a mask (n_groups,)."""
         return Groups(
             self.conditions.rows(wanted),
             self.value[wanted],
@@ -33,10 +36,10 @@ class Groups:
 def group_readings(
     time_ns: TimeArray, conditions: FilmConditions, value: FloatArray, grid: CellGrid
 ) -> Groups:
-    """Group readings by day and quarter of a condition cell.
+    """Return the readings grouped by day and by quarter of a condition cell.
 
-    Readings of a day are correlated: they have the same water level, weather and warm-up. Quarters
-    are used because ln k changes by 0.1 and more across a cell.
+    Readings of a day are correlated: they have the same water level, weather and warm-up. Cells are
+    quartered because ln k (`value`) changes by 0.1 and more across a cell.
     """
     halves = replace(
         grid,
@@ -57,7 +60,7 @@ def group_readings(
 
 
 def group_medians(x: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
-    """Return the median of x in each group; groups are numbered from zero without gaps."""
+    """Return the median of x (n,) in each group; `group` (n,) numbers the groups from 0 on."""
     x = x[np.lexsort((x, group))]
     count = np.bincount(group)
     start = np.cumsum(count) - count
@@ -72,25 +75,25 @@ STD_PER_MAD = 1.4826
 """Ratio of standard deviation to median absolute deviation of a normal distribution."""
 
 BISQUARE_LIMIT = 4.685
-"""Number of standard deviations beyond which Tukey's bisquare is zero; 95 % normal efficiency
-(Maronna, Martin and Yohai, Robust Statistics, 2.2)."""
+"""Number of standard deviations beyond which Tukey's bisquare weight is zero, for 95 % efficiency
+with normal errors (Maronna, Martin and Yohai, Robust Statistics, 2.2)."""
 
 
 def robust_std(deviation: FloatArray) -> float:
-    """Return the standard deviation about zero, estimated from the median absolute deviation."""
+    """Return the standard deviation about zero, from the median absolute value; 0 if empty."""
     if deviation.size == 0:
         return 0.0
     return STD_PER_MAD * float(np.median(np.abs(deviation)))
 
 
 def bisquare(standardised: FloatArray) -> FloatArray:
-    """Return the bisquare weight of each standardised deviation; 0 beyond `BISQUARE_LIMIT`."""
+    """Return Tukey's bisquare weight of each standardised deviation; 0 beyond `BISQUARE_LIMIT`."""
     rest = np.clip(1.0 - (standardised / BISQUARE_LIMIT) ** 2, 0.0, 1.0)
     return np.asarray(rest**2)
 
 
 def absolute_quantile_std(deviation: FloatArray) -> float:
-    """Return a standard deviation about zero from the 50 % and 75 % quantiles; the larger one."""
+    """Return the larger standard deviation about zero of those from the 50 % and 75 % quantiles."""
     if deviation.size == 0:
         return 0.0
     half, three_quarters = np.quantile(np.abs(deviation), (0.5, 0.75))
@@ -102,7 +105,7 @@ MEDIAN_READINGS = 5
 
 
 def running_median(deviation: FloatArray) -> FloatArray:
-    """Return the running median over `MEDIAN_READINGS` values (n,), over fewer at the start."""
+    """Return the median of each value and those before it, `MEDIAN_READINGS` at most (n,)."""
     n = deviation.size
     if n < MEDIAN_READINGS:
         return np.array([np.median(deviation[: i + 1]) for i in range(n)], np.float64)
@@ -117,12 +120,12 @@ def ewma_weight(time_scale_h: float, reading_h: float) -> float:
 
 
 def ewma(x: FloatArray, alpha: float) -> FloatArray:
-    """Return exponentially weighted sums (n,), equal to repeated calls of `ewma_step`."""
+    """Return the exponentially weighted sum, from 0 on, after each value of x (n,)."""
     from scipy.signal import lfilter  # slow import, not needed at start-up
 
     return np.asarray(lfilter([alpha], [1.0, alpha - 1.0], x))
 
 
 def ewma_step(total: float, x: float, alpha: float) -> float:
-    """Return the exponentially weighted sum after one more value."""
+    """Return the exponentially weighted sum `total` updated with one more value."""
     return total * (1.0 - alpha) + alpha * x

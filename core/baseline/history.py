@@ -1,4 +1,4 @@
-"""`StiffnessHistory`: readings of one bearing over time, for learning and back-tests."""
+"""`StiffnessHistory`: stiffness readings of one bearing over time."""
 
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
@@ -14,11 +14,11 @@ CodeArray: TypeAlias = npt.NDArray[np.int8]
 """Values of an IntEnum as int8."""
 
 DIRECTIONS = ("x", "y")
-"""Directions of the rows of columns of shape (2, n)."""
+"""Directions of the film stiffness; row 0 of a (2, n) column is x, row 1 is y."""
 
 
 class ReadingOutcome(IntEnum):
-    """Outcome of a stiffness measurement: measured, or the reason for a missing value."""
+    """Outcome of a stiffness measurement: measured, or the reason why the value is missing."""
 
     MEASURED = 0
     INSUFFICIENT_EXCITATION = 1
@@ -27,7 +27,7 @@ class ReadingOutcome(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class StiffnessHistory:
-    """Readings of one bearing in order of time, as columns; NaN for missing values.
+    """Stiffness readings of one bearing in order of time, as columns; NaN for missing values.
 
     Columns are (n,); the columns `PER_DIRECTION` are (2, n). Time may have gaps.
 
@@ -37,8 +37,10 @@ class StiffnessHistory:
         Natural logarithm of the measured stiffness in N/m.
     u_random
         Relative random standard uncertainty of the stiffness, equal to that of `ln_k`.
-    shaft_um_pk, bearing_um_pk
-        1× amplitudes: of the shaft relative to the bearing, and of the bearing.
+    shaft_um_pk
+        1× amplitude of the shaft relative to the bearing.
+    bearing_um_pk
+        Absolute 1× amplitude of the bearing.
     outcome
         Values of `ReadingOutcome`; by default, a missing `ln_k` is `BAD_QUALITY`.
 
@@ -110,7 +112,7 @@ class StiffnessHistory:
 
 
 PER_DIRECTION = frozenset({"ln_k", "u_random", "shaft_um_pk", "bearing_um_pk", "outcome"})
-"""Columns of shape (2, n)."""
+"""Names of the columns of shape (2, n), with rows for x and y."""
 
 
 def _refuse(column: str, why: str, is_wrong: npt.NDArray[np.bool_]) -> None:

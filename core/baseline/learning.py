@@ -28,9 +28,9 @@ def held_out_deviations(
     table: CellTable,
     settings: BaselineSettings,
 ) -> FloatArray:
-    """Return cross-validated deviations (n,) from surfaces fitted without the reading's fold.
+    """Return cross-validated deviations (n,) of `value` (ln k) from surfaces without its fold.
 
-    A fold consists of spells of consecutive days. NaN for cells with too few days in other folds.
+    A fold consists of blocks of consecutive days. NaN for cells with too few days in other folds.
     """
     n_days = np.unique(groups.day).size
     spell_days = int(np.clip(n_days // (2 * FOLDS), 1, LONGEST_SPELL_DAYS))
@@ -66,7 +66,7 @@ def _is_known_without(
 
 
 REJECTED = 0.1
-"""Robust weight below which the fit has rejected a group."""
+"""Robust weight below which a group counts as rejected by the fit."""
 
 
 def learn(
@@ -76,6 +76,8 @@ def learn(
     settings: BaselineSettings,
 ) -> BearingBaseline:
     """Learn the baseline of a bearing from readings that are mostly from a healthy machine.
+
+    Only the readings selected by `is_settled` (n,) are used.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Scatter of deviations of a healthy bearing: daily means in each cell, means over time scales."""
+"""Scatter of the deviations of a healthy bearing, in each cell and over each time scale."""
 
 from dataclasses import replace
 
@@ -20,7 +20,8 @@ from core.baseline.settings import BaselineSettings
 from core.baseline.surface_fit import MIN_SCATTER, slope_scatter
 
 PRIOR_DAYS = 20.0
-"""Weight of the slope model, in days of readings; large, because deviations last for days."""
+"""Number of days of readings that the `SlopeScatter` model is worth as a prior; large, because
+deviations last for days."""
 
 MAX_LASTING = 0.95
 """Largest fraction of the scatter that is attributed to lasting deviations."""
@@ -33,14 +34,18 @@ def with_scatter(
     day: npt.NDArray[np.int64],
     deviation: FloatArray,
 ) -> CellTable:
-    """Return the table with the scatter and the lasting part of every cell.
+    """Return the table with the estimated `scatter` and `lasting` of every cell.
 
     Parameters
     ----------
     slope : (n_cells,)
         Slope of the surface with eccentricity, at the median condition of each cell.
-    place, day, deviation : (n,)
-        Table row of the cell, day and deviation of each reading.
+    place : (n,)
+        Table row of each reading's cell.
+    day : (n,)
+        Day of each reading, counted from 1970.
+    deviation : (n,)
+        Cross-validated deviation of each reading from the surface, in ln.
     """
     if place.size == 0:
         return table
@@ -94,7 +99,7 @@ def time_scatter(
 ) -> tuple[TimeScatter, ...]:
     """Return the scatter over each time scale for which the learning period is long enough.
 
-    The deviations (n,) are cross-validated, oldest first; `place` is the table row of each.
+    The deviations (n,) are cross-validated, oldest first; `place` (n,) holds their table rows.
     """
     smooth, weight = running_median(deviation), _weight(table.scatter[place])
     columns = (np.ones(weight.size), smooth, table.passing[place], table.lasting[place])
@@ -125,7 +130,7 @@ def _weight(scatter: FloatArray) -> FloatArray:
 
 
 def _share(mean: FloatArray, stray: FloatArray, stays: FloatArray) -> float:
-    """Return the factor of `stray` that explains, with `stays`, the scatter of the means."""
+    """Return the factor of `stray` (passing scatter) that fits the scatter of the means."""
     least, most = MIN_SHARE, MAX_SHARE
     for _ in range(HALVINGS):
         middle = (least * most) ** 0.5

@@ -20,7 +20,7 @@ class BaselineSettings:
         Whether the surface depends on the attitude angle, because pads are set unevenly and x and
         y differ. `grid` defines whether the cells depend on the attitude angle.
     min_readings, min_days
-        Number of readings, and of days with readings, required for own support of a cell.
+        Number of readings, and of days with readings, that a cell needs for own support.
     borrowing_readings
         Number of readings with which a cell borrows support, if the cell and its neighbours have
         at least `min_days` in total.

@@ -1,4 +1,4 @@
-"""Smooth surface over eccentricity ratio and oil temperature, of cubic B-splines."""
+"""Smooth surface of ln stiffness over eccentricity ratio and oil temperature: cubic B-splines."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,7 +15,7 @@ ATTITUDE_TERMS = 4
 
 @dataclass(frozen=True)
 class KnotAxis:
-    """Uniform knots of an axis: `n_intervals` intervals of equal width from `start`."""
+    """Uniform spline knots on an axis: `n_intervals` intervals of equal width from `start`."""
 
     start: float
     width: float
@@ -31,13 +31,13 @@ class KnotAxis:
         return self.n_intervals + 3
 
     def splines(self, x: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
-        """Return the first non-zero spline at each x, and the values of the four non-zero splines.
+        """Return the non-zero splines at each x (n,).
 
         Beyond the ends, the outermost cubic polynomials are extrapolated.
 
         Returns
         -------
-        (n,), (4, n)
+        Index of the first of the four non-zero splines (n,), and their values (4, n).
         """
         along = (x - self.start) / self.width
         first = np.clip(np.floor(along), 0, self.n_intervals - 1).astype(np.int64)
@@ -56,7 +56,7 @@ class KnotAxis:
 
 @dataclass(frozen=True)
 class SurfaceShape:
-    """Knots of a surface on both axes, and whether the surface depends on the attitude angle."""
+    """Shape of a surface: knots on both axes, and whether it depends on the attitude angle."""
 
     eccentricity: KnotAxis
     temperature: KnotAxis
@@ -64,12 +64,12 @@ class SurfaceShape:
 
     @property
     def n_coefficients(self) -> int:
-        """Number of coefficients: tensor products of splines, and attitude terms."""
+        """Number of coefficients: one per tensor product of splines and per attitude term."""
         tensor = self.eccentricity.n_splines * self.temperature.n_splines
         return tensor + (ATTITUDE_TERMS if self.has_attitude else 0)
 
     def terms(self, conditions: FilmConditions) -> tuple[npt.NDArray[np.int64], FloatArray]:
-        """Return the indices (16, n) and values (16, n) of the non-zero tensor products."""
+        """Return the indices (16, n) and values (16, n) of the non-zero products of splines."""
         first_e, value_e = self.eccentricity.splines(conditions.eccentricity_ratio)
         first_t, value_t = self.temperature.splines(conditions.oil_temperature_c)
         step = np.arange(4)[:, np.newaxis]
@@ -80,7 +80,7 @@ class SurfaceShape:
         return index.reshape(shape), value.reshape(shape)
 
     def design(self, conditions: FilmConditions) -> FloatArray:
-        """Return the design matrix (n, n_coefficients)."""
+        """Return the design matrix (n, n_coefficients) of a fit to readings at n conditions."""
         index, value = self.terms(conditions)
         matrix = np.zeros((len(conditions), self.n_coefficients))
         np.put_along_axis(matrix, index.T, value.T, axis=1)
@@ -90,7 +90,7 @@ class SurfaceShape:
 
 
 def attitude_terms(conditions: FilmConditions) -> FloatArray:
-    """Return the attitude terms (4, n): cosine and sine of the angle and of twice the angle."""
+    """Return e cos α, e sin α, e² cos 2α and e² sin 2α (4, n), with attitude α, eccentricity e."""
     angle = np.radians(conditions.attitude_deg)
     once, twice = conditions.eccentricity_ratio, conditions.eccentricity_ratio**2
     return np.stack(
@@ -122,7 +122,7 @@ class Surface:
         return np.array(self.coefficients)
 
     def slope(self, conditions: FilmConditions) -> FloatArray:
-        """Return the slope with eccentricity ratio (n,), a difference over ± 1/4 knot width."""
+        """Return d ln(stiffness) / d(eccentricity ratio) (n,), over ± 1/4 of the knot width."""
         step = self.shape.eccentricity.width / 4.0
         up, down = (
             self.at(replace(conditions, eccentricity_ratio=conditions.eccentricity_ratio + by))
@@ -131,7 +131,7 @@ class Surface:
         return np.asarray((up - down) / (2.0 * step))
 
     def at(self, conditions: FilmConditions) -> FloatArray:
-        """Return the value of the surface at each point (n,)."""
+        """Return the value of the surface, ln of the stiffness, at n conditions (n,)."""
         index, value = self.shape.terms(conditions)
         height = np.zeros(len(conditions))
         for row in range(index.shape[0]):  # summation order does not depend on n

@@ -1,4 +1,4 @@
-"""Robust fit of the surface, with scatter from shaft position errors where it is steep."""
+"""Robust fit of a baseline surface. Where it is steep, shaft position errors add scatter."""
 
 from dataclasses import dataclass
 
@@ -11,10 +11,10 @@ from core.baseline.grouping import Groups, bisquare, robust_std
 from core.baseline.surface import ATTITUDE_TERMS, KnotAxis, Surface, SurfaceShape
 
 MAX_STDS = 3.0
-"""Number of standard deviations at which deviations are clipped."""
+"""Number of standard deviations at which deviations are clipped in the fit of the scatter."""
 
 FLAT_SHARE = 0.25
-"""Fraction of the deviations, those with the smallest slopes, that count as flat."""
+"""Fraction of the deviations, those at the smallest slopes, to which the slope adds no scatter."""
 
 ROUNDS = 8
 MIN_SCATTER = 1e-6
@@ -33,16 +33,16 @@ class SlopeScatter:
     flat_square: float
 
     def lasting(self, slope: FloatArray) -> FloatArray:
-        """Return the variance due to shaft position errors at each slope."""
+        """Return the part of the variance due to shaft position errors at each slope (n,)."""
         return self.per_slope * np.maximum(slope**2 - self.flat_square, 0.0)
 
     def variance(self, slope: FloatArray) -> FloatArray:
-        """Return the variance at each slope."""
+        """Return the variance of a deviation at each slope (n,)."""
         return np.asarray(self.flat + self.lasting(slope))
 
 
 def slope_scatter(slope: FloatArray, deviation: FloatArray) -> SlopeScatter:
-    """Fit the variance model to squared deviations (n,), weighted by their expected values."""
+    """Return the variance model fitted to the squares of deviations (n,) at slopes (n,)."""
     from scipy.optimize import nnls  # slow import, not needed at start-up
 
     flat_square = float(np.quantile(slope**2, FLAT_SHARE))
@@ -69,10 +69,10 @@ MIN_STD = 1e-4
 """Smallest scatter of groups, in ln."""
 
 FEW_READINGS = 2.0
-"""Number of readings with which a group has half weight."""
+"""Number of readings at which a group has half the weight of a very large group."""
 
 SPANS_DAYS = (1, 10)
-"""Lengths of spells over which residuals are tested for correlation, days."""
+"""Lengths in days of the time blocks over which residuals are tested for correlation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class Fit:
     group_std : (n_groups,)
         Standard deviation of each group about the surface.
     clustering
-        Number of correlated groups equivalent to one independent group.
+        Number of correlated groups that are worth one independent group; at least 1.
     """
 
     surface: Surface
@@ -112,7 +112,7 @@ class Fit:
 
 
 def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
-    """Fit a surface robustly; estimate scatter and correlation of the groups."""
+    """Return a surface fitted robustly to groups; `bend_std` is that of `BaselineSettings`."""
     offset = float(np.median(groups.value))
     points = _Points.of(groups, shape, offset)
     prior = prior_precision(shape, bend_std)
@@ -131,7 +131,7 @@ def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
 
 @dataclass(frozen=True, eq=False)
 class _Points:
-    """Groups as rows of a regression, with weights from the numbers of readings."""
+    """Regression rows, one per group; `trust` is the weight from the number of readings."""
 
     design: FloatArray
     y: FloatArray
@@ -144,7 +144,7 @@ class _Points:
         return cls(shape.design(groups.conditions), groups.value - offset, trust, groups.day)
 
     def left(self, coefficients: FloatArray) -> FloatArray:
-        """Return the residuals (n,), scaled to equal scatter."""
+        """Return the residuals (n,), scaled so that all groups have equal scatter."""
         return np.asarray((self.y - self.design @ coefficients) * np.sqrt(self.trust))
 
     def solve(self, precision: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -178,7 +178,7 @@ def _std(
 
 
 def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Surface:
-    """Return the surface refitted to the used groups with the weights of the whole fit."""
+    """Return the surface refitted to the groups with `is_used` = 1, with the weights of `fit`."""
     shape, offset = fit.surface.shape, fit.surface.offset
     points = _Points.of(groups, shape, offset)
     precision = is_used * fit.robust_weight / (fit.group_std**2 * fit.clustering)
@@ -187,7 +187,7 @@ def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Sur
 
 
 def prior_precision(shape: SurfaceShape, bend_std: float) -> FloatArray:
-    """Return the inverse covariance of the prior (n_coefficients, n_coefficients)."""
+    """Return the inverse prior covariance of the coefficients (n_coefficients, n_coefficients)."""
     n_e, n_t = shape.eccentricity.n_splines, shape.temperature.n_splines
     along_e, along_t = _differences(n_e, bend_std), _differences(n_t, bend_std)
     tensor = np.kron(along_e, np.eye(n_t)) + np.kron(np.eye(n_e), along_t)
@@ -204,7 +204,7 @@ def _differences(n: int, bend_std: float) -> FloatArray:
 def _clustering(
     points: _Points, coefficients: FloatArray, robust: FloatArray, std: FloatArray
 ) -> float:
-    """Return the variance of means over spells relative to independent groups; at least 1."""
+    """Return the variance of means over time blocks, relative to independent groups; at least 1."""
     standardised = (points.y - points.design @ coefficients) / std
     weight, found = points.trust * robust, [1.0]
     for span in SPANS_DAYS:
@@ -219,7 +219,7 @@ def _clustering(
 def surface_shape(
     groups: Groups, knot_e: float, knot_t_c: float, has_attitude: bool
 ) -> SurfaceShape:
-    """Return the shape of a surface with knots that cover all groups."""
+    """Return the shape of a surface with knots that cover all groups, at the given spacings."""
     return SurfaceShape(
         _axis(groups.conditions.eccentricity_ratio, knot_e),
         _axis(groups.conditions.oil_temperature_c, knot_t_c),

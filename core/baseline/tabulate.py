@@ -22,12 +22,12 @@ from core.baseline.surface_fit import MIN_SCATTER, Fit
 from core.condition.cells import Cell, CellArray, CellGrid, FilmConditions
 
 BELIEVED = 0.1
-"""Robust weight from which a group counts towards the support of a cell."""
+"""Smallest robust weight with which a group counts towards the support of a cell."""
 
 
 @dataclass(frozen=True)
 class _Contents:
-    """Readings of a cell: numbers of readings and days, median of ln k, median condition."""
+    """Summary of a cell's readings: numbers of readings and days, medians of ln k and condition."""
 
     n_readings: int
     n_days: int
@@ -44,7 +44,10 @@ def tabulate(
     fit: Fit,
     settings: BaselineSettings,
 ) -> CellTable:
-    """Return the table of cells with readings and of cells between them; `value` is ln k."""
+    """Return the table of cells with readings and of cells between supported ones; `value` is ln k.
+
+    The scatter is preliminary.
+    """
     contents = _seen(conditions, value, groups, fit, settings.grid)
     enough = {
         cell
@@ -113,7 +116,7 @@ def _unseen(
     surface: Surface,
     grid: CellGrid,
 ) -> _Contents:
-    """Return the contents of a cell without readings: its centre, the nearest cell's attitude."""
+    """Return the contents of a cell without readings, from its centre and the nearest cell."""
     nearest = min(
         sorted(enough), key=lambda other: sum(abs(a - b) for a, b in zip(cell, other, strict=True))
     )
@@ -151,7 +154,7 @@ def _node_std(contents: dict[Cell, _Contents], fit: Fit, grid: CellGrid) -> list
 def _support_counts(
     groups: Groups, fit: Fit, grid: CellGrid, cells: CellArray
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Return the readings and days of each cell (n_cells,), without groups rejected by the fit."""
+    """Return the numbers of readings and days of each cell (n_cells,), without rejected groups."""
     believed = groups.rows(fit.robust_weight >= BELIEVED)
     place = _find_columns(grid.cells(believed.conditions), cells)
     days = np.unique(np.vstack([place, believed.day]), axis=1)[0]

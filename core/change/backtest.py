@@ -1,4 +1,4 @@
-"""Operating states and decisions recomputed over stored readings, for back-tests and restarts."""
+"""Recomputation of operating states and decisions from stored readings, also after restarts."""
 
 import math
 from collections import deque
@@ -27,7 +27,7 @@ from core.condition.operating_state import (
 
 @dataclass(frozen=True, eq=False)
 class OperationHistory:
-    """`OperatingState` of each reading (n,), and whether the state had settled."""
+    """Operating state at each reading (n,), and whether the unit was settled in this state (n,)."""
 
     state: CodeArray
     is_settled: npt.NDArray[np.bool_]
@@ -41,10 +41,10 @@ def operation_history(
     oil_temperature_c: FloatArray | None = None,
     state: CodeArray | None = None,
 ) -> OperationHistory:
-    """Return the operating states and their settling, from speed and power or from given states.
+    """Return the operating state at each reading and whether it was settled.
 
-    Times increase; columns are (n,) with NaN for missing values. Without an oil temperature, the
-    full warm-up time applies.
+    The states are computed from speed and power, unless `state` is given. Times increase; columns
+    are (n,) with NaN for missing values. Without an oil temperature, the full warm-up time applies.
     """
     columns = (speed_rpm, power_mw, oil_temperature_c, state)
     rows = [
@@ -56,7 +56,7 @@ def operation_history(
 
 
 def last_operation(history: StiffnessHistory, rules: FilmRules) -> tuple[Operation, OilSettling]:
-    """Return the operation of a unit and the oil settling of a bearing after stored readings."""
+    """Return the operation of a unit and the oil settling of a bearing after the last reading."""
     time_ns = history.time_ns.tolist()
     if time_ns:
         # intervals between stored readings stay unscaled; a time lapse applies only from now on
@@ -88,10 +88,10 @@ def _operations(
 
 @dataclass(frozen=True, eq=False)
 class DecisionHistory:
-    """Decision after each reading, as columns (n,).
+    """Decision on a film in one direction after each reading, as columns (n,).
 
     `verdict` contains values of `Verdict`, and `level` values of `AlarmLevel` or 0. The other
-    columns describe the most significant mean deviation; NaN before the first.
+    columns describe the most significant mean deviation of ln k; NaN as long as there is none.
     """
 
     verdict: CodeArray
@@ -101,7 +101,7 @@ class DecisionHistory:
     time_scale_h: FloatArray
 
     def raised(self) -> npt.NDArray[np.int64]:
-        """Return the rows in which the level rises."""
+        """Return the row numbers at which the level is higher than in the row before."""
         return np.flatnonzero(np.diff(self.level, prepend=np.int8(0)) > 0)
 
 
@@ -112,7 +112,10 @@ def decide_all(
     baseline: QuantityBaseline | None,
     limits: ChangeLimits,
 ) -> DecisionHistory:
-    """Return the decisions over stored readings, oldest first, from the initial decision."""
+    """Return the decision after each stored reading, from the initial decision on.
+
+    Readings that `is_settled` (n,) excludes are not judged.
+    """
     nothing = (np.nan, np.nan, np.nan)
     rows = [
         (
@@ -131,7 +134,7 @@ def last_decision(
     baseline: QuantityBaseline,
     rules: FilmRules,
 ) -> Decision:
-    """Return the decision after stored readings, as if the baseline had been in force."""
+    """Return the decision after the last stored reading, computed as if `baseline` was active."""
     watched = (history, is_settled, baseline.direction, baseline)
     found = deque(_decisions(*watched, rules.change, rules.lapsed_ns), maxlen=1)
     return found[0] if found else INITIAL_DECISION

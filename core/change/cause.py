@@ -25,7 +25,7 @@ from core.change.shaft_response import MEAN_READINGS, FilmDirection, ShaftRespon
 
 
 class Cause(StrEnum):
-    """Cause of a change of stiffness."""
+    """Cause of a change of the measured stiffness."""
 
     FILM = "film"
     OIL = "oil"
@@ -35,7 +35,7 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True)
 class Attribution:
-    """Cause of a change of stiffness, with its evidence.
+    """Cause of a change of the measured stiffness, with its evidence.
 
     Parameters
     ----------
@@ -43,9 +43,11 @@ class Attribution:
         Fraction of the change due to the film, if the rest is due to a transducer of the bearing; 0
         to 1 within its uncertainty. None if unknown, or if no such mixture agrees with the motion.
     film_share_std
-        Standard uncertainty of `film_share`.
-    shaft_change, bearing_change
-        ln of the motion of shaft and of bearing over the expected motion.
+        Standard uncertainty of `film_share`; None if `film_share` is None.
+    shaft_change
+        ln of the shaft's 1× amplitude over the expected amplitude; None if unknown.
+    bearing_change
+        ln of the bearing's 1× amplitude over the expected amplitude; None if unknown.
     """
 
     cause: Cause
@@ -57,11 +59,11 @@ class Attribution:
 
 
 MIN_RELATIVE_CHANGE = 0.4
-"""Smallest change of another film, relative to the alarmed film, that counts as changed too."""
+"""Change of another film, relative to that of the alarmed film, from which it counts as changed."""
 
 MAX_MISFIT = 30.0
-"""Largest misfit of a cause that agrees with the shaft motion: sum over all films of the squared
-residuals in standard uncertainties. In simulations, 95 % of the healthy means lie below."""
+"""Largest misfit with which a cause agrees with the shaft motion: the sum, over all films, of the
+squared residuals in standard uncertainties. In simulations, 95 % of healthy means have less."""
 
 SCALES = np.linspace(0.8, 1.6, 9)
 """Scale factors of the predicted motion that are accepted. The response was learned from films that
@@ -92,10 +94,12 @@ class UnitReadings:
 
     Parameters
     ----------
-    ln_k, ln_shaft
-        ln of the stiffness, and of the shaft motion at 1×.
+    ln_k
+        ln of the measured stiffness in N/m.
+    ln_shaft
+        ln of the 1× shaft amplitude in µm zero-to-peak.
     deviation
-        Deviation of ln k from its baseline.
+        Deviation of `ln_k` from its baseline.
     rise
         Derivative of the baseline's ln k with respect to ln of the eccentricity ratio.
     """
@@ -117,14 +121,16 @@ def attribute(
     readings: UnitReadings,
     bracket_n_per_m: FloatArray | None = None,
 ) -> Attribution:
-    """Find the cause of a change of stiffness of a film.
+    """Return the cause of a change of a film's measured stiffness; unknown without a `response`.
 
     Parameters
     ----------
+    film
+        Bearing id and direction of the changed film.
     readings
         About `MEAN_READINGS` newest readings for which the film has a deviation.
     bracket_n_per_m : (n_films,), optional
-        Bracket stiffness that the measured stiffness was computed with. Without it, a loose
+        Bracket stiffness from which the measured stiffness was computed. Without it, a loose
         bracket cannot be excluded, so a stiffer film is never reported as cause.
     """
     if response is None or film not in response.places:
@@ -145,7 +151,10 @@ def attribute(
 
 @dataclass(frozen=True, eq=False)
 class _Residuals:
-    """Residuals (n_films,) of the motion for each possible cause, in standard uncertainties."""
+    """Residuals (n_films,) of the shaft motion for each possible cause of the change of film `row`.
+
+    They are divided by their standard uncertainties.
+    """
 
     row: int
     response: ShaftResponse
@@ -153,7 +162,7 @@ class _Residuals:
 
     @cached_property
     def std(self) -> FloatArray:
-        """Standard uncertainty of the means over the given number of readings (n_films,)."""
+        """Standard uncertainty of the means over the readings (n_films,); larger for few."""
         few = max(1.0, MEAN_READINGS / self.readings.ln_k.shape[1])
         return np.asarray(np.array(self.response.std) * few**0.5)
 
@@ -169,16 +178,16 @@ class _Residuals:
 
     @cached_property
     def if_film(self) -> FloatArray:
-        """Residual if the films have the measured stiffness."""
+        """Residual of the shaft motion (n_films,) if the films have the measured stiffness."""
         return self._residual(self.readings.ln_k)
 
     @cached_property
     def if_unchanged(self) -> FloatArray:
-        """Residual if no film and no shaft probe has changed."""
+        """Residual of the shaft motion (n_films,) if no film and no shaft probe has changed."""
         return self._residual(self.readings.ln_k - self.change)
 
     def probe_misfit(self) -> float:
-        """Return the misfit for wrong shaft probes of the bearing; NaN if unknown."""
+        """Return the misfit if the bearing's shaft probes have wrong gains; NaN if unknown."""
         gain, ln_k = self._probe_gain(), self.readings.ln_k
         if not np.all(np.isfinite(gain)):
             return float("nan")
@@ -187,8 +196,9 @@ class _Residuals:
         return min(self.misfit(x, a * own) for a, x in zip(SCALES, residual, strict=True))
 
     def bracket_misfit(self, bracket_n_per_m: FloatArray | None) -> float:
-        """Return the misfit for brackets that changed by the apparent change; NaN if unknown.
+        """Return the misfit if brackets, not films, changed by the apparent change.
 
+        NaN without a bracket stiffness.
         For the rest of the machine, film and bracket in series act as one spring. The film's share
         of the motion in its own bearing decreases with the bracket stiffness.
         """
@@ -202,7 +212,10 @@ class _Residuals:
         return self.scaled_misfit(self._residual(np.log(alike), own))
 
     def film_share(self) -> tuple[float, float] | tuple[None, None]:
-        """Return the film's share in a mixture with a transducer fault, with its uncertainty."""
+        """Return the film's fraction of a change that includes a transducer fault, and its std.
+
+        None, None if no such mixture agrees with the shaft motion.
+        """
         step = self.if_unchanged - self.if_film
         size = float(np.sum(step**2))
         if size == 0.0:
@@ -219,7 +232,7 @@ class _Residuals:
         return frozenset(bearing for (bearing, _), is_wanted in places if is_wanted)
 
     def _probe_gain(self) -> FloatArray:
-        """Return ln of the probe gains of the bearing that explain the deviations (n_films, n).
+        """Return ln of the bearing's shaft-probe gains that explain the deviations (n_films, n).
 
         With ln gains g, the film reads softer by g, and the apparent eccentricity increases by
         g_x cos² + g_y sin² of the attitude angle, where the baseline is stiffer.
@@ -235,7 +248,10 @@ class _Residuals:
         return gain
 
     def _residual(self, ln_k: FloatArray, own: FloatArray | float = 0.0) -> FloatArray:
-        """Return the residual of the motion shares for a stiffness and an `own` excess per film."""
+        """Return the mean residual (n_films,) of ln shaft motion for a stiffness (n_films, n).
+
+        `own` is the expected excess motion at each film that the other films do not share.
+        """
         motion = self.readings.ln_shaft - own
         left = motion - np.mean(motion, axis=0) - self.response.expected(ln_k)
         return np.asarray(np.mean(left, axis=1) / self.std)

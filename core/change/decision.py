@@ -20,7 +20,7 @@ from core.units import NS_PER_S
 
 
 class Verdict(IntEnum):
-    """Verdict on a reading; all except the first three are reasons why it was not judged."""
+    """Verdict on a reading of a film; from `GATHERING_EVIDENCE` on, the reading was not judged."""
 
     NORMAL = 0
     ALERT = 1
@@ -39,11 +39,11 @@ WITHOUT_NUMBER = {
     ReadingOutcome.INSUFFICIENT_EXCITATION: Verdict.INSUFFICIENT_EXCITATION,
     ReadingOutcome.BAD_QUALITY: Verdict.BAD_QUALITY,
 }
-"""Verdict for each outcome without a stiffness value."""
+"""Verdict for each `ReadingOutcome` that has no stiffness value."""
 
 
 Outcome: TypeAlias = Comparison | Verdict
-"""Comparison of a reading with its baseline, or the verdict that prevents a comparison."""
+"""Comparison of a reading with its baseline, or a verdict if it cannot be compared."""
 
 
 def outcomes(
@@ -54,9 +54,10 @@ def outcomes(
     is_settled: npt.NDArray[np.bool_],
     baseline: QuantityBaseline | None,
 ) -> Iterator[Outcome]:
-    """Yield the outcome of each reading of one film in one direction, from columns (n,).
+    """Yield, for each reading of a film in one direction, its comparison with the baseline.
 
-    `value` is ln of the stiffness, NaN if missing; `codes` contains values of `ReadingOutcome`.
+    Readings that cannot be compared yield a verdict. Columns are (n,): `value` is ln of the
+    stiffness, NaN if missing; `codes` contains values of `ReadingOutcome`.
     """
     unusable = np.full(value.size, -1)
     columns: tuple[FloatArray, ...] = (np.zeros(value.size),) * 4
@@ -85,11 +86,15 @@ class Decision:
     verdict
         Verdict on the newest reading.
     finding
-        Most significant mean deviation after the newest counted reading.
-    deviation, deviation_std
-        Deviation of the newest counted reading, in ln, and its standard uncertainty.
+        Most significant mean deviation after the newest counted reading; None at first.
+    deviation
+        Deviation of the newest counted reading from its baseline, in ln.
+    deviation_std
+        Standard uncertainty of `deviation`.
     alert, danger
-        Delay timers of the levels.
+        Delay timers of the levels alert and danger.
+    last_ns, last_counted_ns
+        Times of the newest reading and of the newest counted reading.
     """
 
     verdict: Verdict = Verdict.GATHERING_EVIDENCE
@@ -104,7 +109,7 @@ class Decision:
 
     @property
     def level(self) -> AlarmLevel | None:
-        """Active level, whether or not the newest reading was judged."""
+        """Active level, also if the newest reading was not judged; None if no level is active."""
         if self.danger.is_on:
             return AlarmLevel.DANGER
         return AlarmLevel.ALERT if self.alert.is_on else None
@@ -121,7 +126,7 @@ def step(
     baseline: QuantityBaseline | None,
     limits: ChangeLimits,
 ) -> Decision:
-    """Return a decision updated with one reading.
+    """Return a decision updated with the outcome of one reading.
 
     A reading does not count if it is less than half a reading interval after the previous counted
     reading, because both share most of their samples.
@@ -162,7 +167,7 @@ def step(
 
 
 def _min_step_ns(baseline: QuantityBaseline) -> int:
-    """Return the smallest interval between counted readings."""
+    """Return the smallest interval between counted readings in ns."""
     return round(0.5 * baseline.reading_h * 3600.0 * NS_PER_S)
 
 
@@ -194,7 +199,7 @@ def _level_step(
 
 
 def _is_exceeded(finding: Finding, limit: float, margin: float, limits: ChangeLimits) -> bool:
-    """Whether a change is significant, and exceeds the limit by the margin."""
+    """Whether a change is significant, and exceeds the limit by `margin` standard uncertainties."""
     significance = finding.significance
     threshold = limits.significance_threshold(finding.time_scale_h)
     size = abs(finding.change) * (1.0 - margin / max(significance, 1e-9))

@@ -10,12 +10,14 @@ from core.baseline.grouping import MEDIAN_READINGS, ewma_step, ewma_weight
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Comparison of one reading with its baseline: a row of `Deviations`, with `u_random`.
+    """Comparison of one reading with its baseline, one row of `Deviations`.
 
     Parameters
     ----------
     offset_std
-        Standard uncertainty that averaging does not reduce.
+        Part of the standard uncertainty that averaging does not reduce.
+    u_random
+        Random standard uncertainty of the reading, in ln.
     """
 
     deviation: float
@@ -27,9 +29,9 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class ScaleSums:
-    """Exponentially weighted sums over one time scale, with the weights of the readings.
+    """Exponentially weighted sums of deviations and their uncertainties over one time scale.
 
-    `fill` is the sum of ones, the elapsed fraction of the time scale.
+    `fill` is the exponentially weighted sum of ones; it approaches 1 as the time scale elapses.
     """
 
     fill: float = 0.0
@@ -39,7 +41,7 @@ class ScaleSums:
     offset: float = 0.0
 
     def step(self, compared: Comparison, middle: float, alpha: float) -> "ScaleSums":
-        """Return the sums with one more reading; `middle` is the running median."""
+        """Return the sums with one more reading; `middle` is the running median deviation."""
         weight = compared.weight
         return ScaleSums(
             ewma_step(self.fill, 1.0, alpha),
@@ -50,7 +52,7 @@ class ScaleSums:
         )
 
     def finding(self, time: TimeScatter) -> "Finding":
-        """Return the mean deviation over the time scale with its uncertainty."""
+        """Return the mean deviation over the time scale `time`, with its standard uncertainty."""
         offset = self.offset / self.weight
         # means over a partly elapsed time scale have a larger scatter
         own = time.share * (self.scatter / self.weight) / self.fill
@@ -60,7 +62,10 @@ class ScaleSums:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Mean deviation of ln k from the baseline, and its standard uncertainty without a change."""
+    """Mean deviation of ln k from the baseline over a time scale, with its standard uncertainty.
+
+    `std` is the standard uncertainty expected for an unchanged film.
+    """
 
     time_scale_h: float
     change: float
@@ -68,13 +73,13 @@ class Finding:
 
     @property
     def significance(self) -> float:
-        """Absolute change in standard uncertainties."""
+        """Absolute change divided by its standard uncertainty."""
         return abs(self.change) / self.std
 
 
 @dataclass(frozen=True, slots=True)
 class GatheredEvidence:
-    """Number of counted deviations, and their sums over the time scales of the baseline.
+    """Evidence on a film: number of counted readings, and sums over each time scale.
 
     The running median of the deviations is averaged, so that single spikes have no effect.
     """
@@ -107,7 +112,7 @@ class GatheredEvidence:
         )
 
     def findings(self, baseline: QuantityBaseline) -> list[Finding]:
-        """Return the mean deviations over the time scales that have fully elapsed."""
+        """Return the mean deviation over each time scale that has fully elapsed."""
         return [
             sums.finding(time)
             for sums, time in zip(self.scales, baseline.time_scatter, strict=True)

@@ -1,4 +1,4 @@
-"""`FilmJudge`: comparison of the film readings of a unit with their baselines."""
+"""`FilmJudge`: comparison of a unit's film readings with baselines, and decisions on each film."""
 
 import math
 from collections import deque
@@ -21,17 +21,22 @@ from core.limits import AlarmLevel, Judgement, unknown
 
 @dataclass(frozen=True)
 class FilmFinding:
-    """Verdict on a film in one direction after a reading, with its values; None if missing.
+    """Verdict on a film in one direction after a reading, with its numbers; None if missing.
 
     Parameters
     ----------
     level
         Active level, whether or not this reading was judged.
-    change, change_std, time_scale_h
-        Most significant mean deviation from the baseline, in ln; its standard uncertainty; its
-        averaging time in running hours.
-    deviation, deviation_std
-        Deviation of this reading and its standard uncertainty; None if it was not compared.
+    change
+        Most significant mean deviation of the stiffness from the baseline, in ln.
+    change_std
+        Standard uncertainty of `change`.
+    time_scale_h
+        Averaging time of `change` in running hours.
+    deviation
+        Deviation of this reading from the baseline, in ln; None if it was not compared.
+    deviation_std
+        Standard uncertainty of `deviation`.
     attribution
         Cause of the change while a level is active.
     """
@@ -53,11 +58,11 @@ ALARM_REASONS = {
     Cause.BRACKET_OR_TRANSDUCER: "bracket_or_transducer_changed",
     Cause.UNKNOWN: "changed_cause_unknown",
 }
-"""Reason of a film alarm, by cause of the change."""
+"""Reason code of a film-stiffness alarm, by cause of the change."""
 
 
 def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Judgement:
-    """Return the judgement of a film's alarm; unknown if the film was not judged."""
+    """Return the judgement for a film-stiffness alarm; unknown if the reading was not judged."""
     if finding.verdict not in JUDGED:
         return unknown(finding.verdict.name.lower())
     limit = limits.danger_change if finding.level is AlarmLevel.DANGER else limits.alert_change
@@ -69,7 +74,7 @@ def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Judgement:
 
 @dataclass(frozen=True)
 class FilmDecision:
-    """Decision on the film of a bearing in one direction, with the version of its baseline."""
+    """Decision on a film in one direction, and version of its baseline (None without baseline)."""
 
     bearing: str
     direction: str
@@ -79,9 +84,10 @@ class FilmDecision:
 
 @dataclass(frozen=True)
 class FilmMemory:
-    """State of `FilmWatch` that stored readings do not contain; oil settling by bearing.
+    """State of `FilmWatch` for another process: what stored readings do not contain.
 
-    `slot` is the number of the newest reading interval; the next reading is due in a later one.
+    `oil` is the oil settling by bearing id. `slot` is the number of the newest reading interval
+    since 1970; the next reading is due in a later interval.
     """
 
     operation: Operation
@@ -92,7 +98,7 @@ class FilmMemory:
 
 @dataclass(frozen=True)
 class FilmNews:
-    """Newly judged reading of a film with its findings and decisions in x and y."""
+    """New reading of a film, with the resulting findings and decisions in x and y."""
 
     reading: FilmReading
     findings: tuple[FilmFinding, FilmFinding]
@@ -100,18 +106,18 @@ class FilmNews:
 
 
 MAX_RECENT = 4 * MEAN_READINGS
-"""Number of recent times whose readings are kept for attribution; some lack a deviation."""
+"""Number of newest reading times kept to find causes; readings without a deviation are not used."""
 
 
 class FilmJudge:
-    """Change detection for the films of one unit, with active baselines and decisions.
+    """Detector of stiffness changes in the films of one unit; holds baselines and decisions.
 
-    `brackets_n_per_m` is the bracket stiffness by bearing.
+    `brackets_n_per_m` is the bracket stiffness by bearing id.
 
     Attributes
     ----------
     response
-        Shaft response used for attribution; None if it has not been learned.
+        Shaft response used to find the cause of a change; None if it has not been learned.
     """
 
     def __init__(self, rules: FilmRules, brackets_n_per_m: Mapping[str, float]) -> None:
@@ -124,15 +130,15 @@ class FilmJudge:
         self._recent: deque[FloatArray] = deque(maxlen=MAX_RECENT)
 
     def baseline(self, bearing: str) -> BearingBaseline | None:
-        """Return the active baseline of a bearing, or None."""
+        """Return the active baseline of a bearing; None if it has none."""
         return self._baselines.get(bearing)
 
     def activate_baseline(
         self, bearing: str, baseline: BearingBaseline | None, decisions: Sequence[Decision] = ()
     ) -> None:
-        """Activate a baseline of a bearing, or none, from the next reading on.
+        """Set the active baseline of a bearing from the next reading on; None removes it.
 
-        `decisions` in x and y are the start values; by default, the initial decisions.
+        `decisions` are the decisions in x and y to continue from; by default, initial decisions.
         """
         if baseline is None:
             self._baselines.pop(bearing, None)
@@ -144,31 +150,36 @@ class FilmJudge:
 
     @property
     def decided(self) -> tuple[FilmDecision, ...]:
-        """All decisions with their baseline versions."""
+        """Decisions on all films and directions, with the versions of their baselines."""
         return tuple(
             FilmDecision(bearing, direction, self._version(bearing), decision)
             for (bearing, direction), decision in self._decisions.items()
         )
 
     def restore(self, decided: Sequence[FilmDecision]) -> None:
-        """Restore decisions whose baseline version is active; ignore other decisions."""
+        """Restore the decisions made with the active baseline versions; ignore the others."""
         for found in decided:
             if found.version == self._version(found.bearing):
                 self._decisions[found.bearing, found.direction] = found.decision
 
     def forget_times(self) -> None:
-        """Clear the times of all decisions, so that the next reading may have any time."""
+        """Clear the times of the last readings, so that the next reading may have any time."""
         self._decisions = {film: _timeless(each) for film, each in self._decisions.items()}
 
     def add_recent(self, columns: Iterable[FloatArray]) -> None:
-        """Add settled readings of earlier times for attribution.
+        """Add settled readings of earlier times, to find the causes of changes.
 
-        Each item is (5, n_films), with the fields of `UnitReadings` as rows.
+        Each item holds one time: (5, n_films), with the fields of `UnitReadings` as rows.
         """
         self._recent.extend(columns)
 
     def judge(self, readings: Sequence[FilmReading]) -> list[FilmNews]:
-        """Judge the readings of all bearings at one time, and update the decisions."""
+        """Compare readings of one time with the baselines, and update the decision on each film.
+
+        Returns
+        -------
+        One item per reading: its findings, and the updated decisions in x and y.
+        """
         found = {
             (reading.bearing, direction): self._decide(reading, direction)
             for reading in readings
@@ -209,7 +220,7 @@ class FilmJudge:
     def _remember(
         self, readings: Sequence[FilmReading], found: Mapping[FilmDirection, FilmFinding]
     ) -> None:
-        """Keep the readings of one time if all bearings have a settled reading."""
+        """Keep the readings of one time to find causes, if all bearings have a settled reading."""
         settled = {each.bearing: each for each in readings if each.condition.is_settled}
         if settled.keys() != self._rules.estimators.keys():
             return
@@ -230,7 +241,7 @@ class FilmJudge:
         self._recent.append(np.array(rows).T)
 
     def _attribution(self, film: FilmDirection) -> Attribution:
-        """Return the cause of a change, from the newest readings with a deviation of this film."""
+        """Return the cause of a film's change, from its newest readings that have a deviation."""
         row = self._films.index(film)
         newest = [column for column in self._recent if np.isfinite(column[2, row])]
         columns = newest[-MEAN_READINGS:] or [np.full((5, len(self._films)), np.nan)]

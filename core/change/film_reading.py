@@ -1,4 +1,4 @@
-"""`FilmReading`: one reading of one film with its operating condition."""
+"""`FilmReading`: stiffness reading of one film in x and y, with its operating condition."""
 
 import math
 from collections.abc import Mapping
@@ -14,16 +14,22 @@ from core.stiffness.estimators import ESTIMATORS
 
 @dataclass(frozen=True)
 class FilmValue:
-    """Reading of a film in one direction; NaN for missing values.
+    """Stiffness reading of a film in one direction; NaN for missing values.
 
     Parameters
     ----------
-    ln_k, u_random
-        Natural logarithm of the stiffness in N/m, and its random standard uncertainty.
-    shaft_um_pk, bearing_um_pk
-        1× amplitudes of the shaft relative to the bearing, and of the bearing.
-    outcome, reason
-        Whether stiffness and condition were measured, and the reason if not.
+    ln_k
+        Natural logarithm of the stiffness in N/m.
+    u_random
+        Random standard uncertainty of `ln_k`.
+    shaft_um_pk
+        1× amplitude of the shaft relative to the bearing.
+    bearing_um_pk
+        Absolute 1× amplitude of the bearing.
+    outcome
+        Whether stiffness and film condition were measured.
+    reason
+        Reason for the outcome; "ok" if measured.
     """
 
     ln_k: float
@@ -36,7 +42,7 @@ class FilmValue:
 
 @dataclass(frozen=True)
 class FilmReading:
-    """Reading of one film in x and y, averaged over a few minutes; NaN for missing values."""
+    """Stiffness reading of one film in x and y, averaged over minutes; NaN for missing values."""
 
     unit: str
     bearing: str
@@ -61,7 +67,7 @@ class FilmReading:
 def film_reading(
     assessment: Assessment, condition: BearingCondition, estimator: Estimator
 ) -> FilmReading:
-    """Return the film reading of an assessment; stiffness and condition need good quality."""
+    """Return the film reading of an assessment; stiffness and conditions need good quality."""
     readings = assessment.readings
     eccentricity = readings["eccentricity_ratio"]
     x, y = (_value(readings, estimator, direction) for direction in DIRECTIONS)

@@ -1,4 +1,4 @@
-"""`FilmWatch`: tracking of the operation of a unit, with film readings at regular intervals."""
+"""`FilmWatch`: operating state of a unit, and film readings taken from it at regular intervals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -20,7 +20,7 @@ from core.units import ns_from_s
 
 
 class FilmWatch:
-    """Monitor of the films of one unit, updated from its assessments."""
+    """Monitor of the operating state and the films of one unit, updated from its assessments."""
 
     def __init__(self, rules: FilmRules, judge: FilmJudge) -> None:
         self.judge = judge
@@ -31,30 +31,31 @@ class FilmWatch:
 
     @property
     def operation(self) -> Operation:
-        """Present operation of the unit."""
+        """Operating state of the unit at its newest assessment, with its memory."""
         return self._operation
 
     @property
     def memory(self) -> FilmMemory:
-        """State for continuing in another process, in addition to stored readings."""
+        """State from which another process continues, in addition to the stored readings."""
         return FilmMemory(self._operation, dict(self._oil), self._slot, self.judge.decided)
 
     def restore_operation(self, operation: Operation, oil: Mapping[str, OilSettling]) -> None:
-        """Restore the operation, and the oil settling by bearing."""
+        """Restore the operation of the unit, and the oil settling by bearing id."""
         self._operation, self._oil = operation, dict(oil)
 
     def restore(self, memory: FilmMemory) -> None:
-        """Restore the state of another process; activate the baselines first."""
+        """Restore the state of another process; the baselines must be activated before."""
         self.restore_operation(memory.operation, memory.oil)
         self._slot = memory.slot
         self.judge.restore(memory.decided)
 
     def take(self, assessments: Sequence[Assessment]) -> tuple[list[Assessment], list[FilmNews]]:
-        """Update operation and films with the assessments of all bearings.
+        """Update the operation, and if a reading is due the films, from new assessments.
 
         Returns
         -------
-        The assessments with their film conditions, and the film news if a reading was due.
+        The assessments with their operating conditions added, and the judged film readings, empty
+        if none was due.
         """
         seen: list[Assessment] = []
         news: list[FilmNews] = []

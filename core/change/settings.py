@@ -1,4 +1,4 @@
-"""Limits of a change of film stiffness, and rules for the films of a unit."""
+"""Limits for changes of film stiffness, and monitoring rules for the films of a unit."""
 
 import math
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from core.machine.unit import Estimator
 
 REFERENCE_H = 4.0
 MIN_SIGNIFICANCE = 3.0
-"""Required significance for long time scales."""
+"""Smallest required significance, which applies to long time scales."""
 
 ALERT_MARGIN, DANGER_MARGIN = 1.0, 3.0
 """Number of standard uncertainties by which a change must exceed its limit. A loss of 5 % must be
@@ -24,20 +24,25 @@ class ChangeLimits:
 
     Parameters
     ----------
-    alert_change, danger_change
-        Limit of the absolute change for an alert and for a danger; the margin is added.
+    alert_change
+        Limit of the absolute change for an alert; `ALERT_MARGIN` is added.
+    danger_change
+        Limit of the absolute change for a danger; `DANGER_MARGIN` is added.
     deadband
         Distance below the limit at which an active level ends. The required significance for
         holding a level is lower by the fraction `deadband / alert_change`.
-    significance, significance_fall
-        Required significance of a mean deviation over four hours, in standard uncertainties, and
-        its reduction for each fourfold longer time scale. Means over longer time have fewer
-        independent values, and so fewer false alarms.
+    significance
+        Required significance of a mean deviation over four hours, in standard uncertainties.
+    significance_fall
+        Reduction of the required significance for each fourfold longer time scale. Means over
+        longer time have fewer independent values, and so fewer false alarms.
     min_evidence_h
         Running hours with a baseline before a film is reported as normal. A time scale is used
         once it has elapsed.
-    on_delay_h, off_delay_h
-        Uninterrupted running hours before a level becomes active, and before it ends.
+    on_delay_h
+        Uninterrupted running hours with a change before a level becomes active.
+    off_delay_h
+        Uninterrupted running hours without the change before a level ends.
     """
 
     alert_change: float = 0.035
@@ -51,7 +56,7 @@ class ChangeLimits:
 
     @property
     def holding_share(self) -> float:
-        """Fraction of the required significance below which an active level ends."""
+        """Fraction of the required significance at or below which an active level ends."""
         return 1.0 - self.deadband / self.alert_change
 
     def significance_threshold(self, time_scale_h: float) -> float:
@@ -67,11 +72,12 @@ class FilmRules:
     Parameters
     ----------
     estimators
-        Estimator of the monitored stiffness, by bearing; other bearings are not monitored.
+        Estimator of the monitored stiffness, by bearing id; other bearings are not monitored.
     reading_ns
         Interval between readings.
     time_lapse
-        Time scale factor for operation and decision; above 1 only in demonstrations.
+        Factor by which time passes faster for operating state and decision; above 1 only in
+        demonstrations.
     """
 
     estimators: Mapping[str, Estimator]
@@ -82,5 +88,5 @@ class FilmRules:
     time_lapse: float = 1.0
 
     def lapsed_ns(self, time_ns: int) -> int:
-        """Return the scaled time used for operation and decision."""
+        """Return a time multiplied by `time_lapse`, for operating state and decision."""
         return time_ns if self.time_lapse == 1.0 else round(time_ns * self.time_lapse)

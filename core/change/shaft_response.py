@@ -3,8 +3,8 @@
 Film stiffness varies by a factor of four with the operating condition, so healthy readings contain
 the shaft motion for a wide range of stiffness. A damaged film has the same effect on the motion as
 a healthy film of equal stiffness; a faulty bracket or transducer has a different effect. Unbalance
-acts on all bearings alike, so the response is the motion at each film direction relative to the
-geometric mean of all.
+acts on all bearings alike, so the response is the motion at each film and direction, relative to
+the geometric mean over all films and directions.
 """
 
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ MEAN_READINGS = 24
 """Number of readings averaged for a comparison with the response: four hours."""
 
 MIN_MEANS = 50
-"""Number of averages required for learning."""
+"""Number of means of `MEAN_READINGS` readings required to learn the response."""
 
 PARTS = 6
 """Number of folds of the cross-validation, each a part of the learning period."""
@@ -38,14 +38,16 @@ MIN_STD = 1e-4
 
 @dataclass(frozen=True)
 class ShaftResponse:
-    """Relative shaft motion at each film, as a quadratic function of ln k of all films.
+    """Relative 1× shaft motion at each film as a quadratic function of ln k of all films.
+
+    Each direction of a bearing counts as a film.
 
     Parameters
     ----------
     places
-        Bearing and direction of each film, in the order of all other arrays.
+        Bearing id and direction of each film, in the order of all other arrays.
     centre
-        ln of the typical stiffness of each film.
+        ln of the median stiffness of each film.
     coefficients
         Coefficients of the quadratic function (n_films, n_terms).
     std
@@ -70,18 +72,18 @@ class ShaftResponse:
         return np.array(self.coefficients)
 
     def expected(self, ln_k: FloatArray) -> FloatArray:
-        """Return ln of the motion at each film over the geometric mean of all (n_films, n)."""
+        """Return ln of the expected motion at each film over the geometric mean (n_films, n)."""
         return self._coefficients @ _terms(ln_k - np.array(self.centre)[:, np.newaxis])
 
 
 def learn_response(
     histories: Mapping[str, StiffnessHistory], is_settled: npt.NDArray[np.bool_]
 ) -> ShaftResponse | None:
-    """Learn the shaft response from histories of all bearings of a unit, at common times.
+    """Learn the shaft response of a unit from stiffness histories by bearing id, at common times.
 
     Returns
     -------
-    The response, or None with too few readings of stiffness and amplitude of every film.
+    The response; None with too few settled readings that have stiffness and amplitude of all films.
     """
     places = tuple((bearing, direction) for bearing in histories for direction in DIRECTIONS)
     ln_k, ln_shaft = film_columns(histories)
@@ -101,7 +103,7 @@ def learn_response(
 
 
 def film_columns(histories: Mapping[str, StiffnessHistory]) -> tuple[FloatArray, FloatArray]:
-    """Return ln of the stiffness and of the shaft motion of all films, (n_films, n) each.
+    """Return ln of the stiffness and ln of the 1× shaft amplitude of all films, (n_films, n) each.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""Checks of transducers and of their signals."""
+"""Plausibility checks of transducers and of their signals."""

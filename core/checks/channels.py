@@ -1,4 +1,4 @@
-"""Checks of single channels over short cells of samples, before calibration.
+"""Checks of single channels over short cells of consecutive samples, before calibration.
 
 A cell is shorter than a turn of the shaft, so its mean follows the vibration. A mean outside the OK
 limits is therefore only uncertain; the checks of a whole segment decide.
@@ -23,7 +23,7 @@ VERDICTS: tuple[Quality, ...] = (
     GOOD,
     *(make(reason) for make in (uncertain, bad) for reason in Reason),
 )
-"""All qualities; the values of a `VerdictArray` are their indices. Index 0 is good."""
+"""All qualities. The values of a `VerdictArray` are indices of this tuple; index 0 is good."""
 
 VERDICT_OF = {quality: number for number, quality in enumerate(VERDICTS)}
 _LEVELS = np.array([list(Level).index(quality.level) for quality in VERDICTS], dtype=np.uint8)
@@ -35,7 +35,7 @@ NOT_FINITE = VERDICT_OF[bad(Reason.NOT_FINITE)]
 
 @dataclass(frozen=True)
 class ChannelLimits:
-    """Voltage ranges of a device's channels, each (n_channels, 1); see `ChannelCalibration`."""
+    """Voltage ranges and gains of channels, each (n_channels, 1); see `ChannelCalibration`."""
 
     full_scale_v: FloatArray
     unit_per_v: FloatArray
@@ -44,7 +44,7 @@ class ChannelLimits:
 
     @classmethod
     def of(cls, channels: Iterable[tuple[float, float, float, float]]) -> "ChannelLimits":
-        """Return limits from (full scale, unit per volt, lowest, highest OK voltage)."""
+        """Return limits from one (full scale, unit per volt, lowest, highest OK V) per channel."""
         columns = np.array(list(channels), dtype=np.float64).reshape(-1, 4)
         return cls(*(column[:, np.newaxis] for column in columns.T))
 
@@ -55,7 +55,7 @@ def channel_verdicts(
     is_ok: npt.NDArray[np.bool_],
     limits: ChannelLimits,
 ) -> VerdictArray:
-    """Judge each channel in each cell: device status, finite samples, clipping, OK limits.
+    """Return the verdict on each channel in each cell, from status, clipping and OK limits.
 
     Parameters
     ----------
@@ -65,6 +65,10 @@ def channel_verdicts(
         Index of the first sample of each cell, increasing from 0.
     is_ok : (n_channels, n_cells)
         Whether the device reports the channel as OK.
+
+    Returns
+    -------
+    Indices of `VERDICTS` (n_channels, n_cells).
     """
     lowest = np.minimum.reduceat(samples, starts, axis=1)
     highest = np.maximum.reduceat(samples, starts, axis=1)
@@ -92,7 +96,7 @@ def channel_verdicts(
 
 
 def worst_qualities(verdicts: VerdictArray) -> tuple[Quality, ...]:
-    """Return the worst quality of each channel over all cells, the first one on a tie."""
+    """Return the worst quality of each channel over all cells; the first of equally bad ones."""
     if not verdicts.any():
         return (GOOD,) * len(verdicts)
     first = _LEVELS[verdicts].argmax(axis=1)

@@ -1,6 +1,6 @@
-"""Checks of transducers and operation on a whole segment or on all averaged segments.
+"""Checks of transducers and of steady operation, over one segment or all averaged segments.
 
-Short cells of samples are checked before calibration in `core.checks.channels`.
+`core.checks.channels` checks short cells of samples before calibration.
 """
 
 import math
@@ -12,15 +12,15 @@ from core.arrays import FloatArray
 from core.quality import GOOD, Quality, Reading, Reason, bad, missing, uncertain
 
 N_PIECES = 8
-"""Number of pieces of a segment; detects a transducer that failed within the segment."""
+"""Number of pieces into which a segment is cut, to detect a transducer that failed within it."""
 
 MAX_CLIPPED_SHARE = 0.01
-"""Largest share of clipped samples that counts as isolated errors, as from a loose contact: only
-this segment of the channel is left out. With a larger share, the channel does not follow its
-signal."""
+"""Largest fraction of clipped samples in a segment that counts as isolated errors, for example of a
+loose contact: only this segment of the channel is left out. Above it, the channel is faulty."""
 
 SURE = 4.0
-"""Coverage factor of the speed check; large, because many segments are checked."""
+"""Coverage factor for the uncertainty of the speed in the speed check; large, because many segments
+are checked."""
 
 LOWEST_COUNT, HIGHEST_COUNT = -32768, 32767
 """Lowest and highest count of a 16-bit converter."""
@@ -61,7 +61,7 @@ class SensorLimits:
 
 
 def quietest_rms(samples: FloatArray) -> FloatArray:
-    """Return the smallest standard deviation over the pieces of each channel (n_channels,).
+    """Return the smallest standard deviation of each channel (n_channels,) among `N_PIECES` pieces.
 
     `samples` is (n_channels, n_samples).
 
@@ -87,10 +87,14 @@ def signal_quality(
 
     Parameters
     ----------
-    rms, mean
-        Smallest standard deviation (:func:`quietest_rms`) and mean of a segment, channel's unit.
+    rms
+        Smallest standard deviation of a segment (:func:`quietest_rms`), in the channel's unit.
+    mean
+        Mean of the segment, in the channel's unit.
     unit_per_count
         Unit per count, of either sign; 0 if unknown, then only a constant signal is a failure.
+    turning
+        Whether the shaft turns; at standstill every signal is good.
     """
     count = abs(unit_per_count)
     if not turning or rms > limits.min_counts_rms * count:
@@ -101,11 +105,12 @@ def signal_quality(
 def level_quality(
     samples: FloatArray, turn_samples: int, ok_limits: tuple[float, float]
 ) -> Quality:
-    """Return the quality of a transducer's level: bad if a mean over a turn is not OK.
+    """Return the quality of a transducer's DC level: bad if a mean over a turn is not OK.
 
-    Means over whole turns of `samples` (n_samples,) do not contain the vibration. A mean that jumps
-    farther than the shaft vibrates indicates a contact that was lost for a moment. Fewer samples
-    than one turn count as one turn.
+    Means over whole turns of `samples` (n_samples,) do not contain the vibration. They must be
+    within `ok_limits` (lowest, highest; in the unit of the samples). A mean that jumps farther than
+    the shaft vibrates indicates a contact that was lost for a moment. Fewer samples than one turn
+    (`turn_samples`) count as one turn.
     """
     n_turns = samples.size // turn_samples
     turns = samples[-n_turns * turn_samples :].reshape(max(n_turns, 1), -1)
@@ -117,14 +122,14 @@ def level_quality(
 
 
 def clipped_share(samples: FloatArray, unit_per_count: float) -> float:
-    """Return the share of samples (n_samples,) at either end of the converter's range."""
+    """Return the fraction of samples (n_samples,) at either end of the converter's range."""
     counts = samples / unit_per_count
     at_end = (counts > HIGHEST_COUNT - 0.5) | (counts < LOWEST_COUNT + 0.5)
     return float(np.mean(at_end))
 
 
 def backward_share(power_x: float, power_y: float, cross_xy: complex) -> float:
-    """Return the share of an orbit's power that turns from y to x (negative sense); 0 to 1.
+    """Return the fraction, 0 to 1, of an orbit's power that turns from y to x (negative sense).
 
     The orbit z = x + iy is split into forward and backward circles F and B. |F|² and |B|² are
     (S_xx + S_yy ± 2 Im S_xy) / 4, with the means of |X|², |Y|² and X · conj(Y) at a spectral line.
@@ -139,9 +144,10 @@ def backward_share(power_x: float, power_y: float, cross_xy: complex) -> float:
 def axes_quality(share: float, rotation_sense: int, limits: SensorLimits) -> Quality:
     """Return the quality of a probe pair: uncertain if its 1× orbit turns against the shaft.
 
-    `share` is the `backward_share` of the orbit. Unbalance and runout turn with the shaft. A
-    backward orbit most likely has swapped x and y. Stiffness anisotropy between two critical speeds
-    can cause it too, so the quality is not bad. Call it only if the 1× line is distinct.
+    `share` is the `backward_share` of the orbit; `rotation_sense` is positive for a shaft that
+    turns from x to y. Unbalance and runout turn with the shaft. A backward orbit most likely means
+    that x and y are swapped, but stiffness anisotropy between two critical speeds can also cause
+    it, so the quality is not bad. Use this check only if the 1× line is distinct.
     """
     against = share if rotation_sense > 0 else 1.0 - share
     return uncertain(Reason.SWAPPED_AXES) if against > limits.max_backward_share else GOOD
@@ -159,8 +165,8 @@ def checked_speed(
     Parameters
     ----------
     line_rpm
-        Speed of the 1× line; None without a distinct line. If it contradicts the reading, the
-        result is uncertain.
+        Speed of the 1× line; None without a distinct line. If it differs from the reading by more
+        than the tolerance, the result is uncertain.
     u_line
         Relative standard uncertainty of `line_rpm`.
     """
@@ -181,14 +187,16 @@ def stationarity(
     limits: SensorLimits,
     rated_power_mw: float | None = None,
 ) -> Quality:
-    """Return the quality of stationarity: uncertain if speed or power changed over the segments.
+    """Return the data quality: uncertain if speed or power varied by more than its limit.
 
-    It is also uncertain if the newest power is unknown, because the load may have changed.
+    The quality is also uncertain if the newest power is unknown, as the load may have changed.
 
     Parameters
     ----------
-    speed_rpm, power_mw : (n_segments,)
-        Mean of each segment, oldest first; NaN if unknown. An empty `power_mw` is not judged.
+    speed_rpm : (n_segments,)
+        Mean speed of each segment, oldest first; NaN if unknown.
+    power_mw : (n_segments,)
+        Mean power of each segment, oldest first; NaN if unknown. It may be empty: not judged.
     rated_power_mw
         Reference of power changes; by default the mean power.
     """

@@ -1,4 +1,4 @@
-"""Film conditions, for comparing stiffness under equal conditions, and condition cells."""
+"""Film conditions, which the stiffness depends on, and their division into condition cells."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from core.condition.operating_state import OperatingState
 
 @dataclass(frozen=True, eq=False)
 class FilmConditions:
-    """Film conditions of n readings as columns (n,); NaN for unknown values."""
+    """Conditions that film stiffness depends on, for n readings as columns (n,); NaN if unknown."""
 
     eccentricity_ratio: FloatArray
     oil_temperature_c: FloatArray
@@ -29,7 +29,7 @@ class FilmConditions:
         return int(self.eccentricity_ratio.size)
 
     def rows(self, wanted: npt.NDArray[np.bool_ | np.int64]) -> "FilmConditions":
-        """Return the conditions of the readings selected by a mask or by row numbers."""
+        """Return the conditions of the readings selected by a mask (n,) or by row numbers."""
         return FilmConditions(*(column[wanted] for column in vars(self).values()))
 
     def is_known(self, needs_attitude: bool) -> npt.NDArray[np.bool_]:
@@ -42,7 +42,7 @@ Cell: TypeAlias = tuple[int, ...]
 """Bin numbers of eccentricity ratio, oil temperature and, if in the grid, attitude angle."""
 
 CellArray: TypeAlias = npt.NDArray[np.int64]
-"""Bin numbers (n_axes, n)."""
+"""Cells of n readings as bin numbers (n_axes, n), in the order of the axes in `Cell`."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class CellGrid:
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Operating condition: state, eccentricity, attitude and oil temperature; None if unknown."""
+    """Operating state of a unit and film condition of a bearing; None for unknown values."""
 
     state: OperatingState = OperatingState.UNKNOWN
     eccentricity_ratio: float | None = None
@@ -111,10 +111,10 @@ NOWHERE_KNOWN = OperatingPoint()
 
 @dataclass(frozen=True)
 class BearingCondition:
-    """Condition of a bearing for the comparison of its stiffness; an unknown cell is None.
+    """Operating state of a bearing, whether it has settled, and condition cell (None if unknown).
 
-    A state is settled when it has lasted for the settling time after the warm-up. Only settled
-    films are compared.
+    A state has settled when it has lasted for the settling time after the warm-up. Only then is
+    film stiffness compared with its baseline.
     """
 
     state: OperatingState

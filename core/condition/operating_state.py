@@ -19,21 +19,26 @@ class OperatingLimits:
 
     Parameters
     ----------
-    standing_below, at_speed_above
-        Fractions of the rated speed: standstill is below the first, rated speed above the second.
-    loaded_above, full_load_above
-        Fractions of the rated power above which a unit is at part load and at full load.
+    standing_below
+        Fraction of the rated speed below which the unit is at standstill.
+    at_speed_above
+        Fraction of the rated speed above which the unit is at rated speed.
+    loaded_above
+        Fraction of the rated power above which the unit is at part load.
+    full_load_above
+        Fraction of the rated power above which the unit is at full load.
     speed_hysteresis, power_hysteresis
-        Distance beyond a limit, up or down, at which the limit counts as crossed.
+        Fraction of the rated value by which a limit must be passed, up or down, to be crossed.
     settling_s
         Time in one state after which readings count as settled. Readings are averages over about
         five minutes, and the shaft reaches its position within minutes.
-    oil_band_c, oil_settling_s
-        Width of the temperature band, and time at speed within the band, for the oil to count as
-        settled after a start. Clearances close for hours after a start, later than the oil warms
-        up (Brito et al., Tables 8 and 9), and film stiffness is not comparable until then. With
-        time constants of 1.2 h (clearance) and 0.8 h (oil), 1.7 % of the closing remains after a
-        cold start, and less after a short stop.
+    oil_band_c
+        Width of the temperature band in which the oil must stay to count as settled after a start.
+    oil_settling_s
+        Time at speed within the band. Clearances close for hours after a start, later than the oil
+        warms up (Brito et al., Tables 8 and 9), and film stiffness is not comparable until then.
+        With time constants of 1.2 h (clearance) and 0.8 h (oil), 1.7 % of the closing remains after
+        a cold start, and less after a short stop.
     warm_up_s
         Time at speed after which readings count even if the oil has not settled, for example with
         a load that follows the grid.
@@ -105,7 +110,7 @@ class Operation:
     was_at_speed: bool | None = None
 
     def is_settled(self, limits: OperatingLimits, has_oil_settled: bool = False) -> bool:
-        """Whether a state at rated speed has lasted for the settling time, after the warm-up."""
+        """Whether the unit is warm, and has been in one state at rated speed for `settling_s`."""
         now_ns, since_ns, from_ns = self.last_ns, self.since_ns, self.at_speed_from_ns
         if self.state not in STEADY or now_ns is None or since_ns is None or from_ns is None:
             return False
@@ -134,7 +139,7 @@ def step_operation(
     speed_rpm, power_mw
         Readings of speed and power; NaN if missing.
     state
-        State as given in a file of readings; overrides speed and power.
+        State from a file of readings, used instead of speed and power; None to compute the state.
 
     Raises
     ------
@@ -178,7 +183,7 @@ def step_operation(
 
 
 BETWEEN = (True, False)
-"""Limits exceeded by a speed above the lower and below the upper limit."""
+"""`Operation.speed_passed` of a speed between the lower and the upper limit."""
 
 
 def _passed(
@@ -212,7 +217,7 @@ def _state(
 
 
 OIL_LEVELS = 8
-"""Number of stored temperatures over the settling time."""
+"""Number of oil temperatures that are stored per settling time."""
 
 
 @dataclass(frozen=True)
@@ -232,7 +237,7 @@ class OilSettling:
     has_settled: bool = False
 
     def step(self, operation: Operation, oil_c: float, limits: OperatingLimits) -> "OilSettling":
-        """Return the settling after one temperature (NaN if missing) and its operation step."""
+        """Return the settling after one oil temperature (NaN if missing) and operation update."""
         now_ns = operation.last_ns
         if now_ns is None or operation.at_speed_from_ns is None:
             return NOT_AT_SPEED

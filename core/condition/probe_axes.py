@@ -15,14 +15,14 @@ from core.quality import Quality, Reading, Reason, uncertain, worst
 from core.uncertainty import Budget, BudgetLine, random_line, systematic_line
 
 NEAR_X, FAR_X, NEAR_Y, FAR_Y, GROWTH, ASYMMETRY = range(6)
-"""Indices of the input quantities of a displacement; all are lengths in µm."""
+"""Indices of the input quantities from which a displacement is computed; all are lengths in µm."""
 
 NAMES = ("gap x", "opposite gap x", "gap y", "opposite gap y", "thermal growth", "uneven growth")
 
 
 @dataclass(frozen=True)
 class ProbeAxis:
-    """Mean gaps in µm along an axis, of the positive probe (near) and the opposite one (far)."""
+    """Mean gaps in µm on an axis: of the probe on the positive side (near) and opposite (far)."""
 
     near: Reading
     near_reference_um: float
@@ -45,7 +45,7 @@ class ProbeAxis:
 
     @property
     def quality(self) -> Quality:
-        """Quality of the displacement along this axis; uncertain if one of two probes failed."""
+        """Quality of the displacement along this axis; at best uncertain if one probe failed."""
         if self.far is None:
             return self.near.quality
         if self.near.value is None and self.far.value is None:
@@ -58,19 +58,19 @@ class ProbeAxis:
 
 @dataclass(frozen=True)
 class Growth:
-    """Last measured thermal growth of the gaps of a bearing, with half-width of its interval."""
+    """Last measured thermal growth of a bearing's gaps, and half-width of its 95 % interval."""
 
     value_um: float
     half_width_um: float
 
 
 class ProbeAxes:
-    """Displacement along both axes, as weighted sums of the input quantities.
+    """Shaft displacement along x and y, as weighted sums of six input quantities.
 
     Attributes
     ----------
     values_um
-        Gap changes, last measured growth and growth asymmetry (6,).
+        Gap changes, last measured growth and growth asymmetry (6,), in the order of `NAMES`.
     weights
         Weights of the values in the displacement along x and y (2, 6); 0 if it is unknown.
     """
@@ -87,11 +87,11 @@ class ProbeAxes:
 
     @property
     def growth_quality(self) -> Quality:
-        """Quality of the presently measured growth."""
+        """Quality of the thermal growth measured now; good if no axis has both gaps."""
         return worst(axis.quality for axis in self._axes if axis.has_both)
 
     def growth_budget(self) -> Budget | None:
-        """Return the present growth from opposite probes of one or both axes; None without them."""
+        """Return the thermal growth from axes with both gaps; None if no axis has both."""
         both = [axis for axis in (0, 1) if self._axes[axis].has_both]
         if not both:
             return None
@@ -141,7 +141,7 @@ class ProbeAxes:
         return np.zeros(len(NAMES))
 
     def _growth_of(self, axis: int) -> FloatArray:
-        """Return weights of the growth of a one-probe axis: the other axis, else last known."""
+        """Return the weights of the growth of a one-probe axis: other axis, else last measured."""
         if self._axes[1 - axis].has_both:
             return self._own_growth(1 - axis) + _unit(ASYMMETRY)
         return _unit(GROWTH) + axis * _unit(ASYMMETRY)

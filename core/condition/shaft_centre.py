@@ -14,7 +14,7 @@ from core.uncertainty import Budget, Found, systematic_line
 CLEARANCE = "clearance"
 
 HALF_CIRCLE_DEG = 180.0
-"""Half-width of the uniform distribution of an unknown angle."""
+"""Half-width of the uniform distribution of an unknown attitude angle."""
 
 
 def locate_shaft(
@@ -32,9 +32,9 @@ def locate_shaft(
 
     Returns
     -------
-    By quantity: thermal widening of the gaps since their references were read (from opposite probes
-    only), displacement along the bearing axes, eccentricity ratio, and attitude angle from the
-    positive x axis towards the positive y axis.
+    Readings and budgets by quantity: thermal growth of the gaps since their references were read
+    (from opposite probes only), displacement along the bearing axes, eccentricity ratio, and
+    attitude angle from the positive x axis towards the positive y axis.
     """
     accuracy = accuracy or GapAccuracy()
     axes = ProbeAxes(x, y, accuracy, last_growth)
@@ -78,7 +78,7 @@ def _eccentricity(
 
 
 def _angle(axes: ProbeAxes, outward: FloatArray, radius_um: float, angle_deg: float) -> Budget:
-    """Return the attitude angle with the uncertainty of the position across it.
+    """Return the budget of the attitude angle, from the tangential uncertainty of the position.
 
     Near the centre, the angle is unknown and has an uncertainty of ± 180°.
     """

@@ -53,13 +53,13 @@ def position_results(
 
 
 def measures_growth(bearing: Bearing) -> bool:
-    """Whether thermal growth can be measured, which requires opposite probes on an axis."""
+    """Whether thermal growth can be measured: an axis has opposite probes with references."""
     far = [probe_axis(bearing, _NO_GAPS, _NO_GAPS, axis).far for axis in (0, 1)]
     return far != [None, None]
 
 
 def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
-    """Return the measured thermal growth, for use when it can no longer be measured, or None."""
+    """Return the measured thermal growth, to be kept for later failures of probes; None without."""
     growth = readings["gap_growth_um"]
     if growth.value is None or growth.interval_95 is None:
         return None
@@ -67,14 +67,14 @@ def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
 
 
 def slow_channels(unit: Unit, bearing: Bearing) -> dict[str, str | None]:
-    """Return the slow channel of power and of oil temperature of a bearing, by quantity."""
+    """Return the slow channel ids of power and oil temperature, by quantity; None if not wired."""
     return {"power_mw": unit.power_channel, "oil_temperature_c": bearing.oil_temperature}
 
 
 def slow_results(segments: Sequence[Segment], channels: Mapping[str, str | None]) -> Found:
-    """Return the means of slow channels over the segments, by quantity, with their scatter.
+    """Return the means of slow channels over the segments, with their budgets, by quantity.
 
-    The uncertainty does not include the unknown calibration uncertainty of the transmitters.
+    The uncertainty is that of the scatter, without the unknown calibration of the transmitters.
     """
     found: dict[str, Budgeted] = {}
     for name, channel in channels.items():
@@ -86,7 +86,7 @@ def slow_results(segments: Sequence[Segment], channels: Mapping[str, str | None]
 def probe_axis(
     bearing: Bearing, near: Sequence[Reading], far: Sequence[Reading], axis: int
 ) -> ProbeAxis:
-    """Return the probe axis (0 is x) with references, from the mean gaps (x, y) in µm."""
+    """Return probe axis 0 (x) or 1 (y) of a bearing, from the mean gaps of (x, y) in µm."""
     has_far = (bearing.opposite_x, bearing.opposite_y)[axis] is not None
     if not has_far or bearing.opposite_reference_um is None:
         return ProbeAxis(near[axis], bearing.gap_reference_um[axis])
