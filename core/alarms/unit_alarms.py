@@ -1,9 +1,8 @@
 """`UnitAlarms`: all alarms of a unit, updated from samples, assessments, film changes and link."""
 
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain
 from operator import itemgetter
 
 from core.alarms.alarm import Alarm, AlarmNews
@@ -85,7 +84,7 @@ class UnitAlarms(AlarmBoard):
         self._references = {(r.bearing, r.state): r for r in references}
         self._segment_faults: dict[str, Reason] = {}
         self._clipped_percent: dict[str, float] = {}
-        self._points: dict[str, list[tuple[OperatingPoint, int]]] = {}  # of the newest block
+        self._points: dict[str, tuple[OperatingPoint, int]] = {}
         self._stop: tuple[int, int] | None = None
         self._inactive_with: tuple[Quality, ...] | None = None
         self._link: tuple[bool, str | None] = (False, None)
@@ -112,12 +111,8 @@ class UnitAlarms(AlarmBoard):
         """
         if self._is_repeated(block):
             return []
-        for points in self._points.values():
-            del points[:-1]
-        for assessment in assessments:
-            self._take_assessment(assessment)
         now_ns = block.stop_ns
-        self._take_channels(block)
+        self._take_channels(block, deque(assessments))
         for watch in self._of_rule[SLOW_CHANNEL]:
             reading = block.slow.get(watch.source, NOT_MEASURED)
             fault = reading.quality.reason if reading.value is None else None
@@ -170,7 +165,7 @@ class UnitAlarms(AlarmBoard):
         news = super().restore(stored, host_ns, memory)
         if memory is not None:
             self._segment_faults = dict(memory.segment_faults)
-            self._points = {bearing: [newest] for bearing, newest in memory.points.items()}
+            self._points = dict(memory.points)
             self._stop, self._link = memory.stop, (memory.is_connected, memory.link_reason)
             kept = {alarm.identity.id: alarm for alarm in memory.alarms}
             for watch in self._of_rule[LINK]:
@@ -186,7 +181,7 @@ class UnitAlarms(AlarmBoard):
         return AlarmMemory(
             tuple(self.alarms),
             dict(self._segment_faults),
-            {bearing: points[-1] for bearing, points in self._points.items()},
+            dict(self._points),
             self._stop,
             *self._link,
         )
@@ -215,7 +210,7 @@ class UnitAlarms(AlarmBoard):
                 self._inactive_with = None
             self._clipped_percent[channel] = 100.0 * assessment.clipped_share.get(place, 0.0)
         point = point_of(assessment)
-        self._points.setdefault(bearing, []).append((point, now_ns))
+        self._points[bearing] = (point, now_ns)
         reference = self.reference(bearing, point.state)
         for watch in self._of_results[bearing]:
             if watch.group in VECTORS:
@@ -228,19 +223,17 @@ class UnitAlarms(AlarmBoard):
                 self.record(watch.id, _at(point, condition), then_ns)
 
     def _recent_point(self, subject: str, now_ns: int) -> OperatingPoint:
-        """Return the newest operating point of a bearing up to a time, if it is recent enough.
+        """Return the newest operating point of a bearing, if it is recent enough.
 
-        For other subjects, return only the operating state of the unit. If all known points are
-        later than the time, the first is used.
+        For other subjects, return only the operating state of the unit.
         """
-        own = self._points.get(subject)
-        points = own or sorted(chain(*self._points.values()), key=itemgetter(1))
-        if not points:
+        if subject in self._points:
+            point, seen_ns = self._points[subject]
+        elif self._points:
+            newest, seen_ns = max(self._points.values(), key=itemgetter(1))
+            point = OperatingPoint(newest.state)
+        else:
             return NOWHERE_KNOWN
-        earlier = [each for each in points if each[1] <= now_ns]
-        point, seen_ns = earlier[-1] if earlier else points[0]
-        if not own:
-            point = OperatingPoint(point.state)
         return point if abs(now_ns - seen_ns) <= POINT_HOLDS_NS else NOWHERE_KNOWN
 
     def _update(self, watch: Watch, condition: Judgement, now_ns: int) -> None:
@@ -258,12 +251,21 @@ class UnitAlarms(AlarmBoard):
         condition = watch.judge(reading, point, alarm.condition.level)
         self.update(watch, _at(point, condition), now_ns)
 
-    def _take_channels(self, block: SampleBlock) -> None:
-        """Judge all channels in each cell of a block; skip cells with unchanged qualities."""
-        if block.channel_quality == self._inactive_with:
+    def _take_channels(self, block: SampleBlock, assessments: deque[Assessment]) -> None:
+        """Judge the channels in each cell of a block, after the assessments up to its end.
+
+        A block may contain several segments. In order of time, its alarms do not depend on its
+        length, which differs between wires. Cells with unchanged qualities are skipped.
+        """
+        if not assessments and block.channel_quality == self._inactive_with:
             return
         watches = self._of_rule[WAVEFORM_CHANNEL]
-        for qualities, stop_ns in block.cell_qualities():
+        half_ns = round(0.5 * NS_PER_S / block.rate_hz)
+        cells = list(block.cell_qualities())
+        for number, (qualities, stop_ns) in enumerate(cells, start=1):
+            is_last = number == len(cells)
+            while assessments and (is_last or assessments[0].time_ns <= stop_ns + half_ns):
+                self._take_assessment(assessments.popleft())
             if qualities == self._inactive_with:
                 continue
             for watch in watches:
