@@ -45,7 +45,7 @@ _MAX_RISE_S = 1.0
 
 
 class LeastDelay:
-    """Estimator of the smallest transmission delay of samples, which counts as no lateness.
+    """Estimator of the smallest transmission delay of samples, which counts as zero lateness.
 
     The stored minimum increases with time by the largest clock drift.
 

@@ -1,4 +1,4 @@
-"""Host name resolution that cannot block the event loop, and reliable task cancellation.
+"""Host name resolution outside the default thread pool, and reliable task cancellation.
 
 The name resolution of the event loop occupies a thread of the default pool, which the database also
 uses, until the name servers time out, even after its caller was cancelled.

@@ -72,7 +72,7 @@ class AlarmBoard:
             self.record(watch.id, condition, now_ns)
 
     def record(self, id_: str, condition: Judgement, now_ns: int) -> None:
-        """Update an alarm with a judgement, even if it stays inactive, to keep its value current."""
+        """Update an alarm with a judgement; an alarm that stays inactive gets the new value too."""
         self._note(id_, *update(self._alarms[id_], condition, now_ns, self._rules[id_]))
 
     def pause(self, spared: str | None = None) -> None:

@@ -147,7 +147,7 @@ class QuantityBaseline:
     def compare(
         self, conditions: FilmConditions, value: FloatArray, u_random: FloatArray
     ) -> Deviations:
-        """Compare readings (n,) with the learned values under their conditions.
+        """Return the deviations of readings (n,) from the learned values under their conditions.
 
         `value` is ln of the stiffness; `u_random` is its random standard uncertainty.
         """
@@ -170,7 +170,7 @@ class QuantityBaseline:
         return found
 
     def compare_history(self, history: StiffnessHistory) -> Deviations:
-        """Compare the readings of a history in the direction of this baseline."""
+        """Return the deviations of a history's readings in the direction of this baseline."""
         row = DIRECTIONS.index(self.direction)
         return self.compare(history.conditions, history.ln_k[row], history.u_random[row])
 

@@ -101,7 +101,7 @@ class CellTable:
 
     @cached_property
     def scatter(self) -> FloatArray:
-        """Scatter of each cell (n_cells,)."""
+        """Standard deviation of readings about the surface in each cell (n_cells,)."""
         return np.array([cell.scatter for cell in self.cells], np.float64)
 
     @cached_property
@@ -116,7 +116,7 @@ class CellTable:
 
     @cached_property
     def node_std(self) -> FloatArray:
-        """Surface uncertainty (NODES, NODES, n_cells) by eccentricity and temperature node, cell."""
+        """Surface uncertainty (NODES, NODES, n_cells), by eccentricity, temperature and cell."""
         rows = np.array([cell.node_std for cell in self.cells], np.float64)
         return rows.reshape(-1, NODES, NODES).transpose(1, 2, 0)
 

@@ -93,7 +93,7 @@ def bisquare(standardised: FloatArray) -> FloatArray:
 
 
 def absolute_quantile_std(deviation: FloatArray) -> float:
-    """Return the larger standard deviation about zero of those from the 50 % and 75 % quantiles."""
+    """Return the larger standard deviation about zero from the 50 % and 75 % quantile of |x|."""
     if deviation.size == 0:
         return 0.0
     half, three_quarters = np.quantile(np.abs(deviation), (0.5, 0.75))
@@ -120,7 +120,7 @@ def ewma_weight(time_scale_h: float, reading_h: float) -> float:
 
 
 def ewma(x: FloatArray, alpha: float) -> FloatArray:
-    """Return the exponentially weighted sum, from 0 on, after each value of x (n,)."""
+    """Return the exponentially weighted sum after each value of x (n,), starting from 0."""
     from scipy.signal import lfilter  # slow import, not needed at start-up
 
     return np.asarray(lfilter([alpha], [1.0, alpha - 1.0], x))

@@ -28,9 +28,10 @@ def held_out_deviations(
     table: CellTable,
     settings: BaselineSettings,
 ) -> FloatArray:
-    """Return cross-validated deviations (n,) of `value` (ln k) from surfaces without its fold.
+    """Return the deviation of each `value` (ln k) from a surface fitted without its fold (n,).
 
-    A fold consists of blocks of consecutive days. NaN for cells with too few days in other folds.
+    A fold of this cross-validation consists of blocks of consecutive days. NaN for readings in
+    cells with too few days in other folds.
     """
     n_days = np.unique(groups.day).size
     spell_days = int(np.clip(n_days // (2 * FOLDS), 1, LONGEST_SPELL_DAYS))

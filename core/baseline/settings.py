@@ -19,8 +19,10 @@ class BaselineSettings:
     uses_attitude
         Whether the surface depends on the attitude angle, because pads are set unevenly and x and
         y differ. `grid` defines whether the cells depend on the attitude angle.
-    min_readings, min_days
-        Number of readings, and of days with readings, that a cell needs for own support.
+    min_readings
+        Number of readings that a cell needs for own support.
+    min_days
+        Number of days with readings that a cell needs for own support.
     borrowing_readings
         Number of readings with which a cell borrows support, if the cell and its neighbours have
         at least `min_days` in total.

@@ -105,7 +105,7 @@ def attitude_terms(conditions: FilmConditions) -> FloatArray:
 
 @dataclass(frozen=True)
 class Surface:
-    """Fitted surface: shape, constant offset and spline coefficients."""
+    """Fitted surface of ln stiffness: shape, constant offset and spline coefficients."""
 
     shape: SurfaceShape
     offset: float
@@ -122,7 +122,7 @@ class Surface:
         return np.array(self.coefficients)
 
     def slope(self, conditions: FilmConditions) -> FloatArray:
-        """Return d ln(stiffness) / d(eccentricity ratio) (n,), over ± 1/4 of the knot width."""
+        """Return d ln(stiffness) / d(eccentricity ratio) (n,), from a step of ± 1/4 knot width."""
         step = self.shape.eccentricity.width / 4.0
         up, down = (
             self.at(replace(conditions, eccentricity_ratio=conditions.eccentricity_ratio + by))

@@ -44,10 +44,7 @@ def tabulate(
     fit: Fit,
     settings: BaselineSettings,
 ) -> CellTable:
-    """Return the table of cells with readings and of cells between supported ones; `value` is ln k.
-
-    The scatter is preliminary.
-    """
+    """Return the table of cells with readings, and of those between them; `value` is ln k."""
     contents = _seen(conditions, value, groups, fit, settings.grid)
     enough = {
         cell

@@ -74,8 +74,8 @@ SPREAD = 0.15
 """Error of the predicted motion at each film, as a fraction of its rms over all films."""
 
 SHARE_SPREAD, COVERAGE = 0.3, 2.0
-"""Relative standard uncertainty of the film share due to the prediction, and the number of standard
-uncertainties by which the share may lie outside 0 to 1."""
+"""`SHARE_SPREAD`: relative standard uncertainty of the film share due to the predicted motion.
+`COVERAGE`: number of standard uncertainties by which the film share may lie outside 0 to 1."""
 
 FILM_REASON = "the shaft moves as it does with films of the stiffness that is measured"
 OIL_REASON = "all films changed alike, and the shaft moves as it does with such films"

@@ -20,7 +20,7 @@ from core.units import NS_PER_S
 
 
 class Verdict(IntEnum):
-    """Verdict on a reading of a film; from `GATHERING_EVIDENCE` on, the reading was not judged."""
+    """Verdict on a reading of a film; from `GATHERING_EVIDENCE` on, why it was not judged."""
 
     NORMAL = 0
     ALERT = 1

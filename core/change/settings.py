@@ -25,9 +25,9 @@ class ChangeLimits:
     Parameters
     ----------
     alert_change
-        Limit of the absolute change for an alert; `ALERT_MARGIN` is added.
+        Absolute change for an alert; to be exceeded by `ALERT_MARGIN` standard uncertainties.
     danger_change
-        Limit of the absolute change for a danger; `DANGER_MARGIN` is added.
+        Absolute change for a danger; to be exceeded by `DANGER_MARGIN` standard uncertainties.
     deadband
         Distance below the limit at which an active level ends. The required significance for
         holding a level is lower by the fraction `deadband / alert_change`.

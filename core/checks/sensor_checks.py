@@ -46,9 +46,12 @@ class SensorLimits:
     speed_tolerance
         Accepted relative difference between measured speed and 1× line. An amplitude at a wrong
         speed reads low: by 0.1 % at 0.2 % in 8192 samples of 600 Hz at 92.3 r/min, by 6 % at 1.5 %.
-    max_speed_change, max_power_change
-        Largest range (maximum minus minimum) over the averaging time, relative to the mean speed
-        and to the rated power. The shaft position and the film change with the load.
+    max_speed_change
+        Largest accepted range (maximum minus minimum) of the speed over the averaging time,
+        relative to the mean speed.
+    max_power_change
+        Largest accepted range of the power, relative to the rated power. The shaft position and the
+        film change with the load.
     """
 
     min_counts_rms: float = 1.0
@@ -196,7 +199,7 @@ def stationarity(
     speed_rpm : (n_segments,)
         Mean speed of each segment, oldest first; NaN if unknown.
     power_mw : (n_segments,)
-        Mean power of each segment, oldest first; NaN if unknown. It may be empty: not judged.
+        Mean power of each segment, oldest first; NaN if unknown. An empty array is not judged.
     rated_power_mw
         Reference of power changes; by default the mean power.
     """

@@ -77,7 +77,7 @@ class CellGrid:
         return self.attitude_width_deg is not None
 
     def cells(self, conditions: FilmConditions) -> CellArray:
-        """Return the cell of each reading (n_axes, n); valid only where `is_known` is true."""
+        """Return the cells of n readings (n_axes, n); valid only where `is_known` is true."""
         axes = [
             conditions.eccentricity_ratio / self.eccentricity_width,
             conditions.oil_temperature_c / self.temperature_width_c,
@@ -111,7 +111,7 @@ NOWHERE_KNOWN = OperatingPoint()
 
 @dataclass(frozen=True)
 class BearingCondition:
-    """Operating state of a bearing, whether it has settled, and condition cell (None if unknown).
+    """Condition of a bearing: operating state, whether it has settled, condition cell (or None).
 
     A state has settled when it has lasted for the settling time after the warm-up. Only then is
     film stiffness compared with its baseline.

@@ -59,7 +59,7 @@ def measures_growth(bearing: Bearing) -> bool:
 
 
 def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
-    """Return the measured thermal growth, to be kept for later failures of probes; None without."""
+    """Return the measured thermal growth, for use if a probe fails later; None if not measured."""
     growth = readings["gap_growth_um"]
     if growth.value is None or growth.interval_95 is None:
         return None
@@ -67,7 +67,7 @@ def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
 
 
 def slow_channels(unit: Unit, bearing: Bearing) -> dict[str, str | None]:
-    """Return the slow channel ids of power and oil temperature, by quantity; None if not wired."""
+    """Return the slow channel ids of power and oil temperature, by quantity; None if absent."""
     return {"power_mw": unit.power_channel, "oil_temperature_c": bearing.oil_temperature}
 
 
