@@ -162,7 +162,7 @@ class _Residuals:
 
     @cached_property
     def std(self) -> FloatArray:
-        """Standard uncertainty of the means over the readings (n_films,); larger for few."""
+        """Standard uncertainty (n_films,) of the means; larger below `MEAN_READINGS` readings."""
         few = max(1.0, MEAN_READINGS / self.readings.ln_k.shape[1])
         return np.asarray(np.array(self.response.std) * few**0.5)
 

@@ -1,4 +1,4 @@
-"""`padwatch backtest`: baseline and decision over years of readings in a file."""
+"""`padwatch backtest`: learn baselines from past readings in a file, and judge later ones."""
 
 from pathlib import Path
 from typing import Annotated

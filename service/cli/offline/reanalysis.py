@@ -31,7 +31,7 @@ def assessment_document(assessment: Assessment) -> dict[str, Any]:
 async def refreshes(
     source: SampleSource, monitor: UnitMonitor, passed: Callable[[int], None]
 ) -> AsyncIterator[Refresh]:
-    """Yield all evaluations of a finite source; each one is assessed on request.
+    """Yield the input of each assessment of a finite source, without computing the assessments.
 
     Parameters
     ----------
