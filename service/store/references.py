@@ -1,6 +1,7 @@
 """Tables of gap references and 1× vector references; the newest reference is in force."""
 
 import json
+from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any, Generic, TypeVar
@@ -105,7 +106,10 @@ class SetVectorReference:
 _Reference = TypeVar("_Reference", GapReference, SetVectorReference)
 
 
-class _References(AuditedTables, Generic[_Reference]):
+class _References(AuditedTables, ABC, Generic[_Reference]):
+    action: str
+    """Action in the audit trail."""
+
     table: str
     columns: tuple[str, ...]
     key: tuple[str, ...]
@@ -152,19 +156,40 @@ class _References(AuditedTables, Generic[_Reference]):
             rows = reader.execute(f"{self._select} {where}", parameters)
             return [self._load(row) for row in rows]
 
-    def _row(self, reference: _Reference) -> tuple[object, ...]:
-        raise NotImplementedError
-
-    def _load(self, row: tuple[Any, ...]) -> _Reference:
-        raise NotImplementedError
-
     def _action(self, before: _Reference | None, reference: _Reference) -> AuditAction:
-        raise NotImplementedError
+        return AuditAction(
+            time_ns=reference.set_ns,
+            actor=reference.author,
+            action=self.action,
+            object=self._object(reference),
+            before=None if before is None else self._values(before),
+            after=self._values(reference),
+            reason=reference.note,
+            source=acting().source,
+            peer=acting().peer,
+        )
+
+    @abstractmethod
+    def _row(self, reference: _Reference) -> tuple[object, ...]:
+        """Return the values of `columns`."""
+
+    @abstractmethod
+    def _load(self, row: tuple[Any, ...]) -> _Reference:
+        """Return the reference of a row. Raises `StoreError` if the row is damaged."""
+
+    @abstractmethod
+    def _object(self, reference: _Reference) -> str:
+        """Return the object of the audit entry."""
+
+    @abstractmethod
+    def _values(self, reference: _Reference) -> dict[str, object]:
+        """Return the values of the audit entry."""
 
 
 class GapReferenceStore(_References[GapReference]):
     """Table of the gap references of all bearings; one reference is in force per bearing."""
 
+    action = "gap_reference.set"
     table = "gap_reference"
     columns = (
         *("unit", "bearing", "set_ns", "author", "x_um", "y_um"),
@@ -189,28 +214,18 @@ class GapReferenceStore(_References[GapReference]):
         except ValueError as error:
             raise StoreError(f"a reference of unit {unit} bearing {bearing}: {error}") from error
 
-    def _action(self, before: GapReference | None, reference: GapReference) -> AuditAction:
-        return AuditAction(
-            time_ns=reference.set_ns,
-            actor=reference.author,
-            action="gap_reference.set",
-            object=f"{reference.unit}:{reference.bearing}",
-            before=None if before is None else _gaps(before),
-            after=_gaps(reference),
-            reason=reference.note,
-            source=acting().source,
-            peer=acting().peer,
-        )
+    def _object(self, reference: GapReference) -> str:
+        return f"{reference.unit}:{reference.bearing}"
 
-
-def _gaps(reference: GapReference) -> dict[str, object]:
-    names = ("author", "set_ns", "gap_reference_um", "opposite_reference_um", "source")
-    return {name: getattr(reference, name) for name in names}
+    def _values(self, reference: GapReference) -> dict[str, object]:
+        names = ("author", "set_ns", "gap_reference_um", "opposite_reference_um", "source")
+        return {name: getattr(reference, name) for name in names}
 
 
 class VectorReferenceStore(_References[SetVectorReference]):
     """Table of the 1× vector references; one per bearing and operating state is in force."""
 
+    action = "order1_reference.set"
     table = "vector_reference"
     columns = ("unit", "bearing", "state", "set_ns", "author", "note", "vectors")
     key = ("unit", "bearing", "state")
@@ -231,26 +246,13 @@ class VectorReferenceStore(_References[SetVectorReference]):
             raise StoreError(f"a 1× reference of unit {unit} bearing {bearing}: {error}") from error
         return SetVectorReference(reference, set_ns, author, note)
 
-    def _action(
-        self, before: SetVectorReference | None, reference: SetVectorReference
-    ) -> AuditAction:
+    def _object(self, reference: SetVectorReference) -> str:
         its = reference.reference
-        return AuditAction(
-            time_ns=reference.set_ns,
-            actor=reference.author,
-            action="order1_reference.set",
-            object=f"{its.unit}:{its.bearing}:{its.state.name.lower()}",
-            before=None if before is None else _vectors(before),
-            after=_vectors(reference),
-            reason=reference.note,
-            source=acting().source,
-            peer=acting().peer,
-        )
+        return f"{its.unit}:{its.bearing}:{its.state.name.lower()}"
 
-
-def _vectors(reference: SetVectorReference) -> dict[str, object]:
-    vectors = {place: asdict(vector) for place, vector in reference.reference.vectors.items()}
-    return {"author": reference.author, "set_ns": reference.set_ns, "vectors": vectors}
+    def _values(self, reference: SetVectorReference) -> dict[str, object]:
+        vectors = {place: asdict(vector) for place, vector in reference.reference.vectors.items()}
+        return {"author": reference.author, "set_ns": reference.set_ns, "vectors": vectors}
 
 
 VECTOR_REFERENCE_TABLES = """

@@ -405,12 +405,9 @@ def percent_of(ln: float) -> float:
 
 
 def interval_percent(ln: float, std: float) -> tuple[float, float]:
-    """Return the ends of the 95 % interval of a relative change, %.
+    """Return the ends of the 95 % interval, %, of a relative change.
 
-    Parameters
-    ----------
-    ln, std
-        Change of the natural logarithm, and its standard uncertainty.
+    `std` is the standard uncertainty of the change `ln` of the natural logarithm.
     """
     return percent_of(ln - NORMAL_95 * std), percent_of(ln + NORMAL_95 * std)
 
