@@ -40,6 +40,8 @@ class Usage:
     n_threads: int
     log_mib: float
     cpu_s: float
+    waited_s: float
+    """Time for which the event loop was ready to run and waited for a processor."""
 
 
 def look(process: psutil.Process, log: Path) -> Usage:
@@ -53,6 +55,7 @@ def look(process: psutil.Process, log: Path) -> Usage:
             n_threads=process.num_threads(),
             log_mib=log.stat().st_size / MIB if log.exists() else 0.0,
             cpu_s=cpu.user + cpu.system,
+            waited_s=int(Path(f"/proc/{process.pid}/schedstat").read_text().split()[1]) / 1e9,
         )
 
 
@@ -119,6 +122,12 @@ class Soaked:
         first, last = self.settled[0], self.settled[-1]
         return (last.cpu_s - first.cpu_s) / max(last.at_s - first.at_s, 1e-9)
 
+    @property
+    def waiting_share(self) -> float:
+        """Share of the time in which other programs had the processor that the service wanted."""
+        first, last = self.usages[0], self.usages[-1]
+        return (last.waited_s - first.waited_s) / max(last.at_s - first.at_s, 1e-9)
+
     def growth(self, name: str) -> Slope:
         """How something grew after the warm-up."""
         return slope(self._values("at_s"), self._values(name))
@@ -143,6 +152,7 @@ class Soaked:
             "minutes": round(self.seconds / 60.0, 1),
             "units, times nominal": f"{plant.n_units}, {plant.load:g}",
             "service, cores": f"{self.cores:.2f} ({per_sample_us:.2f} µs a sample)",
+            "waited for a processor": f"{100.0 * self.waiting_share:.0f} % of the time",
             "ledger DAQ, cores": f"{self.daq_cores:.2f}",
             "memory, MiB": f"{self.most('rss_mib'):.0f}, {self.growth('rss_mib')} an hour",
             "open files": f"{self.most('n_files'):.0f}, {self.growth('n_files')} an hour",
