@@ -27,7 +27,7 @@ from core.arrays import FloatArray
 from core.machine.channel import Measurand
 from core.machine.unit import BearingAccuracy, BracketDynamics, Unit
 from core.monitor.assessment import AnalysisSettings
-from core.quality import GOOD, Reading
+from core.quality import GOOD, Reading, Reason
 from core.samples.ring import Window
 from core.spectra.cross_spectrum import (
     BEARING_X,
@@ -39,7 +39,7 @@ from core.spectra.cross_spectrum import (
 )
 from core.spectra.segments import ORDER1, VORTEX, SegmentTransform
 from core.spectra.vortex import roundness
-from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
+from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, films
 from core.stiffness.dynamic_lines import DynamicSettings
 from core.stiffness.dynamic_readings import dynamic_budgets
 from core.stiffness.stiffness_budget import ratio_budget, transfer_budgets
@@ -86,7 +86,12 @@ class Analysis:
             )
         )
         spectra = [self._bearing(4 * bearing) for bearing in range(len(self._unit.bearings))]
-        return sum(self._estimate(bins, orders) for bins, orders in spectra)
+        turn_hz, bracket = SPEED_RPM / 60.0, BracketDynamics(1.18e9, 0.45e5)
+        measured = [FilmSpectrum(bins, bracket, (turn_hz, turn_hz)) for bins, _ in spectra]
+        found = films(measured, DynamicSettings())
+        for film, (_, orders) in zip(found, spectra, strict=True):
+            self._budgets(film, orders, bracket)
+        return sum(isinstance(film, DynamicStiffness) for film in found)
 
     def _bearing(self, row: int) -> tuple[CrossSpectrum, CrossSpectrum]:
         segments = list(self._transform.segments)
@@ -105,18 +110,17 @@ class Analysis:
             ),
         )
 
-    def _estimate(self, bins: CrossSpectrum, orders: CrossSpectrum) -> bool:
-        bracket, accuracy = BracketDynamics(1.18e9, 0.45e5), BearingAccuracy()
-        turn_hz = SPEED_RPM / 60.0
-        found = dynamic_stiffness(bins, bracket, (turn_hz, turn_hz), DynamicSettings())
-        if isinstance(found, DynamicStiffness):
-            dynamic_budgets(found, bracket, accuracy)
+    def _budgets(
+        self, film: DynamicStiffness | Reason, orders: CrossSpectrum, bracket: BracketDynamics
+    ) -> None:
+        accuracy = BearingAccuracy()
+        if isinstance(film, DynamicStiffness):
+            dynamic_budgets(film, bracket, accuracy)
         for line in (ORDER1, VORTEX):
             roundness(orders, line)
             for shaft, bearing in ((SHAFT_X, BEARING_X), (SHAFT_Y, BEARING_Y)):
                 ratio_budget(orders, line, shaft, bearing, bracket, accuracy)
                 transfer_budgets(orders, line, shaft, bearing, bracket, accuracy)
-        return isinstance(found, DynamicStiffness)
 
 
 ALL_PAIRS = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))

@@ -20,7 +20,6 @@ from core.quality import (
     Quality,
     Reading,
     Reason,
-    bad,
     missing,
     uncertain,
     worst,
@@ -38,7 +37,7 @@ from core.spectra.runout import RunoutVerdict
 from core.spectra.segments import ORDER1, VORTEX, Evidence, KeptSegments
 from core.stiffness.agreement import contradicting
 from core.stiffness.channel_budget import frequency_budget
-from core.stiffness.dynamic import DynamicStiffness
+from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, films
 from core.stiffness.dynamic_readings import NAMES as DYNAMIC_NAMES
 from core.stiffness.dynamic_readings import dynamic_readings
 from core.stiffness.estimators import preferred_stiffness, signs_checked
@@ -71,39 +70,60 @@ class BearingReadings:
     evidence: Evidence
 
 
-def bearing_readings(
-    unit: Unit,
-    bearing: Bearing,
-    settings: AnalysisSettings,
-    kept: KeptSegments,
-    coverage: float,
-    position: Found,
-) -> BearingReadings:
-    """Return the readings of one bearing, averaged over the kept segments or polls.
+class UnitReadings:
+    """Readings of the bearings of one unit, averaged over the same segments or polls.
+
+    The films of all bearings are fitted together, when the readings of the first are asked for.
 
     Parameters
     ----------
     kept
         Segments or polls to average, at least one.
-    coverage
-        Segments in which all four channels were usable, as a fraction of the possible segments.
-    position
-        Readings and budgets from `core.condition.shaft_readings.position_results`.
+    n_expected
+        Number of possible segments.
     """
-    found = _Bearing(unit, bearing, settings, kept, coverage)
-    readings, budgets, dynamic = found.readings(position)
-    readings |= found.doubted(readings, budgets, dynamic)
-    chosen = {
-        axes: preferred_stiffness(readings, bearing.preference, axes) for axes in ("xx", "yy")
-    }
-    readings |= {f"stiffness_{axes}_n_per_m": reading for axes, (reading, _) in chosen.items()}
-    return BearingReadings(
-        readings,
-        budgets,
-        {axes: estimator for axes, (_, estimator) in chosen.items()},
-        found.spectrum or NO_SPECTRUM,
-        found.evidence,
-    )
+
+    def __init__(
+        self, unit: Unit, settings: AnalysisSettings, kept: KeptSegments, n_expected: int
+    ) -> None:
+        self.unit, self.settings, self.kept, self.n_expected = unit, settings, kept, n_expected
+
+    @cached_property
+    def _bearings(self) -> "dict[str, _Bearing]":
+        given = self.settings, self.kept, self.n_expected
+        return {bearing.id: _Bearing(self.unit, bearing, *given) for bearing in self.unit.bearings}
+
+    @cached_property
+    def _films(self) -> dict[str, DynamicStiffness | Reason]:
+        """Result of `dynamic` for each bearing with a usable spectrum."""
+        spectra = {id_: bearing.film_spectrum() for id_, bearing in self._bearings.items()}
+        measured = {id_: found for id_, found in spectra.items() if found is not None}
+        return dict(
+            zip(measured, films(list(measured.values()), self.settings.dynamic), strict=True)
+        )
+
+    def of(self, bearing: Bearing, position: Found) -> BearingReadings:
+        """Return the readings of one bearing.
+
+        Parameters
+        ----------
+        position
+            Readings and budgets from `core.condition.shaft_readings.position_results`.
+        """
+        found = self._bearings[bearing.id]
+        readings, budgets, film = found.readings(position, self._films.get(bearing.id))
+        readings |= found.doubted(readings, budgets, film)
+        chosen = {
+            axes: preferred_stiffness(readings, bearing.preference, axes) for axes in ("xx", "yy")
+        }
+        readings |= {f"stiffness_{axes}_n_per_m": reading for axes, (reading, _) in chosen.items()}
+        return BearingReadings(
+            readings,
+            budgets,
+            {axes: estimator for axes, (_, estimator) in chosen.items()},
+            found.spectrum or NO_SPECTRUM,
+            found.evidence,
+        )
 
 
 class _Bearing:
@@ -115,11 +135,11 @@ class _Bearing:
         bearing: Bearing,
         settings: AnalysisSettings,
         kept: KeptSegments,
-        coverage: float,
+        n_expected: int,
     ) -> None:
         self._unit, self._bearing, self._settings = unit, bearing, settings
         self._segments = segments = list(kept.segments)
-        self._min_segments, self._coverage = kept.min_segments, coverage
+        self._min_segments = kept.min_segments
         ids = [channel.id for channel in unit.channels]
         rows = self._rows = [ids.index(id_) for id_ in bearing.channels]
         self._usable = np.array([s.order_usable[:, rows] for s in segments])  # (n, 2, 4)
@@ -133,6 +153,7 @@ class _Bearing:
         if kept.frequency_hz is not None:
             self.spectrum = average(kept.frequency_hz, self._bins, self._usable[:, ORDER1])
         self._n_segments = int(self._whole.sum())
+        self._coverage = self._n_segments / n_expected
         self._lines = self._order_lines()
         axes_quality = self._lines[ORDER1].axes_quality(unit.rotation_sense)
         self._doubts = worst((self._steadiness(), axes_quality))
@@ -146,12 +167,18 @@ class _Bearing:
         return Evidence.AMPLITUDE_AND_PHASE if phased else Evidence.AMPLITUDE_ONLY
 
     def readings(
-        self, position: Found
+        self, position: Found, found: DynamicStiffness | Reason | None
     ) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
-        """Return all readings but the preferred stiffness, their budgets, and the film or None."""
+        """Return all readings but the preferred stiffness, their budgets, and the film or None.
+
+        Parameters
+        ----------
+        found
+            Result of `dynamic` for `film_spectrum`, if there is such a spectrum.
+        """
         unit, segments = self._unit, self._segments
         speed = segments[-1].speed
-        dynamic, dynamic_budgets, film = self._dynamic()
+        dynamic, dynamic_budgets, film = self._dynamic(found)
         parts: list[Found] = [
             with_budgets({"speed_rpm": (speed.rpm, speed.budget)}),
             slow_results(segments, slow_channels(unit, self._bearing)),
@@ -260,29 +287,33 @@ class _Bearing:
         found = self._lines[line].readings(quality_of)
         return with_budgets({**found, "frequency_hz": self._frequency(line)}, prefix)
 
-    def _dynamic(self) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
-        """Return readings, budgets and the fitted film (or None) of the `dynamic` estimator."""
-        if self.spectrum is None:
-            return dict.fromkeys(DYNAMIC_NAMES, missing(Reason.NOT_MEASURED)), {}, None
-        settings, quality = self._settings.dynamic, self._line_quality(*range(len(self._rows)))
-        if isinstance(quality, Reading) or not self._n_segments:
-            reason = quality.quality if isinstance(quality, Reading) else quality
-            nothing = None, (0.0, 0.0), bad(reason.reason), settings
-            return dynamic_readings(self._bearing, *nothing)
+    def film_spectrum(self) -> FilmSpectrum | None:
+        """Return the spectrum over the segments in which all channels are usable, if possible."""
+        quality = self._line_quality(*range(len(self._rows)))
+        if self.spectrum is None or isinstance(quality, Reading) or not self._n_segments:
+            return None
         whole = [s for s, counts in zip(self._segments, self._whole, strict=True) if counts]
         turns_hz = [float(segment.order_frequency_hz[ORDER1]) for segment in whole]
         spectrum = self.spectrum
         if not self._whole.all():
             all_usable = np.ones((len(whole), len(self._rows)), dtype=np.bool_)
             spectrum = average(spectrum.frequency_hz, self._bins[self._whole], all_usable)
-        return dynamic_readings(
-            self._bearing,
-            spectrum,
-            (min(turns_hz), max(turns_hz)),
-            quality,
-            settings,
-            self._n_integrations,
-        )
+        turn_hz = (min(turns_hz), max(turns_hz))
+        return FilmSpectrum(spectrum, self._bearing.bracket, turn_hz, self._n_integrations)
+
+    def _dynamic(
+        self, found: DynamicStiffness | Reason | None
+    ) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
+        """Return readings, budgets and the fitted film (or None) of the `dynamic` estimator."""
+        if self.spectrum is None:
+            return dict.fromkeys(DYNAMIC_NAMES, missing(Reason.NOT_MEASURED)), {}, None
+        quality = self._line_quality(*range(len(self._rows)))
+        if found is None or isinstance(quality, Reading):
+            reason = quality.quality if isinstance(quality, Reading) else quality
+            return dict.fromkeys(DYNAMIC_NAMES, missing(reason.reason)), {}, None
+        if isinstance(found, Reason):
+            return dict.fromkeys(DYNAMIC_NAMES, missing(found)), {}, None
+        return *dynamic_readings(self._bearing, found, quality), found
 
     @property
     def _n_integrations(self) -> tuple[int, int]:

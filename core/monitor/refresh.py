@@ -9,8 +9,8 @@ import numpy as np
 from core.condition.probe_axes import Growth
 from core.condition.shaft_readings import measured_growth, measures_growth, position_results
 from core.machine.unit import Bearing, Unit
-from core.monitor.assessment import AnalysisSettings, Assessment, AveragingWindow, OrbitTrace
-from core.monitor.bearing_readings import bearing_readings
+from core.monitor.assessment import Assessment, AveragingWindow, OrbitTrace
+from core.monitor.bearing_readings import UnitReadings
 from core.monitor.overall_readings import polled_readings, recent_readings
 from core.quality import worst
 from core.samples.ring import Window
@@ -38,26 +38,31 @@ class Refresh:
 
     Parameters
     ----------
-    kept
-        Segments or polls to average, at least one.
+    unit_readings
+        Readings of all bearings over the same segments or polls.
     newest
         Samples of the newest segment or poll.
-    n_expected
-        Number of segments possible since the epoch began, at most a full averaging window.
     n_voided
         Number of segments interrupted by gaps or restarts since the service started.
     last_growth
         Last measured thermal growth of the gaps; None if there is none.
     """
 
-    unit: Unit
+    unit_readings: UnitReadings
     bearing: Bearing
-    settings: AnalysisSettings
-    kept: KeptSegments
     newest: Window
-    n_expected: int
     n_voided: int
     last_growth: Growth | None
+
+    @property
+    def unit(self) -> Unit:
+        """Unit of the bearing."""
+        return self.unit_readings.unit
+
+    @property
+    def kept(self) -> KeptSegments:
+        """Averaged segments or polls, at least one."""
+        return self.unit_readings.kept
 
     @cached_property
     def averaged(self) -> AveragingWindow:
@@ -72,7 +77,7 @@ class Refresh:
             n_segments=n_segments,
             n_segments_wanted=self.kept.n_segments,
             n_voided=self.n_voided,
-            coverage=n_segments / self.n_expected,
+            coverage=n_segments / self.unit_readings.n_expected,
             duration_s=(last.stop_index - first.first_index) / self.unit.rate_hz,
         )
 
@@ -83,10 +88,8 @@ class Refresh:
 
     def assessment(self) -> Assessment:
         """Return the assessment of the bearing, computed from this input."""
-        newest, rows, coverage = self._segment, self._rows, self.averaged.coverage
-        found = bearing_readings(
-            self.unit, self.bearing, self.settings, self.kept, coverage, self._position
-        )
+        newest, rows = self._segment, self._rows
+        found = self.unit_readings.of(self.bearing, self._position)
         return Assessment(
             unit=self.unit.id,
             bearing=self.bearing.id,

@@ -1,6 +1,5 @@
 """Averaged cross-spectra of the four channels of a bearing, and their statistics."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -162,32 +161,34 @@ SMEAR_BINS_SQUARED = 1.0 / 3.0
 
 
 def correlated_sum(
-    terms: FloatArray, lines: npt.NDArray[np.int64], products: FloatArray | Sequence[float]
+    terms: FloatArray, lines: npt.NDArray[np.int64], products: FloatArray
 ) -> FloatArray:
-    """Return the covariance of n sums over lines; terms up to 2 bins apart are correlated.
+    """Return the covariance of sums over lines; terms up to 2 bins apart are correlated.
 
     Parameters
     ----------
-    terms : (..., n_lines, n, m)
-        Standard deviations of the m independent real parts of each sum's terms.
-    lines : (n_lines,)
+    terms : (n, ..., n_sums, n_parts, n_lines)
+        Standard deviations of the independent real parts of each sum's terms.
+    lines : (n, n_lines)
         Bin index of each line, ascending.
-    products : (3, m) or (3,)
-        Correlation of each part, or of all parts, 0, 1 and 2 bins apart.
+    products : (3, n_parts)
+        Correlation of each part 0, 1 and 2 bins apart; 1 for the same line.
 
     Returns
     -------
-    (..., n, n); no variance is negative if `products` are correlations of a real process.
+    (n, ..., n_sums, n_sums); no variance is negative if `products` are correlations of a real
+    process.
     """
-    *outer, _, n, m = terms.shape
-    spread = np.zeros((*outer, n, int(lines[-1] - lines[0]) + 1, m))
-    spread[..., lines - lines[0], :] = np.swapaxes(terms, -3, -2)
-    here, *apart = np.asarray(products).reshape(3, -1)
-    smoothed = here * spread
-    for distance, correlation in enumerate(apart, 1):
-        smoothed[..., :-distance, :] += 2.0 * correlation * spread[..., distance:, :]
-    flat = (*outer, n, -1)
-    covariance: FloatArray = smoothed.reshape(flat) @ np.swapaxes(spread.reshape(flat), -1, -2)
+    apart = np.zeros((4, products.shape[1]))
+    apart[:3] = products
+    smoothed = terms.copy()
+    for places in (1, 2):  # lines 2 bins apart may be neighbours
+        distance = np.minimum(lines[:, places:] - lines[:, :-places], 3)
+        correlation = 2.0 * np.ascontiguousarray(apart[distance].swapaxes(1, 2))
+        shape = len(lines), *(1,) * (terms.ndim - 3), *correlation.shape[1:]
+        smoothed[..., :-places] += correlation.reshape(shape) * terms[..., places:]
+    flat = (*terms.shape[:-2], -1)
+    covariance: FloatArray = smoothed.reshape(flat) @ np.swapaxes(terms.reshape(flat), -1, -2)
     return 0.5 * (covariance + np.swapaxes(covariance, -1, -2))
 
 

@@ -147,8 +147,10 @@ def turning_factors(n_samples: int, rate_hz: float, frequency_hz: FloatArray) ->
     n_coarse = -(-n_samples // FINE_STEPS)
     fine = np.exp(np.outer(np.arange(FINE_STEPS), turn_rad))
     coarse = np.exp(np.outer(FINE_STEPS * np.arange(n_coarse), turn_rad))
-    factors: ComplexArray = (coarse[:, np.newaxis] * fine).reshape(-1, turn_rad.size)[:n_samples]
-    return factors
+    factors = np.empty((n_coarse, FINE_STEPS, turn_rad.size), dtype=np.complex128)
+    for line in range(turn_rad.size):  # an inner loop over the few lines would be slow
+        np.multiply(coarse[:, line, np.newaxis], fine[:, line], out=factors[..., line])
+    return factors.reshape(-1, turn_rad.size)[:n_samples]
 
 
 def line_phasors(tapered_samples: FloatArray, factors: ComplexArray) -> ComplexArray:

@@ -6,9 +6,11 @@ running speed contain runout and are left out.
 """
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.machine.unit import BracketDynamics
@@ -19,9 +21,14 @@ from core.spectra.cross_spectrum import (
     independent_segments,
     phasor_power_per_density,
 )
-from core.stiffness.dynamic_lines import DynamicSettings, probe_noise_power, used_lines
-from core.stiffness.film_covariance import EACH_ROW, BracketChanges, FilmFit
-from core.stiffness.film_fit import N_ITERATIONS, NormalEquations, line_weights, smoother
+from core.stiffness.dynamic_lines import (
+    DynamicSettings,
+    between_harmonics,
+    probe_noise_power,
+    used_lines,
+)
+from core.stiffness.film_covariance import DAMPING, DELAY, MASS, STIFFNESS, FilmFits
+from core.stiffness.film_fit import N_ITERATIONS, FilmLines, line_weights
 
 MIN_LINES = 12
 """Smallest number of usable lines for a result."""
@@ -33,10 +40,6 @@ highest line."""
 MAX_MASS_STD = 0.5
 """Largest standard uncertainty of a fitted mass as a fraction of the largest plausible mass of the
 bracket. Beyond it the lines do not determine the mass, and there is no result."""
-
-STIFFNESS, MASS, DAMPING, DELAY = range(4)
-"""Indices of the bracket properties that can change: relative stiffness, mass in kg, damping in
-N·s/m, and delay of the bearing channels in s."""
 
 
 @dataclass(frozen=True)
@@ -108,16 +111,9 @@ class DynamicStiffness:
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
 
-def dynamic_stiffness(
-    spectrum: CrossSpectrum,
-    bracket: BracketDynamics,
-    turn_hz: tuple[float, float],
-    settings: DynamicSettings,
-    n_integrations: tuple[int, int] = (2, 2),
-) -> DynamicStiffness | Reason:
-    """Return a film's coefficients fitted to a spectrum, or the reason why there is no result.
-
-    An unknown mass of the bracket is fitted with the film, one mass for both directions.
+@dataclass(frozen=True)
+class FilmSpectrum:
+    """Measured spectrum of one bearing, to which a film is fitted.
 
     Parameters
     ----------
@@ -129,115 +125,168 @@ def dynamic_stiffness(
         Number of integrations of v_x and v_y to displacement: 2 for acceleration, 1 for velocity,
         0 for displacement. At very high coherence the residual is the integration error; the number
         affects only the stated uncertainty.
+    """
+
+    spectrum: CrossSpectrum
+    bracket: BracketDynamics
+    turn_hz: tuple[float, float]
+    n_integrations: tuple[int, int] = (2, 2)
+
+
+def dynamic_stiffness(
+    spectrum: CrossSpectrum,
+    bracket: BracketDynamics,
+    turn_hz: tuple[float, float],
+    settings: DynamicSettings,
+    n_integrations: tuple[int, int] = (2, 2),
+) -> DynamicStiffness | Reason:
+    """Return the film of one bearing as `films` does; parameters as in `FilmSpectrum`."""
+    return films([FilmSpectrum(spectrum, bracket, turn_hz, n_integrations)], settings)[0]
+
+
+def films(
+    measured: Sequence[FilmSpectrum], settings: DynamicSettings
+) -> list[DynamicStiffness | Reason]:
+    """Return the films' coefficients fitted to spectra, or the reasons why there is no result.
+
+    The bearings of a unit are fitted in common arrays; their results do not depend on each other.
+    An unknown mass of a bracket is fitted with the film, one mass for both directions.
 
     Raises
     ------
     ValueError
         If the channels were averaged over different segments, or the speed is not positive.
     """
-    n_averaged = int(spectrum.n_segments.max())
-    if np.any(spectrum.n_segments != n_averaged):
-        raise ValueError(f"channels averaged over different segments: {spectrum.n_segments}")
-    if n_averaged < settings.min_segments:
-        return Reason.FEW_SEGMENTS
-    lines = used_lines(spectrum, turn_hz, settings)
-    if lines.size < MIN_LINES:
-        return Reason.INSUFFICIENT_EXCITATION
-    n_segments = independent_segments(n_averaged, settings.overlap)
-    noise_power, floor_std = probe_noise_power(spectrum, turn_hz, settings, n_segments)
-    frequency_hz, matrix = spectrum.frequency_hz[lines], spectrum.matrix[lines]
-    smoothing = smoother(tuple(lines.tolist()))
-    bin_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
-    # error of each bearing line from integration with the line's frequency
-    slope = np.array(n_integrations) * bin_hz / frequency_hz[:, np.newaxis]
-    smear_share = SMEAR_BINS_SQUARED * slope**2
-
-    def fitted(bracket: BracketDynamics) -> FilmFit | None:
-        stiffness = bracket.dynamic_stiffness_n_per_m(frequency_hz)
-        equations = NormalEquations(matrix, 2.0 * np.pi * frequency_hz, stiffness, noise_power)
-        weight = line_weights(equations, smoothing)
-        if weight is None:
-            return None
-        return FilmFit(equations, weight, lines, smoothing, smear_share, n_segments, floor_std)
-
-    fit = fitted(bracket)
-    seeks_mass, max_mass_std_kg = bracket.mass_kg is None, MAX_MASS_STD * bracket.max_mass_kg
-    for _ in range(N_ITERATIONS if seeks_mass else 0):
-        heavier = None if fit is None else _with_mass(bracket, fit)
-        if heavier is None:
-            return Reason.INSUFFICIENT_EXCITATION
-        bracket, fit = heavier, fitted(heavier)
-    if fit is None:
-        return Reason.INSUFFICIENT_EXCITATION
-    noise_um2_per_hz = noise_power / phasor_power_per_density(bin_hz)
-    found = _result(bracket, fit, frequency_hz, noise_um2_per_hz, seeks_mass=seeks_mass)
-    convinces = _convinces(found, settings) and not found.bracket_mass_std_kg > max_mass_std_kg
-    return found if convinces else Reason.INSUFFICIENT_EXCITATION
+    found: list[DynamicStiffness | Reason] = [Reason.FEW_SEGMENTS] * len(measured)
+    alike: dict[tuple[float, float], list[int]] = {}
+    for place, each in enumerate(measured):
+        n_segments = each.spectrum.n_segments
+        if n_segments.min() != n_segments.max():
+            raise ValueError(f"channels averaged over different segments: {n_segments}")
+        if n_segments[0, 0] >= settings.min_segments:
+            alike.setdefault(each.turn_hz, []).append(place)
+    for places in alike.values():
+        with np.errstate(divide="ignore", invalid="ignore"):  # of bearings without a result
+            fitted = _fitted([measured[place] for place in places], settings)
+        for place, result in zip(places, fitted, strict=True):
+            found[place] = Reason.INSUFFICIENT_EXCITATION
+            if result is not None and _convinces(result, measured[place].bracket, settings):
+                found[place] = result
+    return found
 
 
-def _bracket_changes(bracket: BracketDynamics, fit: FilmFit) -> BracketChanges:
-    omega = fit.equations.ratio * fit.equations.omega_unit
-    changes = np.zeros((4, omega.size), dtype=np.complex128)
-    changes[STIFFNESS] = bracket.stiffness_n_per_m
-    changes[MASS] = -(omega**2)
-    changes[DAMPING] = 1j * omega
-    # a delay turns the phase back by ω times the delay
-    changes[DELAY] = 1j * omega * fit.equations.bracket_n_per_m
-    return BracketChanges(fit, changes)
-
-
-def _with_mass(bracket: BracketDynamics, fit: FilmFit) -> BracketDynamics | None:
-    """Return the bracket with a mass fitted to the residual force; None if it cannot be fitted."""
-    found = _bracket_changes(bracket, fit).estimate([MASS])
-    if found is None:
-        return None
-    highest = float(fit.equations.ratio[-1]) * fit.equations.omega_unit
-    limit_kg = MAX_INERTIA_SHARE * bracket.stiffness_n_per_m / highest**2
-    mass_kg = (bracket.mass_kg or 0.0) + float(found.value[0])
-    return replace(bracket, mass_kg=min(max(mass_kg, -limit_kg), limit_kg))
-
-
-def _result(
-    bracket: BracketDynamics,
-    fit: FilmFit,
-    frequency_hz: FloatArray,
-    noise_um2_per_hz: FloatArray,
-    *,
-    seeks_mass: bool,
-) -> DynamicStiffness:
-    changes = _bracket_changes(bracket, fit)
-    mass = changes.estimate([MASS]) if seeks_mass else None
-    delay = changes.estimate([DELAY, MASS])
-    per = changes.per.copy()
-    if mass is None:
-        covariance = fit.spread(fit.own_influences[:, np.newaxis], EACH_ROW)
-    else:
-        covariance = changes.film_covariance([MASS], mass.influences)
-        for change in (STIFFNESS, DAMPING, DELAY):  # the fitted mass follows
-            per[change] += float(changes.follow(change, [MASS])[0]) * changes.per[MASS]
-    omega_unit = fit.equations.omega_unit
-    scale = np.array([1.0, 1.0, omega_unit, omega_unit])
-    return DynamicStiffness(
-        coefficients=fit.unknowns / scale,
-        covariance=covariance * np.outer(1.0 / scale, 1.0 / scale),
-        changes=per / scale,
-        bracket_mass_kg=bracket.mass_kg or 0.0,
-        bracket_mass_std_kg=0.0 if mass is None else float(mass.std[0]),
-        delay_s=0.0 if delay is None else float(delay.value[0]),
-        delay_std_s=math.inf if delay is None else float(delay.std[0]),
-        delay_per_damping=(
-            0.0 if delay is None else float(changes.follow(DAMPING, [DELAY, MASS])[0])
-        ),
-        coherence=fit.coherence,
-        coherence_segments=fit.coherence_segments,
-        lack_of_fit=fit.lack_of_fit,
-        frequency_hz=frequency_hz,
-        probe_noise_um2_per_hz=noise_um2_per_hz,
-        noise_share=1.0 - fit.equations.signal_share(fit.weight),
+def _fitted(
+    measured: Sequence[FilmSpectrum], settings: DynamicSettings
+) -> list[DynamicStiffness | None]:
+    """Return the fitted film of each bearing, or None; all have the same range of speed."""
+    spectra, turn_hz = [each.spectrum for each in measured], measured[0].turn_hz
+    frequency_hz = spectra[0].frequency_hz
+    between = between_harmonics(frequency_hz, turn_hz, settings.guard_bins)
+    used = used_lines(spectra, between, settings)
+    enough = [own.size >= MIN_LINES for own in used]
+    if not all(enough):
+        some = [each for each, kept in zip(measured, enough, strict=True) if kept]
+        films_found = iter(_fitted(some, settings) if some else [])
+        return [next(films_found) if kept else None for kept in enough]
+    n_segments = np.array(
+        [[independent_segments(int(s.n_segments[0, 0]), settings.overlap)] for s in spectra]
     )
+    noise_power, floor_std = probe_noise_power(spectra, between, settings, n_segments)
+    brackets = [each.bracket for each in measured]
+    bin_hz = float(frequency_hz[1] - frequency_hz[0])
+    lines = FilmLines([spectrum.matrix for spectrum in spectra], used, frequency_hz, noise_power)
+    # error of each bearing line from integration with the line's frequency
+    slope = np.array([each.n_integrations for each in measured])[..., np.newaxis] * bin_hz
+    smear_share = SMEAR_BINS_SQUARED * (slope / lines.frequency_hz[:, np.newaxis]) ** 2
+    stiffness = np.array([[bracket.stiffness_n_per_m] for bracket in brackets])
+    damping = np.array([[bracket.damping_n_s_per_m] for bracket in brackets])
+    mass_kg = np.array([[bracket.mass_kg or 0.0] for bracket in brackets])
+    seeks = np.array([bracket.mass_kg is None for bracket in brackets])
+    omega = lines.omega
+    changes = np.empty((len(measured), 4, omega.shape[1]), dtype=np.complex128)
+    changes[:, STIFFNESS], changes[:, MASS] = stiffness, -(omega**2)
+    changes[:, DAMPING] = 1j * omega
+    moves = np.ones(len(measured), dtype=np.bool_)
+
+    def fit() -> tuple[FilmFits, npt.NDArray[np.bool_]]:
+        bracket_n_per_m = stiffness - mass_kg * omega**2 + 1j * omega * damping
+        # a delay turns the phase back by ω times the delay
+        changes[:, DELAY] = 1j * omega * bracket_n_per_m
+        weight, moving = line_weights(lines, bracket_n_per_m)
+        found = FilmFits(
+            lines, weight, bracket_n_per_m, changes, smear_share, n_segments, floor_std
+        )
+        return found, moves & moving
+
+    found, moves = fit()
+    limit_kg = MAX_INERTIA_SHARE * stiffness / omega[:, -1:] ** 2
+    for _ in range(N_ITERATIONS if seeks.any() else 0):
+        heavier = mass_kg + found.estimate([MASS]).value
+        moves &= ~(seeks & np.isnan(heavier[:, 0]))
+        heavier = np.minimum(np.maximum(heavier, -limit_kg), limit_kg)
+        mass_kg = np.where((seeks & moves)[:, np.newaxis], heavier, mass_kg)
+        found, moves = fit()
+    if not moves.any():
+        return [None] * len(measured)
+    results = _results(found, mass_kg[:, 0], seeks, bin_hz)
+    return [
+        result if moving else None for result, moving in zip(results, moves.tolist(), strict=True)
+    ]
 
 
-def _convinces(found: DynamicStiffness, settings: DynamicSettings) -> bool:
+def _results(
+    fits: FilmFits, mass_kg: FloatArray, seeks_mass: npt.NDArray[np.bool_], bin_hz: float
+) -> list[DynamicStiffness]:
+    delay, per = fits.estimate([DELAY, MASS]), fits.per
+    delay_std = np.sqrt(fits.covariance(delay.weights)[:, 0, 0, 0])
+    delay_per_damping = fits.follow(DAMPING, [DELAY, MASS])[:, 0]
+    covariance, mass_std_kg = fits.film_covariance(None), np.zeros(len(mass_kg))
+    if seeks_mass.any():
+        mass = fits.estimate([MASS])
+        whole = seeks_mass & ~np.isnan(mass.value[:, 0])
+        std = np.sqrt(fits.covariance(mass.weights)[:, 0, 0, 0])
+        mass_std_kg = np.where(whole, std, 0.0)
+        covariance[whole] = fits.film_covariance(mass)[whole]
+        per = per.copy()
+        for change in (STIFFNESS, DAMPING, DELAY):  # the fitted mass follows
+            follows = np.where(whole, fits.follow(change, [MASS])[:, 0], 0.0)
+            per[:, change] += follows[:, np.newaxis, np.newaxis] * per[:, MASS]
+    lines = fits.lines
+    scale = (lines.omega_unit ** (0.0, 0.0, 1.0, 1.0))[:, np.newaxis]
+    coefficients = fits.unknowns / scale
+    covariance /= scale[..., np.newaxis] * scale[..., np.newaxis, :]
+    per = per / scale[:, np.newaxis]
+    coherence, segments, lack = fits.coherence, fits.coherence_segments, fits.lack_of_fit
+    noise_um2_per_hz = lines.noise_power / phasor_power_per_density(bin_hz)
+    delay_s, share = delay.value[:, 0], fits.signal_share
+    unseparable = np.isnan(delay_s)
+    sizes = lines.counted.sum(axis=(1, 2)).astype(int).tolist()
+    return [
+        DynamicStiffness(
+            coefficients=coefficients[n],
+            covariance=covariance[n],
+            changes=per[n],
+            bracket_mass_kg=float(mass_kg[n]),
+            bracket_mass_std_kg=float(mass_std_kg[n]),
+            delay_s=0.0 if unseparable[n] else float(delay_s[n]),
+            delay_std_s=math.inf if unseparable[n] else float(delay_std[n]),
+            delay_per_damping=0.0 if unseparable[n] else float(delay_per_damping[n]),
+            coherence=coherence[n],
+            coherence_segments=segments[n],
+            lack_of_fit=lack[n],
+            frequency_hz=lines.frequency_hz[n, :size],
+            probe_noise_um2_per_hz=noise_um2_per_hz[n],
+            noise_share=1.0 - float(share[n]),
+        )
+        for n, size in enumerate(sizes)
+    ]
+
+
+def _convinces(
+    found: DynamicStiffness, bracket: BracketDynamics, settings: DynamicSettings
+) -> bool:
+    if found.bracket_mass_std_kg > MAX_MASS_STD * bracket.max_mass_kg:
+        return False
     if 1.0 - found.noise_share < settings.min_signal_share:
         return False
     largest = float(np.abs(np.diag(found.k_n_per_m)).max())

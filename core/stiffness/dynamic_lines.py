@@ -1,6 +1,7 @@
 """Settings of `dynamic`, selection of its spectral lines, and noise floor of the shaft probes."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,28 +68,30 @@ class DynamicSettings:
 
 
 def used_lines(
-    spectrum: CrossSpectrum, turn_hz: tuple[float, float], settings: DynamicSettings
-) -> npt.NDArray[np.int64]:
-    """Return the indices of the lines between harmonics that have motion and little leakage."""
-    power = np.diagonal(spectrum.matrix, axis1=1, axis2=2).real
-    used = _between_harmonics_of(settings.band_hz, spectrum, turn_hz, settings)
-    used &= np.all(power > 0.0, axis=1)
-    inside = np.flatnonzero(used)
-    if inside.size:
-        band = slice(int(inside[0]), int(inside[-1]) + 1)
-        used[band] &= little_leakage(power[:, :BEARING_X], band)
-    return np.flatnonzero(used)
+    spectra: Sequence[CrossSpectrum], between: npt.NDArray[np.bool_], settings: DynamicSettings
+) -> list[npt.NDArray[np.int64]]:
+    """Return for each spectrum the indices of the lines that have motion and little leakage.
+
+    Parameters
+    ----------
+    between : (n_lines,)
+        Mask from `between_harmonics`.
+    """
+    inside = np.flatnonzero(between & _in_band(settings.band_hz, spectra[0]))
+    if inside.size == 0:
+        return [inside] * len(spectra)
+    power = np.array([np.einsum("lii->il", spectrum.matrix).real for spectrum in spectra])
+    band, shaft = slice(int(inside[0]), int(inside[-1]) + 1), power[:, :BEARING_X]
+    little = little_leakage(shaft.reshape(-1, shaft.shape[-1]).T, band)
+    little = np.all(little.reshape(-1, len(spectra), BEARING_X), axis=2)[inside - band.start]
+    used = little.T & np.all(power[:, :, inside] > 0.0, axis=1)
+    return [inside[own] for own in used]
 
 
-def _between_harmonics_of(
-    band_hz: tuple[float, float],
-    spectrum: CrossSpectrum,
-    turn_hz: tuple[float, float],
-    settings: DynamicSettings,
-) -> npt.NDArray[np.bool_]:
-    """Return a mask of the lines of a band between the harmonics, (n_lines,)."""
-    inside = (spectrum.frequency_hz >= band_hz[0]) & (spectrum.frequency_hz <= band_hz[1])
-    return inside & between_harmonics(spectrum.frequency_hz, turn_hz, settings.guard_bins)
+def _in_band(band_hz: tuple[float, float], spectrum: CrossSpectrum) -> npt.NDArray[np.bool_]:
+    """Return a mask of the lines of a band, (n_lines,)."""
+    inside: npt.NDArray[np.bool_] = spectrum.frequency_hz >= band_hz[0]
+    return inside & (spectrum.frequency_hz <= band_hz[1])
 
 
 def between_harmonics(
@@ -131,41 +134,51 @@ def little_leakage(shaft_power: FloatArray, lines: slice = slice(None)) -> npt.N
 
     Returns
     -------
-    (n,)
+    (n, n_channels)
     """
     leaked = leakage_kernel(shaft_power.shape[0])[lines] @ shaft_power
-    own: npt.NDArray[np.bool_] = np.all(leaked <= MAX_LEAKAGE * shaft_power[lines], axis=1)
-    return own
+    little: npt.NDArray[np.bool_] = leaked <= MAX_LEAKAGE * shaft_power[lines]
+    return little
 
 
 def conditional_power(matrix: ComplexArray, given: ComplexArray, cross: ComplexArray) -> FloatArray:
-    """Return the power of n signals that is not coherent with two inputs, (n_lines, n).
+    """Return the power of two signals that is not coherent with two inputs, (..., 2, n_lines).
 
     Parameters
     ----------
-    matrix : (n_lines, n, n)
+    matrix : (..., 2, 2, n_lines)
         Cross-spectra of the signals.
-    given : (n_lines, 2, 2)
+    given : (..., 2, 2, n_lines)
         Cross-spectra of the two inputs.
-    cross : (n_lines, n, 2)
+    cross : (..., 2, 2, n_lines)
         Cross-spectra of the signals with the inputs, which are conjugated.
     """
-    determinant = (given[:, 0, 0] * given[:, 1, 1]).real - np.abs(given[:, 0, 1]) ** 2
-    usable = determinant > 1e-12 * (given[:, 0, 0] * given[:, 1, 1]).real
-    adjugate = np.empty_like(given)
-    adjugate[:, 0, 0], adjugate[:, 1, 1] = given[:, 1, 1], given[:, 0, 0]
-    adjugate[:, 0, 1], adjugate[:, 1, 0] = -given[:, 0, 1], -given[:, 1, 0]
-    explained = ((cross @ adjugate) * cross.conj()).sum(axis=2).real
-    own: FloatArray = np.diagonal(matrix, axis1=1, axis2=2).real.copy()
-    own[usable] -= explained[usable] / determinant[usable, np.newaxis]
-    return np.maximum(own, 0.0)
+    x, y, crossed = given[..., 0, 0, :].real, given[..., 1, 1, :].real, given[..., 0, 1, :]
+    product = x * y
+    determinant = product - np.abs(crossed) ** 2
+    usable = determinant > 1e-12 * product
+    to_x, to_y = cross[..., 0, :], cross[..., 1, :]
+    mixed = (to_x * crossed[..., np.newaxis, :] * to_y.conj()).real
+    explained = (
+        np.abs(to_x) ** 2 * y[..., np.newaxis, :] + np.abs(to_y) ** 2 * x[..., np.newaxis, :]
+    )
+    explained -= 2.0 * mixed
+    share = usable / np.where(usable, determinant, 1.0)
+    rest: FloatArray = own_power(matrix) - explained * share[..., np.newaxis, :]
+    return np.maximum(rest, 0.0)
+
+
+def own_power(matrix: ComplexArray) -> FloatArray:
+    """Return the power of the channels of cross-spectra (..., n, n, n_lines), (..., n, n_lines)."""
+    power: FloatArray = np.einsum("...iil->...il", matrix).real
+    return power
 
 
 def probe_noise_power(
-    spectrum: CrossSpectrum,
-    turn_hz: tuple[float, float],
+    spectra: Sequence[CrossSpectrum],
+    between: npt.NDArray[np.bool_],
     settings: DynamicSettings,
-    n_segments: float,
+    n_segments: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the mean squared phasors of the probes' noise, known or estimated in the quiet band.
 
@@ -175,37 +188,39 @@ def probe_noise_power(
 
     Parameters
     ----------
-    n_segments
-        Number of independent segments of the average; at least 3.
+    between : (n_lines,)
+        Mask from `between_harmonics`.
+    n_segments : (n, 1)
+        Number of independent segments of each average; at least 3.
 
     Returns
     -------
-    Power of each probe's noise, (2,) in µm², zero without lines in the quiet band; and its relative
-    standard uncertainty, (2,), zero if the power is known.
+    Power of each probe's noise, (n, 2) in µm², zero without lines in the quiet band; and its
+    relative standard uncertainty, (n, 2), zero if the power is known.
     """
+    nothing = np.zeros((len(spectra), 2))
     if settings.probe_noise_um2_per_hz is not None:
-        bin_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
+        bin_hz = float(spectra[0].frequency_hz[1] - spectra[0].frequency_hz[0])
         known = phasor_power_per_density(bin_hz) * np.array(settings.probe_noise_um2_per_hz)
-        return known, np.zeros(2)
-    quiet = _between_harmonics_of(settings.quiet_band_hz, spectrum, turn_hz, settings)
-    matrix = spectrum.matrix[quiet]
-    if matrix.shape[0] == 0:
-        return np.zeros(2), np.zeros(2)
+        return nothing + known, nothing
+    quiet = np.flatnonzero(between & _in_band(settings.quiet_band_hz, spectra[0]))
+    if quiet.size == 0:
+        return nothing, nothing
+    matrix = np.array([spectrum.matrix[quiet] for spectrum in spectra]).transpose(0, 2, 3, 1)
     shaft, bearing = slice(0, BEARING_X), slice(BEARING_X, None)
     rest = conditional_power(
         matrix[:, shaft, shaft], matrix[:, bearing, bearing], matrix[:, shaft, bearing]
     )
-    n_blocks = min(N_BLOCKS, rest.shape[0])
-    edges = np.linspace(0, rest.shape[0], n_blocks + 1).astype(np.int64)[:-1]
-    counts = np.diff(np.append(edges, rest.shape[0]))[:, np.newaxis]
-    sums = np.add.reduceat(rest, edges, axis=0)
+    n_blocks = min(N_BLOCKS, quiet.size)
+    edges = quiet.size * np.arange(n_blocks + 1) // n_blocks
+    counts = edges[1:] - edges[:-1]
+    sums = np.add.reduceat(rest, edges[:-1], axis=-1)
     # two fitted inputs take two degrees of freedom (Bendat and Piersol, 9.3)
     freedoms = n_segments - 2.0
-    spread = math.sqrt(CORRELATED_LINES / (counts.min() * freedoms))
+    spread = np.sqrt(CORRELATED_LINES / (counts.min() * freedoms))[..., np.newaxis]
     # average all parts with the same floor: the lowest part alone would be biased low
-    same = sums / counts <= (1.0 + SAME_FLOOR * math.sqrt(2.0) * spread) * (sums / counts).min(
-        axis=0
-    )
-    counted: FloatArray = (counts * same).sum(axis=0)
-    floor: FloatArray = (sums * same).sum(axis=0) / counted
+    lowest = (sums / counts).min(axis=-1, keepdims=True)
+    same = sums / counts <= (1.0 + SAME_FLOOR * math.sqrt(2.0) * spread) * lowest
+    counted: FloatArray = (counts * same).sum(axis=-1)
+    floor: FloatArray = (sums * same).sum(axis=-1) / counted
     return floor * n_segments / freedoms, np.sqrt(CORRELATED_LINES / (counted * freedoms))

@@ -6,11 +6,9 @@ import numpy as np
 
 from core.machine.unit import Bearing, BearingAccuracy, BracketDynamics
 from core.quality import GOOD, Quality, Reading, Reason, missing, uncertain, worst
-from core.spectra.cross_spectrum import CrossSpectrum
 from core.stiffness.agreement import FALSE_ALARM
 from core.stiffness.channel_budget import coherence_budget
-from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
-from core.stiffness.dynamic_lines import DynamicSettings
+from core.stiffness.dynamic import DynamicStiffness
 from core.stiffness.estimators import DYNAMIC_COEFFICIENTS
 from core.stiffness.stiffness_budget import (
     BRACKET,
@@ -25,6 +23,7 @@ from core.stiffness.stiffness_budget import (
 from core.uncertainty import (
     Budget,
     Budgeted,
+    Found,
     coverage_factor,
     random_line,
     systematic_line,
@@ -49,38 +48,19 @@ NAMES = (
 )
 
 
-def dynamic_readings(
-    bearing: Bearing,
-    spectrum: CrossSpectrum | None,
-    turn_hz: tuple[float, float],
-    quality: Quality,
-    settings: DynamicSettings,
-    n_integrations: tuple[int, int] = (2, 2),
-) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
-    """Return the readings of `dynamic`, their budgets, and the fitted film or None.
+def dynamic_readings(bearing: Bearing, found: DynamicStiffness, quality: Quality) -> Found:
+    """Return the readings of `dynamic` for a fitted film, and their budgets.
 
     Parameters
     ----------
-    spectrum
-        Cross-spectrum averaged over the segments in which all four channels were usable; None
-        without such segments.
-    turn_hz
-        Lowest and highest 1× frequency in these segments.
     quality
-        Quality of the input; without a spectrum, all readings are missing for its reason.
-    n_integrations
-        Number of integrations of v_x and v_y to displacement, as in `dynamic_stiffness`.
+        Quality of the input.
     """
-    if spectrum is None:
-        return dict.fromkeys(NAMES, missing(quality.reason)), {}, None
-    found = dynamic_stiffness(spectrum, bearing.bracket, turn_hz, settings, n_integrations)
-    if isinstance(found, Reason):
-        return dict.fromkeys(NAMES, missing(found)), {}, None
     damping = _damping_half_width(found, bearing.bracket, bearing.accuracy)
     quality = worst((quality, _fit_quality(found, bearing.accuracy.delay_s, damping)))
     coefficients = dynamic_budgets(found, bearing.bracket, bearing.accuracy)
     of_film = {name: (Reading(b.value, quality), b) for name, b in coefficients.items()}
-    return *with_budgets(of_film | _evidence(found, bearing, damping, quality)), found
+    return with_budgets(of_film | _evidence(found, bearing, damping, quality))
 
 
 def dynamic_budgets(

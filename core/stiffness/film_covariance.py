@@ -1,7 +1,9 @@
-"""Coherence and random covariance of a fitted film, and bracket changes from the residual force.
+"""Coherence and random covariance of fitted films, and bracket changes from the residual force.
 
 Every estimate is a linear function of ``Σ_lines w Σ_segments conj(f u) e``, with the weight w of a
-line, the residual force e, and the influence f of the shaft's motion u on the estimate.
+line, the residual force e, and the influence f of the shaft's motion u on the estimate. All
+influences are sums of the same six: the four regressors of a film, and the effects of the bracket's
+`FITTED` properties through the film. Their covariance is therefore calculated once.
 """
 
 from collections.abc import Sequence
@@ -20,287 +22,371 @@ from core.spectra.cross_spectrum import (
     WHITE_PRODUCTS,
     correlated_sum,
 )
-from core.stiffness.film_fit import N_UNKNOWNS, NormalEquations
+from core.stiffness.dynamic_lines import own_power
+from core.stiffness.film_fit import N_UNKNOWNS, FilmLines
 
 PART_PRODUCTS: FloatArray = np.array(
     [
-        *[WHITE_PRODUCTS] * 4,  # residual times the shaft's motion
+        *[WHITE_PRODUCTS] * 2,  # residual times the shaft's motion
         SMEARED_IN_PHASE,
-        SMEARED_IN_QUADRATURE,
-        *[SMEARED_APART] * 4,
+        *[SMEARED_APART] * 2,
         WHITE_PRODUCTS,  # probe noise in both
-        (0.0, 0.0, 0.0),
+        *[WHITE_PRODUCTS] * 2,
+        SMEARED_IN_QUADRATURE,
+        *[SMEARED_APART] * 2,
     ]
 ).T
-"""Correlation between lines 0, 1 and 2 bins apart, (3, 12), of the real and imaginary parts of
-`FilmFit._parts`."""
+"""Correlation between lines 0, 1 and 2 bins apart, (3, 11), of the parts of the error: real parts
+of the six of `FilmFits._parts`, then imaginary parts of the first five."""
 
-EACH_ROW = np.array([[0], [1]])
-BOTH_ROWS = np.array([[0, 1]])
-"""Rows whose residuals enter a group of estimates: each row alone, or both."""
+N_PARTS = 6
+
+STIFFNESS, MASS, DAMPING, DELAY = range(4)
+"""Indices of the bracket properties that can change: relative stiffness, mass in kg, damping in
+N·s/m, and delay of the bearing channels in s."""
+
+FITTED = (DELAY, MASS)
+"""Bracket properties that can be fitted together with the film."""
+
+N_INFLUENCES = N_UNKNOWNS + len(FITTED)
 
 
 @dataclass(frozen=True)
-class FilmFit:
-    """Weighted least-squares fit of a film, and the sources of its random errors.
+class BracketEstimate:
+    """Estimated changes of properties of the brackets of n bearings.
 
     Parameters
     ----------
-    weight : (n_lines, 2)
+    value : (n, n_fitted)
+        Estimates; NaN where the data do not separate the properties.
+    weights : (n, 1, 2, n_fitted, 6)
+        Weights of the six influences in the estimates, through the residual of each row.
+    """
+
+    value: FloatArray
+    weights: FloatArray
+
+
+@dataclass(frozen=True)
+class FilmFits:
+    """Weighted least-squares fits of the films of n bearings, and sources of their random errors.
+
+    Parameters
+    ----------
+    weight : (n, 2, n_used)
         Weights from `core.stiffness.film_fit.line_weights`.
-    lines : (n_lines,)
-        Bin index of each line, ascending.
-    smoothing : (n_lines, n_lines)
-        Matrix from `core.stiffness.film_fit.smoother`.
-    smear_share : (n_lines, 2)
+    bracket_n_per_m : (n, n_used)
+        Dynamic stiffness of the brackets.
+    changes : (n, 4, n_used)
+        Derivatives of the dynamic stiffness with respect to `STIFFNESS`, `MASS`, `DAMPING` and
+        `DELAY`.
+    smear_share : (n, 2, n_used)
         Power of the integration error as a fraction of the bearing's power.
-    n_segments
+    n_segments : (n, 1)
         Number of independent segments.
-    floor_std : (2,)
+    floor_std : (n, 2)
         Relative standard uncertainty of each probe's noise power; zero if it is known.
     """
 
-    equations: NormalEquations
+    lines: FilmLines
     weight: FloatArray
-    lines: npt.NDArray[np.int64]
-    smoothing: FloatArray
+    bracket_n_per_m: ComplexArray
+    changes: ComplexArray
     smear_share: FloatArray
-    n_segments: float
+    n_segments: FloatArray
     floor_std: FloatArray
 
     @cached_property
+    def _normal(self) -> tuple[FloatArray, FloatArray]:
+        normal, share = self.lines.normal(self.weight)
+        normal[~(share > 0.0)] = np.eye(N_UNKNOWNS)
+        return normal, share
+
+    @property
+    def signal_share(self) -> FloatArray:
+        """Smallest fraction of motion in the weighted shaft spectra of any direction, (n,)."""
+        return self._normal[1]
+
+    @cached_property
+    def _solved(self) -> FloatArray:
+        """Unknowns, and their derivatives with respect to each change, (n, 2, 4, 5)."""
+        brackets = np.concatenate([self.bracket_n_per_m[:, np.newaxis], self.changes], axis=1)
+        moments = self.lines.moments(self.weight, brackets)
+        return np.asarray(np.linalg.solve(self._normal[0], moments), dtype=np.float64)
+
+    @property
     def unknowns(self) -> FloatArray:
-        """Coefficients (k_i1, k_i2, c_i1, c_i2) of each row, in N/m, (2, 4)."""
-        return self.equations.solve(self.weight, self.equations.force)
+        """Coefficients (k_i1, k_i2, c_i1, c_i2) of each row, in N/m, (n, 2, 4)."""
+        return self._solved[..., 0]
+
+    @cached_property
+    def per(self) -> FloatArray:
+        """Derivatives of the unknowns with respect to each change, (n, 4, 2, 4)."""
+        return self._solved[..., 1:].transpose(0, 3, 1, 2)
 
     @cached_property
     def film(self) -> ComplexArray:
-        """Dynamic stiffness of the film in N/m, (n_lines, 2, 2)."""
-        return self.equations.film(self.unknowns)
+        """Dynamic stiffness of the films in N/m, (n, 2, 2, n_used)."""
+        return self.lines.film(self.unknowns)
+
+    @cached_property
+    def force_power(self) -> FloatArray:
+        """Power of the brackets' forces in (N/m)² µm², for each row, (n, 2, n_used)."""
+        power = np.abs(self.bracket_n_per_m[:, np.newaxis]) ** 2 * self.lines.bearing_power
+        return np.asarray(power)
+
+    @cached_property
+    def _force(self) -> ComplexArray:
+        """Cross-spectra of the brackets' forces with the shaft's motion, (n, 2, 2, n_used)."""
+        force: ComplexArray = self.bracket_n_per_m[:, np.newaxis, np.newaxis] * self.lines.cross
+        return force
 
     @cached_property
     def residual(self) -> FloatArray:
-        """Power of the residual force in (N/m)² µm², (n_lines, 2)."""
-        return self.equations.residual(self.unknowns)
+        """Power of the residual force in (N/m)² µm², (n, 2, n_used)."""
+        common = (self._force * self.film.conj()).real.sum(axis=2)
+        left: FloatArray = (
+            self.force_power - 2.0 * common + self.lines.modelled_power(self.unknowns)
+        )
+        return np.maximum(left, 0.0)
 
-    @property
+    @cached_property
     def coherence(self) -> FloatArray:
-        """Fraction of each bearing channel's weighted power explained by the film, (2,), 0 to 1."""
-        whole = (self.weight * self.equations.force_power).sum(axis=0)
-        share: FloatArray = 1.0 - (self.weight * self.residual).sum(axis=0) / whole
+        """Share of each bearing channel's weighted power explained by the film, (n, 2), 0 to 1."""
+        whole = _summed(self.weight, self.force_power)
+        share: FloatArray = 1.0 - _summed(self.weight, self.residual) / whole
         return np.minimum(np.maximum(share, 0.0), 1.0)
 
     @property
     def coherence_segments(self) -> FloatArray:
-        """Number of segments that makes a single line's coherence as certain as `coherence`, (2,).
+        """Number of segments that makes a line's coherence as certain as `coherence`, (n, 2).
 
         The unexplained fraction is residual over total power. Its error comes from each line's
         residual and power, with relative errors of ``1 / √n`` that are correlated by their ratio.
         The residual enters a second time through the weights.
         """
-        left, whole = self.weight * self.residual, self.weight * self.equations.force_power
-        left, whole = left / left.sum(axis=0), whole / whole.sum(axis=0)
-        moves = left + self.smoothing.T @ (whole - left)
-        shared = 2.0 * moves * whole * self.residual / self.equations.force_power
-        squares = (moves**2 + whole**2 - shared).sum(axis=0)
+        left, whole = self.weight * self.residual, self.weight * self.force_power
+        left /= left.sum(axis=-1, keepdims=True)
+        whole /= whole.sum(axis=-1, keepdims=True)
+        moves = left + (whole - left) @ self.lines.smoothing.swapaxes(1, 2)
+        shared = 2.0 * moves * whole * self.residual / self.force_power
+        squares = (moves**2 + whole**2 - shared).sum(axis=-1)
         variance = CORRELATED_LINES * squares / (self.n_segments - 2.0)  # two fitted inputs
         found: FloatArray = 1.0 + 2.0 * self.coherence / variance
         return found
 
+    @cached_property
+    def _common(self) -> ComplexArray:
+        """Residual times the shaft's conjugated motion without noise, (n, 2, 2, n_used)."""
+        return self._force - _times(self.film, self._motion)
+
     @property
     def lack_of_fit(self) -> FloatArray:
-        """Ratio of the residual's coherence with the shaft's motion to that by chance, (2,).
+        """Ratio of the residual's coherence with the shaft's motion to that by chance, (n, 2).
 
         The expected value is 1 if stiffness and damping are constant over the lines: the residual
         is then correlated with the shaft only by chance, according to `n_segments`.
         """
-        equations, ratio = self.equations, self.equations.ratio[:, np.newaxis, np.newaxis]
-        # moments of the residual with (u_1, u_2, iω u_1, iω u_2): real part, then ratio × imaginary
-        left = equations.force - np.einsum("lab,rb->lra", equations.true_gram, self.unknowns)
-        common = (left[..., :2] + 1j * left[..., 2:] / ratio).transpose(0, 2, 1)
-        shaft = equations.gram[:, :2, :2] + 1j * equations.gram[:, :2, 2:] / ratio
-        scaled = np.linalg.solve(shaft.transpose(0, 2, 1), common)
-        power = (common.conj() * scaled).sum(axis=1).real
-        whole = (self.weight * self.residual).sum(axis=0)
-        found: FloatArray = self.n_segments * (self.weight * power).sum(axis=0) / (2.0 * whole)
+        shaft, (x, y) = self.lines.shaft, self._common.swapaxes(0, 2).swapaxes(1, 2)
+        xx, yy = shaft[:, 0, 0, np.newaxis].real, shaft[:, 1, 1, np.newaxis].real
+        yx = shaft[:, 1, 0, np.newaxis]
+        own = np.abs(x) ** 2 * yy + np.abs(y) ** 2 * xx - 2.0 * (x.conj() * yx * y).real
+        power = own / (xx * yy - np.abs(yx) ** 2)
+        whole = _summed(self.weight, self.residual)
+        found: FloatArray = self.n_segments * _summed(self.weight, power) / (2.0 * whole)
         return found
 
     @cached_property
-    def own_influences(self) -> ComplexArray:
-        """Influence of the shaft's motion on the unknowns of each row, (2, n_lines, 4, 2)."""
-        ratio = self.equations.ratio
-        regressors = np.zeros((ratio.size, N_UNKNOWNS, 2), dtype=np.complex128)
-        regressors[:, (0, 1), (0, 1)] = 1.0
-        regressors[:, (2, 3), (0, 1)] = 1j * ratio[:, np.newaxis]
-        inverse = np.linalg.inv(self.equations.normal(self.weight))
-        own: ComplexArray = inverse[:, np.newaxis] @ regressors
-        return own
-
-    def spread(
-        self, influences: ComplexArray, rows: npt.NDArray[np.int64] = BOTH_ROWS
-    ) -> FloatArray:
-        """Return the covariance of groups of n estimates from their influences, (n_groups, n, n).
-
-        Parameters
-        ----------
-        influences : (n_groups, n_rows, n_lines, n, 2)
-            Influence of the shaft's motion on the estimates, through the residual of each row.
-        rows : (n_groups or 1, n_rows)
-            Force direction of each row of `influences`: 0 for x, 1 for y.
-        """
-        parts = (influences @ self._parts[rows]).view(np.float64)
-        of_rows = correlated_sum(parts, self.lines, PART_PRODUCTS).sum(axis=1)
-        weighted = (self.weight[..., np.newaxis] * self.film).transpose(1, 0, 2)[rows]
-        # per unit of noise power
-        slope = (influences.conj() * weighted[..., np.newaxis, :]).real.sum(axis=(1, 2))
-        slope = slope * self.equations.noise_power * self.floor_std
-        # the real part of conj(x) e with circular e has half its power (Bendat and Piersol, 9.2)
-        covariance: FloatArray = of_rows / (2.0 * self.n_segments)
-        covariance += slope @ slope.transpose(0, 2, 1)
-        return covariance
+    def _motion(self) -> ComplexArray:
+        """Cross-spectra of the shaft's motion without the probes' noise, (n, 2, 2, n_used)."""
+        motion = self.lines.shaft.copy()
+        np.einsum("niil->nil", motion)[...] -= self.lines.noise_power[..., np.newaxis]
+        return motion
 
     @cached_property
-    def _parts(self) -> ComplexArray:
-        """Six independent parts of the error per unit of influence, (2, n_lines, 2, 6).
-
-        Integration errors of neighbouring lines cancel in the part of an influence in phase with a
-        row's force. Their sizes use smoothed powers, which are free of the scatter of single lines.
-        """
-        shaft, root = self.equations.shaft, _hermitian_root(self.equations.shaft)
-        weight, film = self.weight.T[..., None, None], self.film.transpose(1, 0, 2)[..., None, :]
-        smear = (self._smoothed(self.equations.force_power) * self.smear_share).T[..., None, None]
-        smeared = np.minimum(weight * smear, 1.0)  # fraction of the smooth residual 1 / weight
-        rest = weight**2 * self.residual.T[..., None, None] * (1.0 - smeared)
-        across = film.conj().swapaxes(-1, -2)
-        force = (film @ shaft @ across).real
-        shared = shaft @ across / force
-        size = np.sqrt(self._smoothed(force[:, :, 0, 0].T).T)[..., None, None]
-        power = np.diagonal(shaft, axis1=1, axis2=2).real
-        smooth_root = np.sqrt(self._smoothed(power) / power)[:, :, np.newaxis] * root
-        # The probes' noise is in the residual and in the shaft's motion, with a common phase:
-        # E[x*e x*e] is not 0 as for independent signals (Isserlis 1918). The resulting reduction of
-        # some variances is neglected.
-        noise = self.equations.noise_power[:, np.newaxis]
-        parts = (
-            np.sqrt(rest) * root,
-            np.sqrt(weight * smeared) * size * shared,
-            np.sqrt(weight * smeared) * ((np.eye(2) - shared @ film) @ smooth_root),
-            weight * noise * across,
-        )
-        return np.concatenate(parts, axis=-1)
-
-    def _smoothed(self, power: FloatArray) -> FloatArray:
-        """Return a power spectrum (n_lines, ...), smoothed by local regression of its logarithm."""
-        smooth: FloatArray = np.exp(self.smoothing @ np.log(power))
-        return smooth
-
-
-def _hermitian_root(shaft: ComplexArray) -> ComplexArray:
-    """Return the Hermitian square roots of cross-spectra, (n_lines, 2, 2)."""
-    trace = (shaft[:, 0, 0] + shaft[:, 1, 1]).real
-    determinant = (shaft[:, 0, 0] * shaft[:, 1, 1]).real - np.abs(shaft[:, 0, 1]) ** 2
-    root = np.sqrt(np.maximum(determinant, 0.0))
-    # closed form of the 2 × 2 square root, by the theorem of Cayley and Hamilton
-    whole = shaft + root[:, np.newaxis, np.newaxis] * np.eye(2)
-    squared: ComplexArray = whole / np.sqrt(trace + 2.0 * root)[:, np.newaxis, np.newaxis]
-    return squared
-
-
-@dataclass(frozen=True)
-class BracketEstimate:
-    """Estimated changes of properties of the bracket.
-
-    Parameters
-    ----------
-    value : (n,)
-        Estimates.
-    std : (n,)
-        Random standard uncertainties of the estimates.
-    influences : (2, n_lines, n, 2)
-        Influence of the shaft's motion on the estimates, through the residual of each row.
-    """
-
-    value: FloatArray
-    std: FloatArray
-    influences: ComplexArray
-
-
-@dataclass(frozen=True)
-class BracketChanges:
-    """Changes of the bracket's dynamic stiffness, and their estimation from the residual.
-
-    The estimation is one Gauss-Newton step. It uses the shaft's motion through the fitted film
-    instead of the bearing's motion, whose noise would bias the estimates.
-
-    Parameters
-    ----------
-    stiffnesses : (n, n_lines)
-        Derivative of the dynamic stiffness with respect to each change.
-    """
-
-    fit: FilmFit
-    stiffnesses: ComplexArray
-
-    @cached_property
-    def per(self) -> FloatArray:
-        """Derivative of the film's unknowns with respect to each change, (n, 2, 4)."""
-        equations = self.fit.equations
-        return equations.solve(self.fit.weight, equations.moment(self.stiffnesses))
+    def _relative(self) -> ComplexArray:
+        """Changes relative to the bracket's dynamic stiffness, (n, 4, n_used)."""
+        return self.changes / self.bracket_n_per_m[:, np.newaxis]
 
     @cached_property
     def _left(self) -> ComplexArray:
-        """Residual per unit of each change after a new fit of the film, (n_lines, n, 2 rows, 2)."""
-        relative = (self.stiffnesses / self.fit.equations.bracket_n_per_m).T
-        left: ComplexArray = relative[:, :, np.newaxis, np.newaxis] * self.fit.film[:, np.newaxis]
-        left -= self.fit.equations.film(self.per)
-        return left
-
-    @cached_property
-    def _motion(self) -> ComplexArray:
-        """Cross-spectra of the shaft's motion without the probes' noise, (n_lines, 2, 2)."""
-        return self.fit.equations.shaft - np.diag(self.fit.equations.noise_power)
+        """Residual per unit of each change after a new fit of the film, (n, 4, 2, 2, n_used)."""
+        through = self._relative[:, :, np.newaxis, np.newaxis] * self.film[:, np.newaxis]
+        through -= self.lines.film(self.per)
+        return through
 
     @cached_property
     def _information(self) -> FloatArray:
-        moved = self._left @ self._motion[:, np.newaxis]
-        information: FloatArray = np.einsum(
-            "lr,lprk,lqrk->pq", self.fit.weight, moved, self._left.conj()
-        ).real
-        return information
+        """Information on the changes in the residual, (n, 4, 4)."""
+        moved = _times(self._left, self._motion[:, np.newaxis])
+        moved *= self.weight[:, np.newaxis, :, np.newaxis]
+        return _real_product(moved, self._left)
 
     def follow(self, change: int, fitted: Sequence[int]) -> FloatArray:
-        """Return the shift of fitted changes per unit of another, unfitted change, (n_fitted,)."""
-        information = self._information
-        step = np.linalg.solve(information[np.ix_(fitted, fitted)], information[fitted, change])
-        return np.asarray(-step, dtype=np.float64)
+        """Return the shift of fitted changes per unit of another, unfitted one, (n, n_fitted)."""
+        inverse, _ = _inverse(self._information[:, fitted][..., fitted])
+        return -(inverse @ self._information[:, fitted, change, np.newaxis])[..., 0]
 
-    def estimate(self, fitted: Sequence[int]) -> BracketEstimate | None:
-        """Return joint estimates of the fitted changes; None if the data do not separate them."""
-        information = self._information[np.ix_(fitted, fitted)]
-        if not np.all(np.linalg.eigvalsh(information) > 0.0):
-            return None
-        equations = self.fit.equations
-        # residual times conjugated shaft motion, without the probes' noise: (n_lines, 2, 2)
-        common = equations.bracket_n_per_m[:, np.newaxis, np.newaxis] * equations.cross
-        common = common - self.fit.film @ self._motion
-        left = self._left[:, fitted]
-        score = np.einsum("lr,lprj,lrj->p", self.fit.weight, left.conj(), common).real
-        inverse = np.linalg.inv(information)
-        influences: ComplexArray = -(inverse @ left.transpose(2, 0, 1, 3))
-        [covariance] = self.fit.spread(influences[np.newaxis])
-        return BracketEstimate(-inverse @ score, np.sqrt(np.diagonal(covariance)), influences)
+    def estimate(self, fitted: Sequence[int]) -> BracketEstimate:
+        """Return joint estimates of one or two of the `FITTED` changes.
 
-    def film_covariance(self, fitted: Sequence[int], influences: ComplexArray) -> FloatArray:
-        """Return the covariance of the film's unknowns fitted together with changes, (2, 4, 4).
+        The estimation is one Gauss-Newton step. It uses the shaft's motion through the fitted film
+        instead of the bearing's motion, whose noise would bias the estimates.
+        """
+        inverse, separate = _inverse(self._information[:, fitted][..., fitted])
+        weighted = (self.weight[:, :, np.newaxis] * self._common)[:, np.newaxis]
+        score = _real_product(self._left[:, fitted], weighted)
+        value = np.where(separate[:, np.newaxis], -(inverse @ score)[..., 0], np.nan)
+        own = np.zeros((len(value), 2, len(fitted), N_INFLUENCES))
+        own[..., :N_UNKNOWNS] = self.per[:, fitted].swapaxes(1, 2)
+        for n, change in enumerate(fitted):
+            own[..., n, N_UNKNOWNS + FITTED.index(change)] = -1.0
+        return BracketEstimate(value, (inverse[:, np.newaxis] @ own)[:, np.newaxis])
+
+    def film_covariance(self, fitted: BracketEstimate | None) -> FloatArray:
+        """Return the covariance of the films' unknowns, (n, 2, 4, 4).
 
         Parameters
         ----------
         fitted
-            Indices of the fitted changes.
-        influences
-            Influences on the estimates of these changes, as in `BracketEstimate`.
+            Estimate of `MASS` if it was fitted together with the film.
         """
-        through = self.per[fitted].transpose(1, 2, 0)[:, np.newaxis, np.newaxis] @ influences
+        through = np.zeros((len(self.weight), 2, 2, N_UNKNOWNS, N_INFLUENCES))
+        if fitted is not None:
+            through += self.per[:, MASS, :, np.newaxis, :, np.newaxis] * fitted.weights
+        inverse = np.linalg.inv(self._normal[0])
         for row in (0, 1):
-            through[row, row] += self.fit.own_influences[row]
-        return self.fit.spread(through)
+            through[:, row, row, :, :N_UNKNOWNS] += inverse[:, row]
+        return self.covariance(through)
+
+    def covariance(self, weights: FloatArray) -> FloatArray:
+        """Return the covariance of groups of estimates, (n, n_groups, n_estimates, n_estimates).
+
+        Parameters
+        ----------
+        weights : (n, n_groups, 2, n_estimates, 6)
+            Weights of the six influences in the estimates, through the residual of each row.
+        """
+        covariance, slope = self._spread
+        own = (weights @ covariance[:, np.newaxis] @ weights.swapaxes(-1, -2)).sum(axis=2)
+        through = (weights @ slope[:, np.newaxis]).sum(axis=2)
+        own += through @ through.swapaxes(-1, -2)
+        return np.asarray(own)
+
+    @cached_property
+    def _spread(self) -> tuple[FloatArray, FloatArray]:
+        """Covariance of the six influences' sums, (n, 2, 6, 6), and its part from the noise floor.
+
+        The second array, (n, 2, 6, 2), holds the change of the sums per standard uncertainty of
+        each probe's noise power.
+        """
+        lines, parts = self.lines, self._parts
+        ratio = lines.ratio[:, np.newaxis, np.newaxis, np.newaxis]
+        relative = self._relative[:, np.newaxis, FITTED]
+        moved = (self.film[:, :, :, np.newaxis] * parts).sum(axis=2)
+        moved = relative[:, :, :, np.newaxis] * moved[:, :, np.newaxis]
+        terms = np.empty((*parts.shape[:2], N_INFLUENCES, 2 * N_PARTS - 1, parts.shape[-1]))
+        terms[:, :, :2, :N_PARTS] = parts.real
+        terms[:, :, :2, N_PARTS:] = parts.imag[..., : N_PARTS - 1, :]
+        np.multiply(-ratio, parts.imag, out=terms[:, :, 2:4, :N_PARTS])
+        np.multiply(ratio, terms[:, :, :2, : N_PARTS - 1], out=terms[:, :, 2:4, N_PARTS:])
+        terms[:, :, 4:, :N_PARTS] = moved.real
+        terms[:, :, 4:, N_PARTS:] = moved.imag[..., : N_PARTS - 1, :]
+        # the real part of conj(x) e with circular e has half its power (Bendat and Piersol, 9.2)
+        covariance = correlated_sum(terms, lines.lines, PART_PRODUCTS)
+        covariance /= 2.0 * self.n_segments[..., np.newaxis, np.newaxis]
+        # per unit of noise power
+        weight = self.weight[:, :, np.newaxis]
+        weighted = weight * self.film
+        slope = np.empty((*parts.shape[:2], N_INFLUENCES, 2))
+        slope[:, :, :4] = 0.0
+        np.einsum("...ii->...i", slope[:, :, :2])[...] = weighted.real.sum(axis=-1)
+        np.einsum("...ii->...i", slope[:, :, 2:4])[...] = (ratio[:, 0] * weighted.imag).sum(axis=-1)
+        power = weight * (self.film.real**2 + self.film.imag**2)
+        slope[:, :, 4:] = relative.real @ power.swapaxes(-1, -2)
+        slope *= (lines.noise_power * self.floor_std)[:, np.newaxis, np.newaxis]
+        return covariance, slope
+
+    @cached_property
+    def _parts(self) -> ComplexArray:
+        """Six independent parts of the error per unit of motion, (n, 2 rows, 2, 6, n_used).
+
+        Integration errors of neighbouring lines cancel in the part of an influence in phase with a
+        row's force. Their sizes use smoothed powers, which are free of the scatter of single lines.
+        """
+        lines, shaft = self.lines, self.lines.shaft
+        root, across = _hermitian_root(shaft), self.film.conj()
+        moved = _times(self.film, shaft)
+        force = (moved * across).real.sum(axis=2)
+        shared = moved.conj() / force[:, :, np.newaxis]
+        smear = lines.smoothed(self.force_power) * self.smear_share
+        smeared = np.minimum(self.weight * smear, 1.0)  # fraction of the residual, 1 / weight
+        rest = np.sqrt(self.weight**2 * self.residual * (1.0 - smeared))
+        smeared_root = np.sqrt(self.weight * smeared)
+        power = own_power(shaft)
+        smooth_root = np.sqrt(lines.smoothed(power) / power)[:, :, np.newaxis] * root
+        apart = (
+            smooth_root[:, np.newaxis]
+            - shared[:, :, :, np.newaxis] * _times(self.film, smooth_root)[:, :, np.newaxis]
+        )
+        parts = np.empty((*self.weight.shape[:2], 2, N_PARTS, shaft.shape[-1]), dtype=np.complex128)
+        parts[:, :, :, :2] = rest[:, :, np.newaxis, np.newaxis] * root[:, np.newaxis]
+        size = smeared_root * np.sqrt(lines.smoothed(force))
+        parts[:, :, :, 2] = size[:, :, np.newaxis] * shared
+        parts[:, :, :, 3:5] = smeared_root[:, :, np.newaxis, np.newaxis] * apart
+        # The probes' noise is in the residual and in the shaft's motion, with a common phase:
+        # E[x*e x*e] is not 0 as for independent signals (Isserlis 1918). The resulting reduction of
+        # some variances is neglected.
+        noise = lines.noise_power[:, np.newaxis, :, np.newaxis]
+        parts[:, :, :, 5] = self.weight[:, :, np.newaxis] * noise * across
+        return parts
+
+
+def _times(first: ComplexArray, second: ComplexArray) -> ComplexArray:
+    """Return the products of (..., n, 2, n_lines) and (..., 2, 2, n_lines) matrices."""
+    x, y = first[..., 0, np.newaxis, :], first[..., 1, np.newaxis, :]
+    return x * second[..., np.newaxis, 0, :, :] + y * second[..., np.newaxis, 1, :, :]
+
+
+def _summed(weight: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the sum over the lines of weighted values, (n, 2)."""
+    total: FloatArray = np.einsum("nrl,nrl->nr", weight, values)
+    return total
+
+
+def _real_product(first: ComplexArray, second: ComplexArray) -> FloatArray:
+    """Return the real inner products of p and q arrays of each bearing, (n, p, q)."""
+    p, q = (np.ascontiguousarray(array) for array in (first, second))
+    parts = [array.reshape(*array.shape[:2], -1).view(np.float64) for array in (p, q)]
+    product: FloatArray = parts[0] @ parts[1].swapaxes(1, 2)
+    return product
+
+
+def _inverse(information: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    """Return the inverse of (n, 1, 1) or (n, 2, 2) matrices and where they are positive definite.
+
+    The inverse of others is zero.
+    """
+    first = information[:, 0, 0]
+    if information.shape[1] == 1:
+        determinant, adjugate = first, np.ones_like(information)
+    else:
+        determinant = first * information[:, 1, 1] - information[:, 0, 1] * information[:, 1, 0]
+        adjugate = np.empty_like(information)
+        adjugate[:, 0, 0], adjugate[:, 1, 1] = information[:, 1, 1], first
+        adjugate[:, 0, 1], adjugate[:, 1, 0] = -information[:, 0, 1], -information[:, 1, 0]
+    separate = (first > 0.0) & (determinant > 0.0)
+    adjugate *= (separate / np.where(separate, determinant, 1.0))[:, np.newaxis, np.newaxis]
+    return adjugate, separate
+
+
+def _hermitian_root(shaft: ComplexArray) -> ComplexArray:
+    """Return the Hermitian square roots of cross-spectra, (n, 2, 2, n_lines)."""
+    own = own_power(shaft)
+    determinant = own[:, 0] * own[:, 1] - np.abs(shaft[:, 0, 1]) ** 2
+    root = np.sqrt(np.maximum(determinant, 0.0))
+    # closed form of the 2 × 2 square root, by the theorem of Cayley and Hamilton
+    whole = shaft.copy()
+    np.einsum("niil->nil", whole)[...] += root[:, np.newaxis]
+    whole /= np.sqrt(own.sum(axis=1) + 2.0 * root)[:, np.newaxis, np.newaxis]
+    return whole

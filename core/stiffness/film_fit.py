@@ -1,20 +1,21 @@
-"""Weighted least-squares fit of a film's eight coefficients to averaged cross-spectra.
+"""Weighted least-squares fit of the films of several bearings to their averaged cross-spectra.
 
 For row i of ``z_b V = (K + iωC) U``, four real numbers (k_i1, k_i2, c_i1, c_i2) minimise
 ``Σ_lines w Σ_segments |z_b v_i - Σ_j (k_ij + iω c_ij) u_j|²``. The sums over segments are entries
 of the cross-spectrum matrix; the segments themselves are not needed.
+
+Bearing comes first in all arrays, line last, so that each step is one operation for all bearings.
 """
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
 from core.spectra.cross_spectrum import BEARING_X
-from core.stiffness.dynamic_lines import conditional_power
+from core.stiffness.dynamic_lines import conditional_power, own_power
 
 MIN_SHARE = 0.05
 """Smallest fraction of motion in the shaft spectra. With less, the spectra without noise may be
@@ -32,203 +33,222 @@ N_ITERATIONS = 4
 N_UNKNOWNS = 4
 
 
-@dataclass(frozen=True)
-class NormalEquations:
-    """Normal equations of the fit at each line.
+class FilmLines:
+    """Cross-spectra at the used lines of n bearings, and the normal equations of their films.
 
-    The unknowns are stiffness and damping times `omega_unit`, both in N/m.
+    The unknowns are stiffness and damping times `omega_unit`, both in N/m. Bearings with fewer
+    lines than others are filled up with their last line, which then has no weight.
 
     Parameters
     ----------
-    matrix : (n_lines, 4, 4)
-        Cross-spectra of (u_x, u_y, v_x, v_y) at the used lines.
-    omega : (n_lines,)
-        Angular frequencies of the lines.
-    bracket_n_per_m : (n_lines,)
-        Dynamic stiffness of the bracket.
-    noise_power : (2,)
+    matrices : (n_lines, 4, 4) of each bearing
+        Cross-spectra of (u_x, u_y, v_x, v_y) at all lines.
+    lines : (n_used,) of each bearing
+        Indices of the used lines, ascending.
+    frequency_hz : (n_lines,)
+        Frequencies of all lines.
+    noise_power : (n, 2)
         Mean squared phasor of each probe's noise.
+
+    Attributes
+    ----------
+    lines, frequency_hz, omega : (n, n_used)
+        Indices, frequencies and angular frequencies of the used lines.
+    counted : (n, 1, n_used)
+        1 for lines of the bearing, 0 for the repeated last line.
+    omega_unit : (n, 1)
+        Angular frequency that scales damping to N/m, comparable with stiffness.
+    ratio : (n, n_used)
+        Angular frequencies over `omega_unit`.
+    shaft : (n, 2, 2, n_used)
+        Cross-spectra of the shaft's motion, with the probes' noise.
+    cross : (n, 2, 2, n_used)
+        Cross-spectra of the bearing's with the shaft's (conjugated) motion.
+    bearing : (n, 2, 2, n_used)
+        Cross-spectra of the bearing's motion.
     """
 
-    matrix: ComplexArray
-    omega: FloatArray
-    bracket_n_per_m: ComplexArray
-    noise_power: FloatArray
+    def __init__(
+        self,
+        matrices: Sequence[ComplexArray],
+        lines: Sequence[npt.NDArray[np.int64]],
+        frequency_hz: FloatArray,
+        noise_power: FloatArray,
+    ) -> None:
+        sizes = np.array([[own.size] for own in lines])
+        place = np.arange(sizes.max())
+        self.lines = np.array(
+            [own[at] for own, at in zip(lines, np.minimum(place, sizes - 1), strict=True)]
+        )
+        self.counted = (place < sizes).astype(np.float64)[:, np.newaxis]
+        self.noise_power = noise_power
+        self.frequency_hz = frequency_hz[self.lines]
+        self.omega = 2.0 * np.pi * self.frequency_hz
+        self.omega_unit = np.einsum("nrl,nl->nr", self.counted, self.omega) / sizes
+        self.ratio = self.omega / self.omega_unit
+        used = [matrix[own] for matrix, own in zip(matrices, self.lines, strict=True)]
+        matrix = np.ascontiguousarray(np.array(used).transpose(0, 2, 3, 1))
+        self.shaft = matrix[:, :BEARING_X, :BEARING_X]
+        self.cross, self.bearing = (
+            matrix[:, BEARING_X:, :BEARING_X],
+            matrix[:, BEARING_X:, BEARING_X:],
+        )
+        self.smoothing = smoother(tuple(tuple(own.tolist()) for own in lines))
 
     @cached_property
-    def omega_unit(self) -> float:
-        """Angular frequency that scales damping to N/m, comparable with stiffness."""
-        return float(self.omega.mean())
+    def bearing_power(self) -> FloatArray:
+        """Power of each bearing channel, (n, 2, n_used)."""
+        return np.ascontiguousarray(own_power(self.bearing))
 
     @cached_property
-    def ratio(self) -> FloatArray:
-        """Angular frequencies over `omega_unit`, (n_lines,)."""
-        return self.omega / self.omega_unit
-
-    @property
-    def shaft(self) -> ComplexArray:
-        """Cross-spectra of the shaft's motion including noise, (n_lines, 2, 2)."""
-        return self.matrix[:, :BEARING_X, :BEARING_X]
-
-    @property
-    def cross(self) -> ComplexArray:
-        """Cross-spectra of the bearing's with the shaft's (conjugated) motion, (n_lines, 2, 2)."""
-        return self.matrix[:, BEARING_X:, :BEARING_X]
+    def _gram(self) -> FloatArray:
+        """Real parts of the products of (u_1, u_2, iω u_1, iω u_2), (n, 16, n_used)."""
+        scale, (n, n_used) = self.ratio[:, np.newaxis, np.newaxis], self.ratio.shape
+        gram = np.empty((n, N_UNKNOWNS, N_UNKNOWNS, n_used))
+        gram[:, :2, :2] = self.shaft.real
+        np.multiply(scale, self.shaft.imag, out=gram[:, :2, 2:])
+        np.negative(gram[:, :2, 2:], out=gram[:, 2:, :2])
+        np.multiply(scale**2, gram[:, :2, :2], out=gram[:, 2:, 2:])
+        return gram.reshape(n, -1, n_used)
 
     @cached_property
-    def gram(self) -> FloatArray:
-        """Gram matrix of the shaft's motion including noise, (n_lines, 4, 4)."""
-        return _gram(self.shaft, self.ratio)
+    def _noise(self) -> FloatArray:
+        """Diagonal of the products of the probes' noise, (n, 4, n_used)."""
+        noise = np.ones_like(self.ratio)[:, np.newaxis] * self.noise_power[..., np.newaxis]
+        return np.concatenate([noise, self.ratio[:, np.newaxis] ** 2 * noise], axis=1)
 
-    @cached_property
-    def noise_gram(self) -> FloatArray:
-        """Gram matrix of the probes' noise, which is independent in x and y, (n_lines, 4, 4)."""
-        return _gram(np.diag(self.noise_power).astype(np.complex128), self.ratio)
+    def normal(self, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the normal equations of both rows, (n, 2, 4, 4), and the least share of motion.
 
-    @cached_property
-    def true_gram(self) -> FloatArray:
-        """Gram matrix of the shaft's motion without the probes' noise, (n_lines, 4, 4)."""
-        return self.gram - self.noise_gram
-
-    @cached_property
-    def force(self) -> FloatArray:
-        """Moments of the shaft's motion with the bracket's force, for each row, (n_lines, 2, 4)."""
-        return self.moment(self.bracket_n_per_m)
-
-    @cached_property
-    def force_power(self) -> FloatArray:
-        """Power of the bracket's force in (N/m)² µm², for each row, (n_lines, 2)."""
-        bearing = self.matrix[:, BEARING_X:, BEARING_X:]
-        power = np.diagonal(bearing, axis1=1, axis2=2).real
-        return np.asarray(np.abs(self.bracket_n_per_m[:, np.newaxis]) ** 2 * power)
-
-    def moment(self, stiffness_n_per_m: ComplexArray) -> FloatArray:
-        """Return the moments (..., n_lines, 2, 4) of the shaft's motion with the force of brackets.
-
-        `stiffness_n_per_m` holds the dynamic stiffnesses of the brackets, (..., n_lines).
-        """
-        cross = stiffness_n_per_m[..., np.newaxis, np.newaxis] * self.cross
-        scale = self.ratio[:, np.newaxis, np.newaxis]
-        return np.concatenate([cross.real, scale * cross.imag], axis=-1)
-
-    def solve(self, weight: FloatArray, right: FloatArray) -> FloatArray:
-        """Return the unknowns of both rows that solve the normal equations, (..., 2, 4).
+        The share, (n,), is the smallest fraction of motion in the weighted shaft spectra of any
+        direction of motion, for the worse row.
 
         Parameters
         ----------
-        weight : (n_lines, 2)
-        right : (..., n_lines, 2, 4)
-            Right-hand side: `force`, or results of `moment`.
+        weight : (n, 2, n_used)
         """
-        moment = (weight[..., np.newaxis] * right).sum(axis=-3)
-        unknowns: FloatArray = np.linalg.solve(self.normal(weight), moment[..., np.newaxis])[..., 0]
-        return unknowns
+        whole = (weight @ self._gram.swapaxes(1, 2)).reshape(-1, 2, N_UNKNOWNS, N_UNKNOWNS)
+        noise = weight @ self._noise.swapaxes(1, 2)
+        share = 1.0 - _largest_share(noise[..., :2], whole[..., :2, :2]).max(axis=1)
+        np.einsum("...ii->...i", whole)[...] -= noise
+        return whole, share
 
-    def normal(self, weight: FloatArray) -> FloatArray:
-        """Return the weighted sum of `true_gram` for each row, (2, 4, 4)."""
-        summed = weight.T @ self.true_gram.reshape(weight.shape[0], -1)
-        return summed.reshape(-1, N_UNKNOWNS, N_UNKNOWNS)
+    def moments(self, weight: FloatArray, stiffness_n_per_m: ComplexArray) -> FloatArray:
+        """Return moments of the shaft's motion with the force of brackets, (n, 2, 4, n_brackets).
 
-    def residual(self, unknowns: FloatArray) -> FloatArray:
-        """Return the power of the residual force, (n_lines, 2) in (N/m)² µm²."""
-        squares = np.einsum("ra,rb->rab", unknowns, unknowns).reshape(2, -1)
-        modelled = self.gram.reshape(-1, N_UNKNOWNS**2) @ squares.T
-        common = np.einsum("lra,ra->lr", self.force, unknowns)
-        left: FloatArray = self.force_power - 2.0 * common + modelled
-        return np.maximum(left, 0.0)
+        `stiffness_n_per_m` holds the dynamic stiffnesses of the brackets, (n, n_brackets, n_used).
+        """
+        weighted = weight[:, :, np.newaxis] * self.cross
+        scaled = np.concatenate([weighted, self.ratio[:, np.newaxis, np.newaxis] * weighted], 2)
+        summed = scaled @ stiffness_n_per_m[:, np.newaxis].swapaxes(-1, -2)
+        return np.concatenate([summed[:, :, :2].real, summed[:, :, 2:].imag], axis=2)
+
+    def force_moments(self, stiffness_n_per_m: ComplexArray) -> FloatArray:
+        """Return the moments of the force of one bracket at each line, (n, 2, 4, n_used)."""
+        force = stiffness_n_per_m[:, np.newaxis, np.newaxis] * self.cross
+        scaled = self.ratio[:, np.newaxis, np.newaxis] * force.imag
+        return np.concatenate([force.real, scaled], axis=2)
+
+    def modelled_power(self, unknowns: FloatArray) -> FloatArray:
+        """Return the power of the film's force for (n, 2, 4) unknowns, (n, 2, n_used)."""
+        squares = unknowns[..., np.newaxis] * unknowns[..., np.newaxis, :]
+        power: FloatArray = squares.reshape(-1, 2, N_UNKNOWNS**2) @ self._gram
+        return power
 
     def film(self, unknowns: FloatArray) -> ComplexArray:
-        """Return the dynamic stiffness of films from (..., 2, 4) unknowns, (n_lines, ..., 2, 2)."""
-        ratio = self.ratio.reshape(-1, *(1,) * unknowns.ndim)
-        film: ComplexArray = unknowns[..., :2] + 1j * (ratio * unknowns[..., 2:])
+        """Return the dynamic stiffness of films, (n, ..., 2, n_used), of (n, ..., 4) unknowns."""
+        ratio = self.ratio.reshape(len(self.ratio), *(1,) * (unknowns.ndim - 1), -1)
+        film = np.empty((*unknowns.shape[:-1], 2, ratio.shape[-1]), dtype=np.complex128)
+        film.real = unknowns[..., :2, np.newaxis]
+        film.imag = ratio * unknowns[..., 2:, np.newaxis]
         return film
 
-    def signal_share(self, weight: FloatArray) -> float:
-        """Return the smallest fraction of motion in the weighted shaft spectra of any direction."""
-        noise, motion = ((weight.T @ power).tolist() for power in self._powers)
-        return min(1.0 - _largest_share(*row) for row in zip(noise, motion, strict=True))
-
-    @cached_property
-    def _powers(self) -> tuple[FloatArray, FloatArray]:
-        """Power of the probes' noise and of the shaft's motion with noise, each (n_lines, 4)."""
-        noise, motion = (gram[:, :2, :2].reshape(-1, 4) for gram in (self.noise_gram, self.gram))
-        return noise, motion
+    def smoothed(self, power: FloatArray) -> FloatArray:
+        """Return power spectra (n, n_spectra, n_used), smoothed by regression of the logarithm."""
+        smooth: FloatArray = np.exp(np.log(power) @ self.smoothing)
+        return smooth
 
 
-def _gram(shaft: ComplexArray, ratio: FloatArray) -> FloatArray:
-    """Return the real parts of the products of (u_1, u_2, iω u_1, iω u_2), (n_lines, 4, 4)."""
-    scale = ratio[:, np.newaxis, np.newaxis]
-    gram = np.empty((ratio.size, N_UNKNOWNS, N_UNKNOWNS))
-    gram[:, :2, :2] = shaft.real
-    gram[:, :2, 2:] = scale * shaft.imag
-    gram[:, 2:, :2] = -gram[:, :2, 2:]
-    gram[:, 2:, 2:] = scale**2 * shaft.real
-    return gram
+def _largest_share(part: FloatArray, whole: FloatArray) -> FloatArray:
+    """Return the largest ratio of two quadratic forms; 1 if the second is singular.
 
-
-def _largest_share(part: Sequence[float], whole: Sequence[float]) -> float:
-    """Return the largest ratio of two quadratic forms, given as flat symmetric 2 × 2 matrices."""
-    determinant = whole[0] * whole[3] - whole[1] ** 2
-    if not determinant > ROUNDING * whole[0] * whole[3]:
-        return 1.0
+    Parameters
+    ----------
+    part : (..., 2)
+        Diagonal of the first, which is diagonal.
+    whole : (..., 2, 2)
+        Second, symmetric.
+    """
+    x, y = whole[..., 0, 0], whole[..., 1, 1]
+    determinant = x * y - whole[..., 0, 1] ** 2
+    singular = ~(determinant > ROUNDING * x * y)
     # largest root of det(part - share · whole) = 0
-    mixed = part[0] * whole[3] + part[3] * whole[0] - 2.0 * part[1] * whole[1]
-    left = part[0] * part[3] - part[1] ** 2
-    root = math.sqrt(max(mixed**2 - 4.0 * determinant * left, 0.0))
-    return (mixed + root) / (2.0 * determinant)
+    mixed = part[..., 0] * y + part[..., 1] * x
+    left = part[..., 0] * part[..., 1]
+    root = np.sqrt(np.maximum(mixed**2 - 4.0 * determinant * left, 0.0))
+    return np.where(singular, 1.0, (mixed + root) / np.where(singular, 1.0, 2.0 * determinant))
 
 
-def line_weights(equations: NormalEquations, smoothing: FloatArray) -> FloatArray | None:
-    """Return the weights of the lines, (n_lines, 2): reciprocals of the smoothed residual power.
+def line_weights(
+    lines: FilmLines, stiffness_n_per_m: ComplexArray
+) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    """Return the weights of the lines: reciprocals of the smoothed residual power.
 
     Fit and weights are iterated. The first weights are the reciprocals of the bearing's power that
     is incoherent with the shaft, times the coherence.
 
     Parameters
     ----------
-    smoothing : (n_lines, n_lines)
-        Matrix from `smoother`.
+    stiffness_n_per_m : (n, n_used)
+        Dynamic stiffness of the brackets.
 
     Returns
     -------
-    None if the fraction of motion in the shaft spectra is below `MIN_SHARE`.
+    Weights, (n, 2, n_used); and a mask, (n,), of the bearings in which the fraction of motion in
+    the shaft spectra was at least `MIN_SHARE` throughout.
     """
-    bearing = equations.matrix[:, BEARING_X:, BEARING_X:]
-    rest = conditional_power(bearing, equations.shaft, equations.cross)
-    coherence = 1.0 - rest / np.diagonal(bearing, axis1=1, axis2=2).real
-    residual = equations.force_power * (1.0 - coherence)
-    weight = coherence / _smoothed(smoothing, residual, equations.force_power)
+    power = np.abs(stiffness_n_per_m[:, np.newaxis]) ** 2 * lines.bearing_power
+    force, least = lines.force_moments(stiffness_n_per_m), ROUNDING * power
+    rest = conditional_power(lines.bearing, lines.shaft, lines.cross) / lines.bearing_power
+    weight = lines.counted * (1.0 - rest) / lines.smoothed(np.maximum(power * rest, least))
+    normal, share = lines.normal(weight)
+    moves = share >= MIN_SHARE
     for _ in range(N_ITERATIONS):
-        if equations.signal_share(weight) < MIN_SHARE:
-            return None
-        residual = equations.residual(equations.solve(weight, equations.force))
-        weight = 1.0 / _smoothed(smoothing, residual, equations.force_power)
-    return weight if equations.signal_share(weight) >= MIN_SHARE else None
+        if not moves.any():
+            break
+        normal[~moves] = np.eye(N_UNKNOWNS)
+        moment = force @ weight[..., np.newaxis]
+        unknowns = np.asarray(np.linalg.solve(normal, moment)[..., 0], dtype=np.float64)
+        common = (unknowns[..., np.newaxis, :] @ force)[..., 0, :]
+        residual = power - 2.0 * common + lines.modelled_power(unknowns)
+        weight = lines.counted / lines.smoothed(np.maximum(residual, least))
+        normal, share = lines.normal(weight)
+        moves &= share >= MIN_SHARE
+    return weight, moves
 
 
 @lru_cache(maxsize=32)
-def smoother(lines: tuple[int, ...]) -> FloatArray:
-    """Return the matrix of a local linear regression over neighbouring lines, (n_lines, n_lines).
+def smoother(lines: tuple[tuple[int, ...], ...]) -> FloatArray:
+    """Return matrices of a local linear regression over neighbouring lines, (n, n_used, n_used).
+
+    A row of spectra times the matrix is the smoothed row.
 
     Parameters
     ----------
     lines
-        Bin indices of the lines.
+        Bin indices of the lines of each bearing.
     """
-    distance = np.subtract.outer(np.array(lines), np.array(lines)).astype(np.float64)
-    near = (np.abs(distance) <= SMOOTHING_REACH_BINS).astype(np.float64)
-    count, first = near.sum(axis=1), (near * distance).sum(axis=1)
-    second = (near * distance**2).sum(axis=1)
-    alone = count * second == first**2  # a line without neighbours is not smoothed
-    determinant = np.where(alone, 1.0, count * second - first**2)
-    sloped = near * (second[:, np.newaxis] - first[:, np.newaxis] * distance)
-    matrix: FloatArray = np.where(alone[:, np.newaxis], np.eye(len(lines)), sloped)
-    matrix /= determinant[:, np.newaxis]
-    matrix.setflags(write=False)
-    return matrix
-
-
-def _smoothed(smoothing: FloatArray, residual: FloatArray, force_power: FloatArray) -> FloatArray:
-    """Return the residual power, smoothed as logarithm because noise spectra are steep."""
-    smooth: FloatArray = np.exp(smoothing @ np.log(np.maximum(residual, ROUNDING * force_power)))
-    return smooth
+    n_used = max(map(len, lines))
+    matrices = np.zeros((len(lines), n_used, n_used))
+    for matrix, own in zip(matrices, lines, strict=True):
+        distance = np.subtract.outer(np.array(own), np.array(own)).astype(np.float64)
+        near = (np.abs(distance) <= SMOOTHING_REACH_BINS).astype(np.float64)
+        count, first = near.sum(axis=1), (near * distance).sum(axis=1)
+        second = (near * distance**2).sum(axis=1)
+        alone = count * second == first**2  # a line without neighbours is not smoothed
+        determinant = np.where(alone, 1.0, count * second - first**2)
+        sloped = near * (second[:, np.newaxis] - first[:, np.newaxis] * distance)
+        found = np.where(alone[:, np.newaxis], np.eye(len(own)), sloped)
+        matrix[: len(own), : len(own)] = (found / determinant[:, np.newaxis]).T
+    matrices.setflags(write=False)
+    return matrices

@@ -14,7 +14,7 @@ from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
 from core.quality import GOOD, Level, Reading, Reason, bad, uncertain
 from core.spectra.speed import SpeedSource
-from core.stiffness.dynamic_readings import dynamic_readings
+from core.stiffness.dynamic import films
 from service.settings.bearings import BearingSettings
 
 OMEGA = 2.0 * np.pi * 92.3 / 60.0
@@ -187,8 +187,10 @@ def test_how_often_a_bearing_channel_is_integrated_follows_from_its_transducer(
     asked: list[tuple[int, int]] = []
     monkeypatch.setattr(
         core.monitor.bearing_readings,
-        "dynamic_readings",
-        lambda *given: asked.append(given[-1]) or dynamic_readings(*given),
+        "films",
+        lambda spectra, settings: (
+            asked.extend(each.n_integrations for each in spectra) or films(spectra, settings)
+        ),
     )
     velocity = Channel("bx", Measurand.VELOCITY_MM_S)
     acceleration = Channel("by", Measurand.ACCELERATION_M_S2)

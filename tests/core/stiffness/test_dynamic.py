@@ -21,9 +21,10 @@ from rigs.shaken_shaft import (
 from core.arrays import ComplexArray, FloatArray
 from core.quality import Reason
 from core.spectra.cross_spectrum import average, phasor_power_per_density
-from core.stiffness.dynamic import DELAY, DynamicStiffness, dynamic_stiffness
-from core.stiffness.dynamic import STIFFNESS as STIFFENING
+from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, dynamic_stiffness, films
 from core.stiffness.dynamic_lines import DynamicSettings
+from core.stiffness.film_covariance import DELAY
+from core.stiffness.film_covariance import STIFFNESS as STIFFENING
 
 Recording = Callable[..., ComplexArray]
 
@@ -303,3 +304,32 @@ def test_each_demand_on_the_evidence_can_refuse_alone(
     strict = replace(base, **stricter)
     result = dynamic_stiffness(spectrum, BRACKET, TURN_HZ, strict)
     assert result is Reason.INSUFFICIENT_EXCITATION
+
+
+def test_bearings_fitted_together_have_the_films_that_each_has_alone(recording: Recording) -> None:
+    """With other lines, another or an unknown mass, another speed, and one without a film."""
+    rng = np.random.default_rng(5)
+    line = recording(seed=2, bearing_um=0.3)
+    line[:, :, 60] *= 30.0  # leaks into its neighbours, which are not used
+    still = 1e-3 * hann_noise(rng, 24, 4)
+    heavier = replace(BRACKET, mass_kg=0.6e5, damping_n_s_per_m=1e5)
+    measured = [
+        FilmSpectrum(averaged(recording(seed=1, bearing_um=0.3)), BRACKET, TURN_HZ),
+        FilmSpectrum(averaged(line), heavier, TURN_HZ),
+        FilmSpectrum(averaged(still), BRACKET, TURN_HZ),
+        FilmSpectrum(averaged(line), replace(BRACKET, mass_kg=None), TURN_HZ, (1, 0)),
+        FilmSpectrum(averaged(recording(seed=3, n_segments=8)), BRACKET, (1.5, 1.55)),
+        FilmSpectrum(averaged(recording(n_segments=3)), BRACKET, TURN_HZ),
+    ]
+
+    together = films(measured, DynamicSettings())
+
+    assert together[2] is Reason.INSUFFICIENT_EXCITATION
+    assert together[5] is Reason.FEW_SEGMENTS
+    for place in (0, 1, 3, 4):
+        [alone], found = films([measured[place]], DynamicSettings()), together[place]
+        assert isinstance(alone, DynamicStiffness)
+        assert isinstance(found, DynamicStiffness)
+        for name, value in vars(alone).items():
+            np.testing.assert_allclose(getattr(found, name), value, rtol=1e-10)
+    assert len({found.frequency_hz.size for found in together[:2]}) == 2

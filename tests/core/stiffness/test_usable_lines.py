@@ -66,7 +66,7 @@ def test_side_lobes_stay_below_the_kernel_wherever_the_tone_falls(offset: float)
 def test_lines_beside_a_strong_tone_are_dropped_and_quiet_distant_ones_kept() -> None:
     power = np.ones((341, 1))
     power[100] = 1e4
-    own = little_leakage(power)
+    own = little_leakage(power).all(axis=1)
 
     assert not own[104:108].any()
     assert own[115:].all()
@@ -93,8 +93,8 @@ def test_noise_of_known_density_has_the_power_and_the_correlation_stated() -> No
 
 def test_correlated_lines_and_overlapping_segments_count_for_less() -> None:
     def variance(lines: list[int], products: tuple[float, ...] = WHITE_PRODUCTS) -> float:
-        terms = np.ones((len(lines), 1, 1))
-        return float(correlated_sum(terms, np.array(lines), products)[0, 0])
+        terms, parts = np.ones((1, 1, 1, len(lines))), np.array(products)[:, np.newaxis]
+        return float(correlated_sum(terms, np.array([lines]), parts)[0, 0, 0])
 
     assert variance(list(range(2000))) / 2000 == pytest.approx(CORRELATED_LINES, rel=0.001)
     assert variance([0, 3]) == 2.0
