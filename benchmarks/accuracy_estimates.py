@@ -9,7 +9,7 @@ from core.machine.unit import BearingAccuracy
 from core.quality import Reason
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.spectra.segments import ORDER1, VORTEX
-from core.stiffness.dynamic import dynamic_stiffness
+from core.stiffness.dynamic import FilmSpectrum, films
 from core.stiffness.dynamic_lines import DynamicSettings
 from core.stiffness.dynamic_readings import dynamic_budgets
 from core.stiffness.estimators import DYNAMIC_COEFFICIENTS
@@ -83,9 +83,8 @@ def _dynamic(
     spectra: BearingSpectra, accuracy: BearingAccuracy, c_over_k_xx: bool
 ) -> Iterator[Estimate]:
     film = spectra.film
-    result = dynamic_stiffness(
-        spectra.bins, spectra.bracket, spectra.turn_hz, DynamicSettings(), spectra.n_integrations
-    )
+    measured = FilmSpectrum(spectra.bins, spectra.bracket, spectra.turn_hz, spectra.n_integrations)
+    [result] = films([measured], DynamicSettings())
     budgets = (
         {} if isinstance(result, Reason) else dynamic_budgets(result, spectra.bracket, accuracy)
     )

@@ -97,14 +97,7 @@ def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexAr
 
     Velocity is integrated once, acceleration twice, by division by iω and (iω)²; the transducer's
     response and the channel's delay are compensated. The factor of a key-phase channel is zero.
-
-    Raises
-    ------
-    ValueError
-        If a frequency is not positive: a constant velocity has no displacement phasor.
     """
-    if np.any(frequency_hz <= 0.0):
-        raise ValueError(f"frequencies must be positive, got {frequency_hz.min()} Hz")
     if channel.measurand is Measurand.KEY_PHASE_V:
         return np.zeros(np.shape(frequency_hz), dtype=np.complex128)
     n = channel.measurand.n_integrations

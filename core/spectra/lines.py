@@ -125,15 +125,8 @@ def exact_phasors(
     Returns
     -------
     (n_channels, n_lines)
-
-    Raises
-    ------
-    ValueError
-        If a frequency is out of range.
     """
     n_samples = tapered_samples.shape[1]
-    if np.any(frequency_hz <= 0.0) or np.any(frequency_hz >= rate_hz / 2.0):
-        raise ValueError(f"frequencies {frequency_hz} must lie between 0 and {rate_hz / 2.0} Hz")
     return line_phasors(tapered_samples, turning_factors(n_samples, rate_hz, frequency_hz))
 
 

@@ -133,17 +133,6 @@ class FilmSpectrum:
     n_integrations: tuple[int, int] = (2, 2)
 
 
-def dynamic_stiffness(
-    spectrum: CrossSpectrum,
-    bracket: BracketDynamics,
-    turn_hz: tuple[float, float],
-    settings: DynamicSettings,
-    n_integrations: tuple[int, int] = (2, 2),
-) -> DynamicStiffness | Reason:
-    """Return the film of one bearing as `films` does; parameters as in `FilmSpectrum`."""
-    return films([FilmSpectrum(spectrum, bracket, turn_hz, n_integrations)], settings)[0]
-
-
 def films(
     measured: Sequence[FilmSpectrum], settings: DynamicSettings
 ) -> list[DynamicStiffness | Reason]:
@@ -151,19 +140,11 @@ def films(
 
     The bearings of a unit are fitted in common arrays; their results do not depend on each other.
     An unknown mass of a bracket is fitted with the film, one mass for both directions.
-
-    Raises
-    ------
-    ValueError
-        If the channels were averaged over different segments, or the speed is not positive.
     """
     found: list[DynamicStiffness | Reason] = [Reason.FEW_SEGMENTS] * len(measured)
     alike: dict[tuple[float, float], list[int]] = {}
     for place, each in enumerate(measured):
-        n_segments = each.spectrum.n_segments
-        if n_segments.min() != n_segments.max():
-            raise ValueError(f"channels averaged over different segments: {n_segments}")
-        if n_segments[0, 0] >= settings.min_segments:
+        if each.spectrum.n_segments[0, 0] >= settings.min_segments:
             alike.setdefault(each.turn_hz, []).append(place)
     for places in alike.values():
         with np.errstate(divide="ignore", invalid="ignore"):  # of bearings without a result
@@ -221,7 +202,7 @@ def _fitted(
     found, moves = fit()
     limit_kg = MAX_INERTIA_SHARE * stiffness / omega[:, -1:] ** 2
     for _ in range(N_ITERATIONS if seeks.any() else 0):
-        heavier = mass_kg + found.estimate([MASS]).value
+        heavier = mass_kg + found.estimate([MASS])[0]
         moves &= ~(seeks & np.isnan(heavier[:, 0]))
         heavier = np.minimum(np.maximum(heavier, -limit_kg), limit_kg)
         mass_kg = np.where((seeks & moves)[:, np.newaxis], heavier, mass_kg)
@@ -237,16 +218,16 @@ def _fitted(
 def _results(
     fits: FilmFits, mass_kg: FloatArray, seeks_mass: npt.NDArray[np.bool_], bin_hz: float
 ) -> list[DynamicStiffness]:
-    delay, per = fits.estimate([DELAY, MASS]), fits.per
-    delay_std = np.sqrt(fits.covariance(delay.weights)[:, 0, 0, 0])
+    (delays_s, of_delay), per = fits.estimate([DELAY, MASS]), fits.per
+    delay_std = np.sqrt(fits.covariance(of_delay)[:, 0, 0, 0])
     delay_per_damping = fits.follow(DAMPING, [DELAY, MASS])[:, 0]
-    covariance, mass_std_kg = fits.film_covariance(None), np.zeros(len(mass_kg))
+    covariance, mass_std_kg = fits.film_covariance(), np.zeros(len(mass_kg))
     if seeks_mass.any():
-        mass = fits.estimate([MASS])
-        whole = seeks_mass & ~np.isnan(mass.value[:, 0])
-        std = np.sqrt(fits.covariance(mass.weights)[:, 0, 0, 0])
+        masses_kg, of_mass = fits.estimate([MASS])
+        whole = seeks_mass & ~np.isnan(masses_kg[:, 0])
+        std = np.sqrt(fits.covariance(of_mass)[:, 0, 0, 0])
         mass_std_kg = np.where(whole, std, 0.0)
-        covariance[whole] = fits.film_covariance(mass)[whole]
+        covariance[whole] = fits.film_covariance(of_mass)[whole]
         per = per.copy()
         for change in (STIFFNESS, DAMPING, DELAY):  # the fitted mass follows
             follows = np.where(whole, fits.follow(change, [MASS])[:, 0], 0.0)
@@ -258,7 +239,7 @@ def _results(
     per = per / scale[:, np.newaxis]
     coherence, segments, lack = fits.coherence, fits.coherence_segments, fits.lack_of_fit
     noise_um2_per_hz = lines.noise_power / phasor_power_per_density(bin_hz)
-    delay_s, share = delay.value[:, 0], fits.signal_share
+    delay_s, share = delays_s[:, 0], fits.signal_share
     unseparable = np.isnan(delay_s)
     sizes = lines.counted.sum(axis=(1, 2)).astype(int).tolist()
     return [

@@ -52,22 +52,6 @@ N_INFLUENCES = N_UNKNOWNS + len(FITTED)
 
 
 @dataclass(frozen=True)
-class BracketEstimate:
-    """Estimated changes of properties of the brackets of n bearings.
-
-    Parameters
-    ----------
-    value : (n, n_fitted)
-        Estimates; NaN where the data do not separate the properties.
-    weights : (n, 1, 2, n_fitted, 6)
-        Weights of the six influences in the estimates, through the residual of each row.
-    """
-
-    value: FloatArray
-    weights: FloatArray
-
-
-@dataclass(frozen=True)
 class FilmFits:
     """Weighted least-squares fits of the films of n bearings, and sources of their random errors.
 
@@ -227,11 +211,16 @@ class FilmFits:
         inverse, _ = _inverse(self._information[:, fitted][..., fitted])
         return -(inverse @ self._information[:, fitted, change, np.newaxis])[..., 0]
 
-    def estimate(self, fitted: Sequence[int]) -> BracketEstimate:
-        """Return joint estimates of one or two of the `FITTED` changes.
+    def estimate(self, fitted: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+        """Return joint estimates of one or two of the `FITTED` changes, and their influences.
 
         The estimation is one Gauss-Newton step. It uses the shaft's motion through the fitted film
         instead of the bearing's motion, whose noise would bias the estimates.
+
+        Returns
+        -------
+        Estimates, (n, n_fitted), NaN where the data do not separate the changes; and the weights of
+        the six influences in them as a single group of `covariance`.
         """
         inverse, separate = _inverse(self._information[:, fitted][..., fitted])
         weighted = (self.weight[:, :, np.newaxis] * self._common)[:, np.newaxis]
@@ -241,19 +230,16 @@ class FilmFits:
         own[..., :N_UNKNOWNS] = self.per[:, fitted].swapaxes(1, 2)
         for n, change in enumerate(fitted):
             own[..., n, N_UNKNOWNS + FITTED.index(change)] = -1.0
-        return BracketEstimate(value, (inverse[:, np.newaxis] @ own)[:, np.newaxis])
+        return value, (inverse[:, np.newaxis] @ own)[:, np.newaxis]
 
-    def film_covariance(self, fitted: BracketEstimate | None) -> FloatArray:
+    def film_covariance(self, of_mass: FloatArray | None = None) -> FloatArray:
         """Return the covariance of the films' unknowns, (n, 2, 4, 4).
 
-        Parameters
-        ----------
-        fitted
-            Estimate of `MASS` if it was fitted together with the film.
+        `of_mass` holds the influences on `MASS` from `estimate` if it was fitted with the film.
         """
         through = np.zeros((len(self.weight), 2, 2, N_UNKNOWNS, N_INFLUENCES))
-        if fitted is not None:
-            through += self.per[:, MASS, :, np.newaxis, :, np.newaxis] * fitted.weights
+        if of_mass is not None:
+            through += self.per[:, MASS, :, np.newaxis, :, np.newaxis] * of_mass
         inverse = np.linalg.inv(self._normal[0])
         for row in (0, 1):
             through[:, row, row, :, :N_UNKNOWNS] += inverse[:, row]
@@ -363,21 +349,13 @@ def _real_product(first: ComplexArray, second: ComplexArray) -> FloatArray:
 
 
 def _inverse(information: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """Return the inverse of (n, 1, 1) or (n, 2, 2) matrices and where they are positive definite.
+    """Return inverses of (n, p, p) matrices, and where they are positive definite; p is 1 or 2.
 
-    The inverse of others is zero.
+    Elsewhere the inverse is the identity.
     """
-    first = information[:, 0, 0]
-    if information.shape[1] == 1:
-        determinant, adjugate = first, np.ones_like(information)
-    else:
-        determinant = first * information[:, 1, 1] - information[:, 0, 1] * information[:, 1, 0]
-        adjugate = np.empty_like(information)
-        adjugate[:, 0, 0], adjugate[:, 1, 1] = information[:, 1, 1], first
-        adjugate[:, 0, 1], adjugate[:, 1, 0] = -information[:, 0, 1], -information[:, 1, 0]
-    separate = (first > 0.0) & (determinant > 0.0)
-    adjugate *= (separate / np.where(separate, determinant, 1.0))[:, np.newaxis, np.newaxis]
-    return adjugate, separate
+    separate = (information[:, 0, 0] > 0.0) & (np.linalg.det(information) > 0.0)
+    safe = np.where(separate[:, np.newaxis, np.newaxis], information, np.eye(len(information[0])))
+    return np.linalg.inv(safe), separate
 
 
 def _hermitian_root(shaft: ComplexArray) -> ComplexArray:

@@ -55,14 +55,7 @@ def effective_stiffness_n_per_m(
     bracket_stiffness_n_per_m
         Radial stiffness k_b of the bracket. Its inertia is neglected, which biases the result by
         m_b ω² / k_b (+0.4 % on the paper's machine at rated speed).
-
-    Raises
-    ------
-    ValueError
-        If the shaft amplitude is not positive.
     """
-    if not shaft_um_pk > 0.0:
-        raise ValueError(f"shaft amplitude must be above 0 µm, got {shaft_um_pk}")
     # Brito et al., equation (5): k_eff = |X_b| / |U| · k_b
     return bearing_um_pk / shaft_um_pk * bracket_stiffness_n_per_m
 

@@ -4,8 +4,9 @@ import numpy as np
 
 from core.arrays import ComplexArray
 from core.machine.unit import BracketDynamics
+from core.quality import Reason
 from core.spectra.cross_spectrum import CrossSpectrum, average
-from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
+from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, films
 from core.stiffness.dynamic_lines import DynamicSettings
 
 FREQUENCY_HZ = 600.0 / 8192 * np.arange(1, 342)
@@ -46,6 +47,17 @@ def shaken(
 
 def averaged(phasors: ComplexArray) -> CrossSpectrum:
     return average(FREQUENCY_HZ, phasors, np.ones(phasors.shape[:2], dtype=bool))
+
+
+def dynamic_stiffness(
+    spectrum: CrossSpectrum,
+    bracket: BracketDynamics,
+    turn_hz: tuple[float, float],
+    settings: DynamicSettings,
+    n_integrations: tuple[int, int] = (2, 2),
+) -> DynamicStiffness | Reason:
+    """Fit the film of one bearing alone."""
+    return films([FilmSpectrum(spectrum, bracket, turn_hz, n_integrations)], settings)[0]
 
 
 def found(

@@ -14,14 +14,15 @@ from rigs.shaken_shaft import (
     STIFFNESS,
     TURN_HZ,
     averaged,
+    dynamic_stiffness,
     found,
     hann_noise,
 )
 
 from core.arrays import ComplexArray, FloatArray
 from core.quality import Reason
-from core.spectra.cross_spectrum import average, phasor_power_per_density
-from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, dynamic_stiffness, films
+from core.spectra.cross_spectrum import phasor_power_per_density
+from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, films
 from core.stiffness.dynamic_lines import DynamicSettings
 from core.stiffness.film_covariance import DELAY
 from core.stiffness.film_covariance import STIFFNESS as STIFFENING
@@ -280,14 +281,6 @@ def test_a_dead_channel_is_never_a_stiffness(recording: Recording, channel: int)
     phasors[:, channel] = 0.0
     result = dynamic_stiffness(averaged(phasors), BRACKET, TURN_HZ, DynamicSettings())
     assert result is Reason.INSUFFICIENT_EXCITATION
-
-
-def test_channels_of_different_segments_are_refused(recording: Recording) -> None:
-    usable = np.ones((24, 4), dtype=bool)
-    usable[0, 2] = False
-    spectrum = average(FREQUENCY_HZ, recording(), usable)
-    with pytest.raises(ValueError, match="different segments"):
-        dynamic_stiffness(spectrum, BRACKET, TURN_HZ, NOISE_FREE)
 
 
 @pytest.mark.parametrize(
