@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from scipy import fft
 
-from core.arrays import ComplexArray, FloatArray, SampleArray
+from core.arrays import ComplexArray, FloatArray
 from core.checks.sensor_checks import SensorLimits
 
 
@@ -83,23 +83,6 @@ def taper_weights(n_samples: int) -> FloatArray:
     return weights
 
 
-def tapered(samples: SampleArray | FloatArray) -> FloatArray:
-    """Return samples without each channel's mean, multiplied by `taper_weights`.
-
-    Parameters
-    ----------
-    samples : (n_channels, n_samples)
-
-    Returns
-    -------
-    (n_channels, n_samples)
-    """
-    centred = np.asarray(samples, dtype=np.float64)
-    centred = centred - centred.mean(axis=1, keepdims=True)
-    weighted: FloatArray = centred * taper_weights(centred.shape[1])
-    return weighted
-
-
 def bin_phasors(tapered_samples: FloatArray, n_lines: int) -> ComplexArray:
     """Return the phasors at the first `n_lines` bins above zero of the discrete Fourier transform.
 
@@ -109,25 +92,6 @@ def bin_phasors(tapered_samples: FloatArray, n_lines: int) -> ComplexArray:
     """
     phasors: ComplexArray = fft.rfft(tapered_samples, axis=1)[:, 1 : n_lines + 1]
     return phasors
-
-
-def exact_phasors(
-    tapered_samples: FloatArray, rate_hz: float, frequency_hz: FloatArray
-) -> ComplexArray:
-    """Return the phasors at given frequencies, on or between the bins, as Fourier sums.
-
-    Parameters
-    ----------
-    tapered_samples : (n_channels, n_samples)
-    frequency_hz : (n_lines,)
-        Between zero and ``rate_hz / 2``, both excluded.
-
-    Returns
-    -------
-    (n_channels, n_lines)
-    """
-    n_samples = tapered_samples.shape[1]
-    return line_phasors(tapered_samples, turning_factors(n_samples, rate_hz, frequency_hz))
 
 
 def turning_factors(n_samples: int, rate_hz: float, frequency_hz: FloatArray) -> ComplexArray:

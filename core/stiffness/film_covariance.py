@@ -23,7 +23,7 @@ from core.spectra.cross_spectrum import (
     correlated_sum,
 )
 from core.stiffness.dynamic_lines import own_power
-from core.stiffness.film_fit import N_UNKNOWNS, FilmLines
+from core.stiffness.film_fit import MIN_SHARE, N_UNKNOWNS, FilmLines
 
 PART_PRODUCTS: FloatArray = np.array(
     [
@@ -83,7 +83,7 @@ class FilmFits:
     @cached_property
     def _normal(self) -> tuple[FloatArray, FloatArray]:
         normal, share = self.lines.normal(self.weight)
-        normal[~(share > 0.0)] = np.eye(N_UNKNOWNS)
+        normal[~(share >= MIN_SHARE)] = np.eye(N_UNKNOWNS)  # may be singular
         return normal, share
 
     @property

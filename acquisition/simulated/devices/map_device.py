@@ -15,7 +15,7 @@ from acquisition.simulated.devices.register_image import RegisterImage, no_value
 from acquisition.simulated.feed import Ledger, SampleFeed
 from core.arrays import FloatArray
 from core.samples.calibration import UnitCalibration
-from core.spectra.lines import exact_phasors, tapered
+from core.spectra.lines import part_phasors, turning_factors
 from core.spectra.polls import VectorPart, VectorRow
 from core.units import hz_from_rpm
 
@@ -207,7 +207,8 @@ class VectorDevice(MapDevice):
         turns = np.full((len(samples), 2), np.nan, dtype=np.complex128)
         if 0.0 < turn_hz < rate_hz / 2.0:
             order_hz = turn_hz * np.array([1.0, self._vortex_order])
-            turns = exact_phasors(tapered(samples), rate_hz, order_hz)
+            turning = turning_factors(samples.shape[1], rate_hz, order_hz)
+            turns = part_phasors(samples, turning)
             turns *= np.exp(-2j * np.pi * order_hz * first_index / rate_hz)
         return {
             VectorPart.ORDER1_AMPLITUDE: np.abs(turns[:, 0]),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rigs.tapered import tapered
 from scipy import signal
 
 from core.arrays import FloatArray
@@ -13,7 +14,7 @@ from core.monitor.assessment import AnalysisSettings
 from core.quality import GOOD, Reading
 from core.samples.ring import Window
 from core.spectra.cross_spectrum import CrossSpectrum, average
-from core.spectra.lines import bin_phasors, exact_phasors, hann, peak_frequency_hz, tapered
+from core.spectra.lines import bin_phasors, hann, part_phasors, peak_frequency_hz, turning_factors
 from core.spectra.segments import SegmentTransform
 
 RATE_HZ = 600.0
@@ -21,10 +22,11 @@ RATE_HZ = 600.0
 
 def test_the_taper_is_the_one_of_scipy_and_phasors_on_a_bin_are_the_transform_there() -> None:
     np.testing.assert_allclose(hann(8192), signal.get_window("hann", 8192), atol=1e-15)
-    samples = tapered(np.random.default_rng(2).normal(size=(2, 1024)))
+    samples = np.random.default_rng(2).normal(size=(2, 1024))
     frequency_hz = np.array([3, 10, 77]) * RATE_HZ / 1024
-    exact = exact_phasors(samples, RATE_HZ, frequency_hz)
-    np.testing.assert_allclose(exact, bin_phasors(samples, 100)[:, [2, 9, 76]], atol=1e-12)
+    exact = part_phasors(samples, turning_factors(1024, RATE_HZ, frequency_hz))
+    bins = bin_phasors(tapered(samples), 100)
+    np.testing.assert_allclose(exact, bins[:, [2, 9, 76]], atol=1e-12)
 
 
 @given(
@@ -38,10 +40,9 @@ def test_a_tone_of_any_frequency_reads_its_amplitude_from_a_minute_of_samples(
     """Required: 0.3 % for 0.3 to 3 Hz from 60 s."""
     time_s = np.arange(int(60 * RATE_HZ)) / RATE_HZ
     tone = gap_um + 60.0 * np.cos(2 * np.pi * frequency_hz * time_s + phase_rad)
+    turning = turning_factors(8192, RATE_HZ, np.array([frequency_hz]))
     segments = [
-        exact_phasors(
-            tapered(tone[np.newaxis, start : start + 8192]), RATE_HZ, np.array([frequency_hz])
-        )
+        part_phasors(tone[np.newaxis, start : start + 8192], turning)
         for start in range(0, tone.size - 8191, 7168)
     ]
     spectrum = average(

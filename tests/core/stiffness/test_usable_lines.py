@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from rigs.tapered import tapered
 from scipy import signal
 
 from core.spectra.cross_spectrum import (
@@ -16,7 +17,7 @@ from core.spectra.cross_spectrum import (
     leakage_kernel,
     phasor_power_per_density,
 )
-from core.spectra.lines import bin_phasors, tapered
+from core.spectra.lines import bin_phasors
 from core.stiffness.dynamic_lines import between_harmonics, little_leakage
 
 FREQUENCY_HZ = 600.0 / 8192 * np.arange(1, 342)

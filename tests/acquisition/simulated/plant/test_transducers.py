@@ -16,7 +16,7 @@ from core.checks.channels import COUNTS_FULL_SCALE
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
 from core.samples.calibration import UnitCalibration
-from core.spectra.lines import exact_phasors, tapered
+from core.spectra.lines import part_phasors, turning_factors
 from core.spectra.speed import KeyPhase, read_key_phase
 
 MachineWith = Callable[[Measurand], Unit]
@@ -169,7 +169,8 @@ def test_runout_has_the_same_phase_to_the_mark_whenever_a_record_begins(
         assert isinstance(found, KeyPhase)
         assert found.speed_rpm == pytest.approx(speed_rpm, rel=1e-4)
         turn_hz = np.array([found.speed_rpm / 60.0])
-        gap = complex(exact_phasors(tapered(record), 600.0, turn_hz)[0, 0])
+        turning = turning_factors(record.shape[1], 600.0, turn_hz)
+        gap = complex(part_phasors(record, turning)[0, 0])
         to_mark = -gap * np.exp(-1j * found.shaft_angle_rad)
         assert abs(to_mark) == pytest.approx(20.0, rel=1e-3)
         expected = 0.8 - 2.0 * math.pi * mark_turns
