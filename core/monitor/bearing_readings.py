@@ -70,7 +70,7 @@ class BearingReadings:
     evidence: Evidence
 
 
-class UnitReadings:
+class UnitEvaluation:
     """Readings of the bearings of one unit, averaged over the same segments or polls.
 
     The films of all bearings are fitted together, when the readings of the first are asked for.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from core.condition.probe_axes import Growth
 from core.machine.unit import Unit, bearings_with_new_references, require_same_machine
 from core.monitor.assessment import AnalysisSettings, Assessment
-from core.monitor.bearing_readings import UnitReadings
+from core.monitor.bearing_readings import UnitEvaluation
 from core.monitor.refresh import Refresh
 from core.samples.blocks import BlockMisfitError, SampleBlock
 from core.samples.gaps import Gap, Reach, SampleAccount, outage, restart
@@ -233,10 +233,10 @@ class UnitMonitor:
     def _refreshes(self, newest: Segment, window: Window) -> Iterator[Refresh]:
         n_wanted, kept = self._transform.n_segments, self._transform.snapshot()
         n_possible = 1 + (newest.first_index - self._first_start) // self._transform.hop_samples
-        together = UnitReadings(self.unit, self._settings, kept, min(n_wanted, n_possible))
+        evaluation = UnitEvaluation(self.unit, self._settings, kept, min(n_wanted, n_possible))
         for bearing in self.unit.bearings:
             refresh = Refresh(
-                unit_readings=together,
+                evaluation=evaluation,
                 bearing=bearing,
                 newest=window,
                 n_voided=self._n_voided,

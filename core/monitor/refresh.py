@@ -10,7 +10,7 @@ from core.condition.probe_axes import Growth
 from core.condition.shaft_readings import measured_growth, measures_growth, position_results
 from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import Assessment, AveragingWindow, OrbitTrace
-from core.monitor.bearing_readings import UnitReadings
+from core.monitor.bearing_readings import UnitEvaluation
 from core.monitor.overall_readings import polled_readings, recent_readings
 from core.quality import worst
 from core.samples.ring import Window
@@ -38,7 +38,7 @@ class Refresh:
 
     Parameters
     ----------
-    unit_readings
+    evaluation
         Readings of all bearings over the same segments or polls.
     newest
         Samples of the newest segment or poll.
@@ -48,7 +48,7 @@ class Refresh:
         Last measured thermal growth of the gaps; None if there is none.
     """
 
-    unit_readings: UnitReadings
+    evaluation: UnitEvaluation
     bearing: Bearing
     newest: Window
     n_voided: int
@@ -57,12 +57,12 @@ class Refresh:
     @property
     def unit(self) -> Unit:
         """Unit of the bearing."""
-        return self.unit_readings.unit
+        return self.evaluation.unit
 
     @property
     def kept(self) -> KeptSegments:
         """Averaged segments or polls, at least one."""
-        return self.unit_readings.kept
+        return self.evaluation.kept
 
     @cached_property
     def averaged(self) -> AveragingWindow:
@@ -77,7 +77,7 @@ class Refresh:
             n_segments=n_segments,
             n_segments_wanted=self.kept.n_segments,
             n_voided=self.n_voided,
-            coverage=n_segments / self.unit_readings.n_expected,
+            coverage=n_segments / self.evaluation.n_expected,
             duration_s=(last.stop_index - first.first_index) / self.unit.rate_hz,
         )
 
@@ -89,7 +89,7 @@ class Refresh:
     def assessment(self) -> Assessment:
         """Return the assessment of the bearing, computed from this input."""
         newest, rows = self._segment, self._rows
-        found = self.unit_readings.of(self.bearing, self._position)
+        found = self.evaluation.of(self.bearing, self._position)
         return Assessment(
             unit=self.unit.id,
             bearing=self.bearing.id,

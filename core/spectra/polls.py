@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
 from core.machine.channel import displacement_factor
@@ -21,7 +20,7 @@ from core.quality import Level, Quality, Reason, bad
 from core.samples.ring import Window
 from core.spectra.lines import SegmentSettings
 from core.spectra.runout import runout_verdict
-from core.spectra.segments import ORDER1, VORTEX, KeptSegments, Segment
+from core.spectra.segments import ORDER1, VORTEX, KeptSegments, Segment, usable_channels
 from core.spectra.speed import running_speed
 from core.units import hz_from_rpm
 
@@ -137,7 +136,7 @@ class PollTransform(KeptSegments):
         amplitude = np.stack([values for values, _ in of_line], axis=1)
         quality = of_line[ORDER1][1], of_line[VORTEX][1]
         angle_deg, angle_quality = self._of_channels(VectorPart.ORDER1_PHASE, window)
-        has_phase = _usable(angle_quality)
+        has_phase = usable_channels(angle_quality)
         factor = np.array([displacement_factor(c, order_hz) for c in self._unit.channels])
         # without a phase, the angle of the factor would look like a measured one
         turned: ComplexArray = np.where(has_phase[:, np.newaxis], factor, np.abs(factor))
@@ -151,7 +150,7 @@ class PollTransform(KeptSegments):
                 stop_index=window.stop_index,
                 stop_ns=window.start_ns,
                 channel_quality=gap_quality,
-                usable=_usable(gap_quality),
+                usable=usable_channels(gap_quality),
                 slow=window.slow,
                 mean=gap_um,
                 speed=speed,
@@ -160,7 +159,7 @@ class PollTransform(KeptSegments):
                 has_vortex_peak=False,
                 order_phasors_um_pk=phasors,
                 order_quality=quality,
-                order_usable=np.array([_usable(of_line) for of_line in quality]),
+                order_usable=np.array([usable_channels(of_line) for of_line in quality]),
                 has_phase=np.array([has_phase, np.zeros_like(has_phase)]),
                 at_mark_um_pk=phasors[:, ORDER1],
                 runout=self._runout,
@@ -189,7 +188,3 @@ class PollTransform(KeptSegments):
         if not math.isfinite(value):
             return 0.0, bad(Reason.NOT_FINITE)
         return (value, quality) if value >= least else (0.0, bad(Reason.OUT_OF_RANGE))
-
-
-def _usable(qualities: Sequence[Quality]) -> npt.NDArray[np.bool_]:
-    return np.array([quality.level is not Level.BAD for quality in qualities])

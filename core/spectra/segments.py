@@ -263,12 +263,12 @@ class SegmentTransform(KeptSegments):
         prepared = centred * taper_weights(samples.shape[1])
         lines = bin_phasors(prepared, prepared.shape[1] // 2 - 1)
         bins = lines[:, : self.frequency_hz.size] * self._bin_factor
-        key_phase = self._key_phase(samples, window.rate_hz, _usable(quality))
-        speed = self._speed(window, bins, _usable(quality), key_phase)
+        key_phase = self._key_phase(samples, window.rate_hz, usable_channels(quality))
+        speed = self._speed(window, bins, usable_channels(quality), key_phase)
         clipped = self._clipped(quality, samples)
         quality = self._judged(quality, samples, mean, speed)
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
-        vortex_hz = self._vortex_hz(turn_hz, bins, _usable(quality))
+        vortex_hz = self._vortex_hz(turn_hz, bins, usable_channels(quality))
         order_hz = np.array([turn_hz, vortex_hz or self._settings.vortex_order * turn_hz])
         factors = _factors(self._unit.channels, order_hz)
         turn_samples = window.rate_hz / turn_hz
@@ -278,7 +278,7 @@ class SegmentTransform(KeptSegments):
         orders[:, ORDER1], runout = without_runout(
             orders[:, ORDER1], self._unit, shafts, speed, key_phase
         )
-        angle_rad, usable = shaft_angle_rad(speed, key_phase), _usable(quality)
+        angle_rad, usable = shaft_angle_rad(speed, key_phase), usable_channels(quality)
         segment = Segment(
             epoch=window.epoch,
             first_index=window.first_index,
@@ -397,7 +397,8 @@ class SegmentTransform(KeptSegments):
         return vortex_frequency_hz(spectra, band_hz)
 
 
-def _usable(qualities: Sequence[Quality]) -> npt.NDArray[np.bool_]:
+def usable_channels(qualities: Sequence[Quality]) -> npt.NDArray[np.bool_]:
+    """Return a mask (n_channels,) of the channels that are not bad."""
     return np.array([quality.level is not Level.BAD for quality in qualities])
 
 

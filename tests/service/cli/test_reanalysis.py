@@ -15,7 +15,7 @@ from acquisition.delivery.blocks import BlockAssembler, RawBlock, sample_block
 from acquisition.recordings.reader import open_recording
 from acquisition.recordings.source import RecordingSource
 from core.monitor.assessment import AnalysisSettings, Assessment
-from core.monitor.bearing_readings import UnitReadings
+from core.monitor.bearing_readings import UnitEvaluation
 from core.monitor.monitor import UnitMonitor
 from core.monitor.refresh import Refresh
 from core.samples.blocks import Rejection
@@ -111,8 +111,8 @@ def averaged(one: Refresh, bearing: str, first_index: int, n_usable: int) -> Ref
         replace(segment, first_index=first_index, order_usable=each) for each in usable
     )
     bearings = {bearing.id: bearing for bearing in one.unit.bearings}
-    together = UnitReadings(one.unit, ANALYSIS, kept, one.unit_readings.n_expected)
-    return replace(one, bearing=bearings[bearing], unit_readings=together)
+    evaluation = UnitEvaluation(one.unit, ANALYSIS, kept, one.evaluation.n_expected)
+    return replace(one, bearing=bearings[bearing], evaluation=evaluation)
 
 
 @pytest.mark.parametrize(
