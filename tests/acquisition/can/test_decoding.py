@@ -150,7 +150,7 @@ def test_a_lost_part_drops_the_instant(assembler_with):
 @pytest.mark.parametrize(
     ("signals", "words"),
     [
-        ("M.a M.c", "must all be in one message"),
+        ("M.a M.c", "all signals must be in one message"),
         ("M.count", "in every frame of a multiplexed message"),
     ],
 )

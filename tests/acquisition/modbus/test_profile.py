@@ -123,7 +123,7 @@ def test_samples_lie_channel_by_channel_behind_slow_values_and_before_a_checksum
     ("register", "value", "complaint"),
     [
         (0, 0x5058, "magic is 0x5058, expected 0x5057"),
-        (1, 3, "version is 3, known is 2"),
+        (1, 3, "version is 3, expected 2"),
         (2, 0, "n_channels is 0"),
         (2, 33, "n_channels is 33"),
         (3, 0, "samples_per_slot is 0"),
