@@ -76,7 +76,7 @@ def quietest_rms(samples: FloatArray) -> FloatArray:
     n_channels, n_samples = samples.shape
     length = n_samples // N_PIECES
     if length == 0:
-        raise ValueError(f"needs {N_PIECES} samples or more, got {n_samples}")
+        raise ValueError(f"expected at least {N_PIECES} samples, got {n_samples}")
     # aligned to the end, so that the newest sample is always included
     pieces = samples[:, n_samples - N_PIECES * length :].reshape(n_channels, N_PIECES, length)
     quietest: FloatArray = pieces.std(axis=2, dtype=np.float64).min(axis=1)

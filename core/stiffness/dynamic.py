@@ -137,7 +137,7 @@ def dynamic_stiffness(
     """
     n_averaged = int(spectrum.n_segments.max())
     if np.any(spectrum.n_segments != n_averaged):
-        raise ValueError(f"channels averaged over different segments: {spectrum.n_segments}")
+        raise ValueError(f"channels must have the same segments, got {spectrum.n_segments}")
     if n_averaged < settings.min_segments:
         return Reason.FEW_SEGMENTS
     lines = used_lines(spectrum, turn_hz, settings)

@@ -41,7 +41,7 @@ def test_of_eight_samples_or_more_a_healthy_channel_moves_by_more_than_a_count()
     assert judged(flicker) == bad(Reason.DEAD)
     assert judged(np.zeros(N_SAMPLES)) == bad(Reason.DEAD)
     assert judged(flicker + 0.5, turning=False) == GOOD
-    with pytest.raises(ValueError, match="needs 8 samples or more, got 7"):
+    with pytest.raises(ValueError, match="expected at least 8 samples, got 7"):
         quietest_rms(np.zeros((1, 7)))
 
 
