@@ -126,7 +126,7 @@ def execute_command(servers: Mapping[str, DaqServer], line: str) -> dict[str, st
     if count and int(count[0]) > MAX_COUNT:
         return {"refused": f"COUNT is {count[0]}, at most {MAX_COUNT}"}
     if unit not in servers:
-        return {"refused": f"no unit {unit} here; known are {', '.join(servers)}"}
+        return {"refused": f"unknown unit {unit}; known units: {', '.join(servers)}"}
     try:
         servers[unit].inject(fault, *map(int, count))
     except LookupError as error:

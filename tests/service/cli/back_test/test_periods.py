@@ -51,7 +51,9 @@ def test_times_need_an_offset_and_an_event_is_a_place_a_time_and_words() -> None
 
 @pytest.mark.parametrize("text", ["", "U1", "U1/ 2025-01-01T00:00:00Z", "U/1/2 x", "Ü 2025-01-01Z"])
 def test_what_is_no_event_is_refused_with_an_example(text: str) -> None:
-    with pytest.raises(ValueError, match="is not an event like 'U1 2026-03-01T08:00:00Z overhaul'"):
+    with pytest.raises(
+        ValueError, match="is not an event such as 'U1 2026-03-01T08:00:00Z overhaul'"
+    ):
         event_of(text)
 
 
