@@ -143,7 +143,7 @@ def scenario_of(simulation: SimulationSettings) -> Scenario:
         If the unit has a machine life instead of constant films.
     """
     if simulation.speed_rpm is None or simulation.power_mw is None:
-        raise LookupError("a simulated unit with a life has no constant scenario")
+        raise LookupError("a unit with life_seed has no constant scenario")
     return Scenario(
         bearings={bearing.bearing: _bearing_scenario(bearing) for bearing in simulation.bearing},
         speed_rpm=simulation.speed_rpm,

@@ -160,8 +160,8 @@ def map_figure(case: Case) -> Figure | None:
     plot.points([found.eccentricity_ratio], [found.oil_temperature_c], "alarm", 2.2)
     return Figure(
         plot,
-        f"What the baseline knows: the darker, the stiffer, {low / GN_PER_M:.3g} to"
-        f" {high / GN_PER_M:.3g} GN/m. Dashed: known from neighbours. White: too few readings to"
+        f"Stiffness of the baseline, darker if stiffer, {low / GN_PER_M:.3g} to"
+        f" {high / GN_PER_M:.3g} GN/m. Dashed: from neighbours. White: too few readings to"
         " compare. Red: the cell and reading of the alarm.",
     )
 

@@ -238,9 +238,7 @@ class ChannelSettings(Settings):
         for key in ("probe", "slow_roll"):
             if getattr(self, key) is not None and self.transducer not in SHAFT_TRANSDUCERS:
                 words = " or ".join(f'"{name}"' for name in SHAFT_TRANSDUCERS)
-                raise MisfitError(
-                    f"applies only to transducer {words}, not to {self.transducer}", key
-                )
+                raise MisfitError(f"applies only to transducer {words}, not {self.transducer}", key)
         if self.slow_roll is not None and self.probe is None:
             raise MisfitError("is required with slow_roll, which applies to one probe", "probe")
 
@@ -248,9 +246,7 @@ class ChannelSettings(Settings):
         allowed = ALLOWED_UNITS[self.transducer]
         if self.sensitivity_unit not in allowed:
             words = " or ".join(f'"{unit}"' for unit in allowed)
-            raise MisfitError(
-                f"must be {words} for transducer {self.transducer}", "sensitivity_unit"
-            )
+            raise MisfitError(f"must be {words} for {self.transducer}", "sensitivity_unit")
         low, high = PLAUSIBLE_V_PER_UNIT[self.transducer]
         scale = V_PER_ENGINEERING_UNIT[self.sensitivity_unit]
         if self.sensitivity is None or not low <= abs(self.sensitivity) * scale <= high:

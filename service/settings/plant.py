@@ -219,9 +219,7 @@ class AnalysisModel(Settings):
     def _check(self) -> Self:
         low, high = self.vortex_band
         if not 0.05 <= low < high <= 0.95:
-            raise MisfitError(
-                "must be [low, high] with low < high, within 0.05 to 0.95", "vortex_band"
-            )
+            raise MisfitError("must be [low, high] with 0.05 <= low < high <= 0.95", "vortex_band")
         if not low < self.vortex_order < high:
             limits = f"must lie within vortex_band = [{low:g}, {high:g}]"
             raise MisfitError(limits, "vortex_order")

@@ -37,9 +37,7 @@ class StoreSettings(Settings):
                 "postgresql",
             )
         if "passfile" in keywords and self.password_file is not None:
-            raise MisfitError(
-                "must not be given together with passfile in postgresql", "password_file"
-            )
+            raise MisfitError("must not be given with passfile in postgresql", "password_file")
         return self
 
     @property

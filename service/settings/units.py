@@ -205,9 +205,7 @@ class UnitSettings(Settings):
         taken = {channel.id for channel in self.channel}
         for n, slow in enumerate(self.slow_channel):
             if slow.id in taken:
-                raise MisfitError(
-                    "is already the id of a waveform channel", "slow_channel", n, "id"
-                )
+                raise MisfitError("is the id of a waveform channel", "slow_channel", n, "id")
         refuse_twice(("slow_channel", n, "id", slow.id) for n, slow in enumerate(self.slow_channel))
         refuse_twice(("bearing", n, "id", bearing.id) for n, bearing in enumerate(self.bearing))
         for n, bearing in enumerate(self.bearing):
@@ -244,9 +242,7 @@ class UnitSettings(Settings):
     def _check_key_phase(self) -> None:
         if self.key_phase is not None and self.key_phase not in self._key_phases():
             words = ", ".join(self._key_phases()) or "none"
-            raise MisfitError(
-                f'must be a channel with transducer "key_phase"; known: {words}', "key_phase"
-            )
+            raise MisfitError(f'must have transducer "key_phase"; known: {words}', "key_phase")
 
     def _check_slow(self, id_: str | None, unit: str, *at: int | str) -> None:
         units = {channel.id: channel.unit for channel in self.slow_channel}
@@ -265,9 +261,7 @@ class UnitSettings(Settings):
         for number, bearing in enumerate(self.bearing):
             if bearing.id not in names:
                 allowed = " or ".join(names)
-                raise MisfitError(
-                    f"must be {allowed} for a simulated unit", "bearing", number, "id"
-                )
+                raise MisfitError(f"must be {allowed} in a simulation", "bearing", number, "id")
         cutoff_hz = simulation.hydraulic_cutoff_hz
         if cutoff_hz is not None and cutoff_hz >= self.rate_hz / 2:
             limit = f"must be below half the sampling rate, {self.rate_hz / 2:g} Hz"

@@ -175,9 +175,7 @@ class CanSettings(Settings):
 
     def _check_speed(self) -> None:
         if self.data_bitrate is not None and not self.fd:
-            raise MisfitError(
-                "requires CAN FD; set fd = true or remove data_bitrate", "data_bitrate"
-            )
+            raise MisfitError("requires CAN FD; set fd = true", "data_bitrate")
         if self.interface in LISTENING_IS_SET:
             for key in ("bitrate", "data_bitrate"):
                 if getattr(self, key) is not None:

@@ -103,9 +103,7 @@ class MappedDeviceSettings(ModbusLinkSettings):
             if value.channel not in known:
                 place = (*at, "map", "value", n, "channel") if self.map else (*at, "map_file")
                 words = ", ".join(known) or "none"
-                raise MisfitError(
-                    f"unknown channel {value.channel!r}; known channels: {words}", *place
-                )
+                raise MisfitError(f"unknown channel {value.channel!r}; known: {words}", *place)
 
 
 class ModbusPolledSettings(MappedDeviceSettings):

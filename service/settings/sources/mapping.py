@@ -152,9 +152,7 @@ class ImportMapping(Settings):
                 *("time", "source"),
             )
         if time.source != "file" and self.format in CAN_LOGS:
-            raise MisfitError(
-                f'must be "file" for {self.format}, which stores times', "time", "source"
-            )
+            raise MisfitError(f'must be "file" for {self.format} logs', "time", "source")
         if time.source == "file" and self.format in IN_UTC and time.zone != "UTC":
             raise MisfitError(f'must be "UTC" for {self.format}, which stores UTC', "time", "zone")
         for key in ("column", "form"):

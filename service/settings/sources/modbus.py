@@ -50,9 +50,7 @@ class IdentificationIdentity(Settings):
     @model_validator(mode="after")
     def _check_any(self) -> Self:
         if self.vendor is None and self.product_code is None and self.revision is None:
-            raise MisfitError(
-                "at least one of vendor, product_code and revision must be given", "kind"
-            )
+            raise MisfitError("vendor, product_code or revision must be given", "kind")
         return self
 
 

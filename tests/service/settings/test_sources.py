@@ -193,7 +193,7 @@ def test_an_identity_reaches_the_adapter_as_it_was_written() -> None:
         ({"kind": "signature", "address": 0, "words": [65_536]}, "less than or equal to 65535"),
         ({"kind": "signature", "address": 65_535, "words": [1, 2]}, "beyond register 65535"),
         ({"kind": "signature", "address": 0, "words": [1], "function": 6}, "should be 3 or 4"),
-        ({"kind": "identification"}, "at least one of vendor, product_code and revision"),
+        ({"kind": "identification"}, "vendor, product_code or revision must"),
         ({"kind": "face"}, "'signature', 'identification'"),
     ],
 )

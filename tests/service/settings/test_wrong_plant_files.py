@@ -118,7 +118,7 @@ BOTH = f'postgresql = "{ADDRESS} passfile=x"\npassword_file = "y"'
         ("store", 'postgresql = "postgresql://a:x@b.c/d"', "postgresql", "not contain a password"),
         ("store", 'postgresql = "no address"', "postgresql", "is not a libpq connection string"),
         ("store", 'postgresql = "hostname=x"', "postgresql", "is not a libpq connection string"),
-        ("store", BOTH, "password_file = 'y'", "together with passfile"),
+        ("store", BOTH, "password_file = 'y'", "not be given with passfile"),
     ],
 )
 def test_a_table_that_does_not_fit_is_refused_at_its_line_and_no_password_is_shown(

@@ -77,7 +77,7 @@ def test_neither_the_only_admin_nor_one_who_is_not_there_is_changed(
         lambda: access.accounts.set_role("nobody", Role.VIEWER, T0),
         lambda: people.set_password("nobody", PASSWORD, T0),
     ):
-        with pytest.raises(AccessRefusedError, match="there is no account nobody"):
+        with pytest.raises(AccessRefusedError, match="account nobody does not exist"):
             change()
     assert store.audit.entries(AuditQuery()) == told
     access.accounts.set_role("berta", Role.ADMIN, T0)

@@ -177,7 +177,7 @@ def test_a_disk_that_is_away_is_told_and_its_recordings_are_not_given_up(
     rig.roots[CONTINUOUS].rename(tmp_path / "unmounted")
     keeper.look()
     assert keeper.trouble is not None
-    assert "folder of 1 recordings is not there" in keeper.trouble
+    assert "folder of 1 recordings does not exist" in keeper.trouble
     assert [file.state for file in rig.files()] == [WaveformState.PRESENT]
     (tmp_path / "unmounted").rename(rig.roots[CONTINUOUS])
     keeper.look()

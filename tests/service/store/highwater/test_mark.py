@@ -64,7 +64,7 @@ def test_an_older_database_is_told_with_what_is_missing_and_since_when() -> None
         (
             {"store": "00" * 16, "n_commits": 7},
             Kind.REPLACED,
-            "150 transactions.*7 are in this one",
+            "150 transactions.*this one has 7",
         ),
     ],
 )
