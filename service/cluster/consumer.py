@@ -215,7 +215,7 @@ def consumer_metrics(consumer: Consumer) -> Iterator[Metric]:
     yield one("stream_connected", "1 while blocks are read from the stream.", connected)
     yield gauge(
         "stream_pending",
-        "Messages of the unit on the stream that were not fetched yet.",
+        "Messages of the unit in the stream that are not fetched yet.",
         UNIT,
         (((unit,), n) for unit, n in consumer.n_pending.items()),
     )

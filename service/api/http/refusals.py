@@ -64,15 +64,17 @@ class Refusal:
         await send({"type": "http.response.body", "body": body, "more_body": False})
 
 
-NOT_HTTP = Refusal(400, "Not a request", "malformed HTTP/1.1 request")
-NO_HOST = Refusal(400, "No host", "a request must have exactly one Host header")
-NOT_UTF8 = Refusal(400, "Not UTF-8", "the body is not valid UTF-8")
-TOO_DEEP = Refusal(400, "Nested too deep", "the JSON body is nested too deeply")
-TOO_SLOW = Refusal(408, "Too slow", "the request was not complete in time")
+NOT_HTTP = Refusal(400, "Malformed request", "malformed HTTP/1.1 request")
+NO_HOST = Refusal(400, "Invalid Host header", "a request must have exactly one Host header")
+NOT_UTF8 = Refusal(400, "Invalid UTF-8", "the body is not valid UTF-8")
+TOO_DEEP = Refusal(400, "JSON nested too deeply", "the JSON body is nested too deeply")
+TOO_SLOW = Refusal(408, "Request timeout", "the request was not received in time")
 BODY_TOO_LARGE = Refusal(413, "Body too large", "the body is larger than allowed")
-TARGET_TOO_LONG = Refusal(414, "Address too long", "path and query are longer than allowed")
-WRONG_HOST = Refusal(421, "Wrong host", "the requested host is not a name of this service")
-HEAD_TOO_LARGE = Refusal(431, "Headers too large", "line and headers are longer than allowed")
+TARGET_TOO_LONG = Refusal(414, "URI too long", "path and query are longer than allowed")
+WRONG_HOST = Refusal(421, "Unknown host", "the Host header is not a name of this service")
+HEAD_TOO_LARGE = Refusal(
+    431, "Headers too large", "request line and headers are larger than allowed"
+)
 BUSY = Refusal(503, "Busy", "too many concurrent requests; try again", retry_after_s=1)
 FULL = Refusal(503, "Busy", "too many connections; try again", retry_after_s=5)
-NO_ANSWER = Refusal(503, "No answer in time", "the request timed out; request a shorter range", 5)
+NO_ANSWER = Refusal(503, "Response timeout", "the request timed out; request a shorter range", 5)

@@ -240,10 +240,12 @@ def bearing_router(context: Context) -> APIRouter:
         context.bearing(unit, bearing)
         if quantity not in BY_NAME or not BY_NAME[quantity].has_uncertainty:
             detail = f"quantity {quantity!r} has no uncertainty budget; see /api/v1/quantities"
-            raise ProblemError(404, "No such budget", detail)
+            raise ProblemError(404, "No uncertainty budget", detail)
         found = _budget(context.live.current(unit, bearing), quantity)
         if found is None:
-            detail = f"{quantity} has no budget now: no value, or too few segments yet"
+            detail = (
+                f"{quantity} has no uncertainty budget, because it has no value or too few segments"
+            )
             raise ProblemError(409, "No result", detail)
         return found
 

@@ -151,7 +151,7 @@ def test_a_recording_being_written_is_none_yet_and_is_never_overwritten(
         with pytest.raises(ConfigError, match=r"run\.incomplete: the folder exists already"):
             RecordingWriter(folder, unit, "another")
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
-    with pytest.raises(ConfigError, match="run: already exists"):
+    with pytest.raises(ConfigError, match="run: folder exists already"):
         RecordingWriter(folder, unit, "another")
     assert open_recording(folder).manifest.n_samples == 10
 

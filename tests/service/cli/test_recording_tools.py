@@ -90,7 +90,7 @@ def test_verify_reads_every_page(folder: Path) -> None:
     result = padwatch_recording("verify", folder)
     assert (result.exit_code, result.stdout) == (
         0,
-        f"{folder}: sound, 200 samples of each channel\n",
+        f"{folder}: intact, 200 samples of each channel\n",
     )
     assert json.loads(padwatch_recording("verify", folder, "--json").stdout) == {
         "folder": str(folder),
@@ -181,7 +181,7 @@ def test_what_is_exported_can_be_imported_again(
             1,
             "channel ujb_shaft_z is mapped, but unit U1 has ujb_shaft",
         ),
-        ('zone = "UTC"', "", 2, "time.zone (by default): is needed"),
+        ('zone = "UTC"', "", 2, "time.zone (by default): is required"),
         (
             'unit = "r/min"',
             'unit = "degF"',

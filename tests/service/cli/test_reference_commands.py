@@ -58,7 +58,7 @@ def test_what_was_set_is_listed_with_time_author_and_what_was_before(plant_path:
         ((), {"x_um": "nan"}, "gap x is nan µm, must be above 0 and at most 10000 µm"),
         ((), {"opposite_x_um": 2000}, "bearing UJB has no opposite probe in x"),
         ((), {"bearing": "XJB"}, "unit U1: unknown bearing XJB; known bearings: UJB, LJB, TJB"),
-        ((), {"unit": "U9"}, "has no unit U9, it has U1, U2"),
+        ((), {"unit": "U9"}, "unknown unit U9; known units: U1, U2"),
         (
             ("--measured",),
             {"x_um": None, "y_um": None},

@@ -61,7 +61,7 @@ FIRST = ["content", "quantities", 0]
         ([*FIRST, "surface", "shape", "temperature", "width"], 0.0, "temperature: width = 0"),
         ([*FIRST, "grid", "eccentricity_width"], -0.05, "grid: eccentricity_width = -0.05"),
         ([*FIRST, "table", "cells", 0, "support"], "some", "cells.0.support: .* 'some'"),
-        ([*FIRST, "table", "cells", 0, "cell"], [99, 99, 99], "not all have as many axes"),
+        ([*FIRST, "table", "cells", 0, "cell"], [99, 99, 99], "all have the same number of axes"),
         ([*FIRST, "time_scatter", 0, "time_scale_h"], 1e9, "must increase"),
     ],
 )

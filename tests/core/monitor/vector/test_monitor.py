@@ -204,7 +204,7 @@ def test_a_restart_begins_a_new_average(rack) -> None:
 
 def test_a_block_of_something_else_is_refused(rack) -> None:
     [block] = polls(60.0, 50.0, 20.0, 10.0, n=1)
-    with pytest.raises(ValueError, match="block of unit 'U2'"):
+    with pytest.raises(ValueError, match="block of unit 'U1', got 'U2'"):
         rack().ingest(of_unit(block, unit="U2"))
     with pytest.raises(ValueError, match=r"at 0\.2 Hz, got 1\.0 Hz"):
         rack().ingest(of_unit(block, rate_hz=1.0))

@@ -94,11 +94,11 @@ def test_names_may_be_in_a_dictionary_and_numbers_of_any_kind(written: Written) 
     [
         ("time", columns()["time"].cast(pa.timestamp("us")), "column time of type timestamp[us]:"),
         ("time", list(range(N_ROWS)), "column time of type int64: must be texts like"),
-        ("time", with_value("time", None), "row 8: not a time of ISO 8601"),
+        ("time", with_value("time", None), "row 8: time is not ISO 8601"),
         (
             "time",
             pa.array([10**15] * N_ROWS, pa.timestamp("ms", tz="UTC")),
-            "row 1: not a time of ISO 8601",
+            "row 1: time is not ISO 8601",
         ),
         ("unit", with_value("unit", None), "row 8: unit is missing"),
         ("unit", list(range(N_ROWS)), "column unit of type int64: must be texts"),

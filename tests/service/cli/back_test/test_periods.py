@@ -36,7 +36,7 @@ def test_each_event_begins_to_learn_anew_and_learning_ends_where_told() -> None:
 
 def test_times_need_an_offset_and_an_event_is_a_place_a_time_and_words() -> None:
     assert time_ns_of("2025-01-01T02:00:00.000001+02:00") == 1_735_689_600_000_001_000
-    with pytest.raises(ValueError, match="needs an offset from UTC"):
+    with pytest.raises(ValueError, match="requires an offset from UTC"):
         time_ns_of("2025-01-01T02:00:00")
     with pytest.raises(ValueError, match="is not a time like"):
         time_ns_of("yesterday")

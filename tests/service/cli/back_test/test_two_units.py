@@ -244,7 +244,7 @@ def test_states_that_are_not_told_are_followed_or_asked_for(
     followed = run_back_test({("U2", "LJB"): untold}, BackTestRules(learning, rated=rated))
     of_u2 = [film.verdicts for film in found.films if (film.unit, film.bearing) == ("U2", "LJB")]
     assert [film.verdicts for film in followed.films] == of_u2
-    with pytest.raises(ReadingsError, match="unit U2: operating states are not known"):
+    with pytest.raises(ReadingsError, match="unit U2: operating states are unknown"):
         run_back_test({("U2", "LJB"): untold}, BackTestRules(learning))
 
 

@@ -146,7 +146,7 @@ def test_a_damaged_database_gives_no_copy_and_costs_no_older_one(
 
 
 def test_what_is_not_there_gives_no_copy_and_makes_no_folder(database: Path, folder: Path) -> None:
-    with pytest.raises(BackupError, match="there is no such database"):
+    with pytest.raises(BackupError, match="the database does not exist"):
         back_up(database, folder, NOW_NS, 1)
     assert not folder.exists()
 
