@@ -165,7 +165,10 @@ def install_problem_handlers(app: FastAPI) -> None:
             return _not_allowed(request, methods)
         found = error.errors()
         mistakes = [
-            Mistake(parameter=".".join(str(p) for p in e["loc"][1:]), detail=str(e["msg"]))
+            Mistake(
+                parameter=".".join(str(p) for p in e["loc"][1:]),
+                detail=str(e["msg"]).removeprefix("Value error, "),
+            )
             for e in found[:MAX_MISTAKES]
         ]
         detail = "; ".join(f"{mistake.parameter}: {mistake.detail}" for mistake in mistakes)

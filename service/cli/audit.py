@@ -63,7 +63,7 @@ def _lines(verdict: Verdict, unknown: list[int]) -> Iterator[str]:
     if verdict.n_behind and verdict.is_shared:
         yield (
             f"the head of this host names entry {verdict.n_entries - verdict.n_behind}; the"
-            f" {verdict.n_behind} after it are other hosts', or this one's just before a crash"
+            f" {verdict.n_behind} later entries are of other hosts, or of this one before a crash"
         )
     elif verdict.n_behind:
         yield f"the head is {verdict.n_behind} entries behind; the next entry repairs it"

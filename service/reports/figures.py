@@ -134,9 +134,9 @@ def condition_figure(case: Case) -> Figure | None:
     _draw_films(plot, found, recent, y)
     return Figure(
         plot,
-        f"Grey: the {members.n_in_all if members else 0} readings of the cell (pink) that the"
-        " baseline stands on. Dashed: expected at this oil temperature. Blue: the last 24 hours."
-        " Red: the reading of the alarm; its bar holds 95 % of what chance does.",
+        f"Grey: the {members.n_in_all if members else 0} readings of the cell (pink) of the"
+        " baseline. Dashed: expected at this oil temperature. Blue: the last 24 hours."
+        " Red: the reading of the alarm with its 95 % interval of random errors.",
     )
 
 

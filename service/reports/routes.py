@@ -181,7 +181,7 @@ PROBLEMS = problem_responses(
 )
 
 WHY_NOT = {
-    EvidenceState.LOST: "was lost: the service ended, or the disk refused, before it was written",
+    EvidenceState.LOST: "was lost, because the service ended or the disk failed before",
     EvidenceState.REMOVED: "was removed to free space for newer evidence",
     EvidenceState.NOT_KEPT: "was never kept",
 }

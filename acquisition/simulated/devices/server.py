@@ -179,8 +179,8 @@ def _set_link(link: Path, terminal: str) -> None:
     try:
         if os.path.lexists(link) and not _leads_to_terminal(link):
             raise ConfigError(
-                f"{link}: something else is there; a simulated DAQ makes a link of its own, which"
-                ' needs a free name such as "/tmp/line7", or "pty" for none'
+                f"{link}: the path is in use; the link of a simulated DAQ requires a free path such"
+                ' as "/tmp/line7", or "pty" for none'
             )
         _remove_link(link)
         link.symlink_to(terminal)

@@ -33,8 +33,8 @@ from service.store.references import GapReference
 MicrometrePair = Annotated[
     list[float], Field(min_length=2, max_length=2, examples=[[1998.5, 2003.1]])
 ]
-SetTime = Annotated[Time, Field(description="Time when it was set.")]
-Author = Annotated[str, Field(description="Person who set it.", examples=["A. Name"])]
+SetTime = Annotated[Time, Field(description="Time at which the reference was set.")]
+Author = Annotated[str, Field(description="Person who set the reference.", examples=["A. Name"])]
 Note = Annotated[str, Field(description="Note of the author.", examples=["after the overhaul"])]
 
 

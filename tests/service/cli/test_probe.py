@@ -249,4 +249,4 @@ async def test_the_map_of_a_plants_rack_is_read_with_units(probe, tmp_path: Path
     assert len(table.stdout.splitlines()) == 13
     assert other.exit_code == none.exit_code == 2
     assert "source of unit U2 has no register map" in other.stderr
-    assert "the slow_source of unit U1 has no register map" in none.stderr
+    assert "slow_source of unit U1 has no register map" in none.stderr

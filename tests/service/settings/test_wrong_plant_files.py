@@ -90,7 +90,12 @@ BOTH = f'postgresql = "{ADDRESS} passfile=x"\npassword_file = "y"'
     [
         ("analysis", "vortex_order = 0.45", "vortex_order = 0.45", "[0.2, 0.4]"),
         ("analysis", "vortex_band = [0.3, 0.4]", "vortex_order (by default)", "[0.3, 0.4]"),
-        ("analysis", "vortex_band = [0.4, 0.2]", "vortex_band = [0.4, 0.2]", "0.05 to 0.95"),
+        (
+            "analysis",
+            "vortex_band = [0.4, 0.2]",
+            "vortex_band = [0.4, 0.2]",
+            "0.05 <= low < high <= 0.95",
+        ),
         ("analysis", "segment_samples = 1024", "segment_samples = 1024", "at least 3121 samples"),
         ("analysis", "max_frequency_hz = 3.0", "max_frequency_hz = 3.0", "3.07667 Hz"),
         ("analysis", "max_frequency_hz = 300", "max_frequency_hz = 300", "half the sampling rate"),

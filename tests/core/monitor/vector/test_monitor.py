@@ -212,7 +212,7 @@ def test_a_block_of_something_else_is_refused(rack) -> None:
         rack(AMPLITUDES + GAPS).ingest(block)
     with pytest.raises(ValueError, match="no channel of unit"):
         rack((VectorRow("nowhere", VectorPart.GAP),))
-    with pytest.raises(ValueError, match="are the same"):
+    with pytest.raises(ValueError, match="rows must be unique"):
         rack((AMPLITUDES[0], AMPLITUDES[0]))
 
 

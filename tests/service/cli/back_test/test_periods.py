@@ -38,7 +38,7 @@ def test_times_need_an_offset_and_an_event_is_a_place_a_time_and_words() -> None
     assert time_ns_of("2025-01-01T02:00:00.000001+02:00") == 1_735_689_600_000_001_000
     with pytest.raises(ValueError, match="requires an offset from UTC"):
         time_ns_of("2025-01-01T02:00:00")
-    with pytest.raises(ValueError, match="is not a time like"):
+    with pytest.raises(ValueError, match="is not a time such as"):
         time_ns_of("yesterday")
     time_ns = 1_735_689_600 * 10**9
     of_unit = event_of("U1 2025-01-01T00:00:00Z new pads, LJB")
