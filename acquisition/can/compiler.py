@@ -136,7 +136,7 @@ class _Compiler:
                 part.epoch = read
                 if self._settings.counters and part.counter is None:
                     what = (
-                        "message has no counter, so the first sample of an epoch is unknown; name"
+                        "its message has no counter, so the first sample of an epoch is unknown; name"
                         " the counter of the message in counters, or remove epoch"
                     )
                     raise _misfit(EPOCH, path, what)
@@ -195,8 +195,8 @@ class _Compiler:
         ids = signal.multiplexer_ids
         if len(ids) > 1 or (signal.message.multiplexer is not None and not ids):
             what = (
-                "must not be in every frame of a multiplexed message, unlike counters and"
-                " frame_samples"
+                "must be multiplexed like the other signals of its message; only counters and"
+                " frame_samples may be in every frame"
             )
             raise _misfit(key, signal.path, what)
         return self._part(signal, ids[0] if ids else 0)

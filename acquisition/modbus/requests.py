@@ -167,7 +167,7 @@ def _fifo_bytes(reply: memoryview) -> int:
     n_registers: int
     _, n_bytes, n_registers = _FIFO_HEAD.unpack_from(reply)
     if n_registers > MAX_FIFO_REGISTERS:
-        raise FrameError(f"FIFO count is {n_registers}, allowed is 0 to {MAX_FIFO_REGISTERS}")
+        raise FrameError(f"FIFO count must be 0 to {MAX_FIFO_REGISTERS}, got {n_registers}")
     if n_bytes != 2 + 2 * n_registers:
         raise FrameError(
             f"byte count is {n_bytes}, expected {2 + 2 * n_registers} for FIFO count {n_registers}"

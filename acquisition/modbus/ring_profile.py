@@ -112,9 +112,7 @@ class RingLayout:
             ("end of the ring", self.end_address, 1, ADDRESS_SPACE),
         ):
             if not lowest <= value <= highest:
-                raise ConfigError(
-                    f"block ring: {name} is {value}, allowed is {lowest} to {highest}"
-                )
+                raise ConfigError(f"block ring: {name} must be {lowest} to {highest}, got {value}")
 
 
 @dataclass(frozen=True)

@@ -104,7 +104,7 @@ def _require_file(path: Path, expected: RecordedFile) -> None:
         raise ConfigError(f"{path}: {error.strerror}") from error
     if found != expected.sha256:
         raise ConfigError(
-            f"{path}: file is damaged: its SHA-256 is {found[:12]}…, expected"
+            f"{path}: file is damaged: its checksum is {found[:12]}…, expected"
             f" {expected.sha256[:12]}…"
         )
 

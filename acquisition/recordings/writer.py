@@ -273,8 +273,8 @@ def _require_fit(raw: RawBlock, unit: RecordedUnit) -> None:
     found = (len(raw.counts), len(raw.ok), len(raw.slow), raw.counts.dtype.name)
     if found != (n_channels, n_channels, n_slow, unit.sample_type):
         raise ConfigError(
-            f"expected a block of {n_channels} channels as {unit.sample_type} and {n_slow} slow"
-            f" values, got {len(raw.counts)} as {raw.counts.dtype} and {len(raw.slow)}"
+            f"expected {n_channels} channels as {unit.sample_type} and {n_slow} slow values,"
+            f" got {len(raw.counts)} channels as {raw.counts.dtype} and {len(raw.slow)} slow values"
         )
     if raw.rate_hz != unit.rate_hz:
         raise ConfigError(f"expected a block at {unit.rate_hz} Hz, got {raw.rate_hz} Hz")

@@ -72,7 +72,7 @@ def record(
     )
     print_result(manifest, [line], json_output)
     if problem:
-        fail(f"ended early: {problem}")
+        fail(f"recording ended early: {problem}")
 
 
 class ReconnectPolicy:

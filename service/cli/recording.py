@@ -73,7 +73,7 @@ def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
     if not verdicts:
         lines.append(
             f"no recordings in {' or '.join(map(str, roots.values()))};"
-            " padwatch recording verify FOLDER checks one that was made elsewhere (--out)"
+            " use padwatch recording verify FOLDER for a recording in another folder"
         )
     print_result(document, lines, json_output)
     if counts[RecordingState.DAMAGED] or counts[RecordingState.MISSING]:

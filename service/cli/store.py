@@ -99,8 +99,8 @@ def _file(plant: PlantFile) -> Path:
     """Return the plant's database file; PostgreSQL is copied by its own tools."""
     if plant.store.postgresql is not None:
         fail(
-            f"{store_name(plant)} is copied with pg_dump or pg_basebackup and put back with"
-            " pg_restore: docs/how-to/postgresql.md shows how"
+            f"{store_name(plant)} must be copied with pg_dump or pg_basebackup and restored with"
+            " pg_restore; see docs/how-to/postgresql.md"
         )
     return database_path(plant)
 
@@ -126,8 +126,8 @@ def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
     plant = load_plant_file(plant_file)
     if plant.store.postgresql is not None:
         fail(
-            f"{store_name(plant)} is checked by PostgreSQL: enable its data checksums"
-            " (SHOW data_checksums) and check it with pg_amcheck"
+            f"{store_name(plant)} must be checked by PostgreSQL; enable its data checksums"
+            " (SHOW data_checksums) and run pg_amcheck"
         )
     with progress("Checking", STEPS) as bar:
         found = list(

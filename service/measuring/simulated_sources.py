@@ -107,7 +107,7 @@ def _refuse_misfit(unit: UnitSettings, simulation: SimulationSettings) -> None:
 
 def _compare(unit: UnitSettings, key: str, found: float, wanted: float) -> None:
     if abs(found - wanted) > MAX_MISFIT * wanted:
-        raise ConfigError(f"unit {unit.id}: {key} = {found:g}, but its life requires {wanted:g}")
+        raise ConfigError(f"unit {unit.id}: {key} = {found:g}, but life_seed requires {wanted:g}")
 
 
 def simulated_feed(unit: UnitSettings, clock: Clock) -> SimulatedUnit:

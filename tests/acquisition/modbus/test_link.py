@@ -38,7 +38,7 @@ async def test_a_long_read_is_split_at_what_a_read_can_have(linked, bench_server
 async def test_a_queue_that_claims_more_than_31_registers_is_refused(linked):
     link = linked()
     await link.open()
-    with pytest.raises(LinkError, match="FIFO count is 32, allowed is 0 to 31"):
+    with pytest.raises(LinkError, match="FIFO count must be 0 to 31, got 32"):
         await link.read_fifos([9])
 
 

@@ -107,7 +107,7 @@ def test_a_damaged_recording_is_one_sentence_and_exit_code_1(folder: Path, comma
     result = padwatch_recording(command, folder)
     assert (result.exit_code, result.stdout) == (1, "")
     damaged = (
-        f"padwatch recording {command}: {folder}/samples.parquet: file is damaged: its SHA-256 is"
+        f"padwatch recording {command}: {folder}/samples.parquet: file is damaged: its checksum is"
     )
     assert result.stderr.startswith(damaged)
     assert result.stderr.count("\n") == 1

@@ -90,12 +90,12 @@ def test_a_unit_with_fixed_films_has_no_past(stepped_clock: Any) -> None:
 
 def test_a_unit_that_cannot_have_this_life_is_refused(tmp_path: Path, stepped_clock: Any) -> None:
     odd = plant_with(LIFE.replace("life_seed = 2", "life_seed = 3"), tmp_path).unit[0]
-    with pytest.raises(ConfigError, match=r"rated_speed_rpm = 92\.3, but its life requires 90\.9"):
+    with pytest.raises(ConfigError, match=r"rated_speed_rpm = 92\.3, but life_seed requires 90\.9"):
         simulated_feed(odd, stepped_clock)
     living = plant_with(LIFE, tmp_path).unit[0]
     narrow = living.bearing[0].model_copy(update={"clearance_um": 200.0})
     unit = living.model_copy(update={"bearing": (narrow, *living.bearing[1:])})
-    with pytest.raises(ConfigError, match="UJB clearance_um = 200, but its life requires 500"):
+    with pytest.raises(ConfigError, match="UJB clearance_um = 200, but life_seed requires 500"):
         simulated_history(unit, stepped_clock.now_ns())
 
 

@@ -106,7 +106,7 @@ def test_another_recording_in_the_place_of_one_is_not_taken_for_it(
     rig.clock.s = DAY_S + 1.0
     rig.caretaker.look()
 
-    assert "not the one" in rig.caretaker.faults[folder.name]
+    assert "the manifest has changed" in rig.caretaker.faults[folder.name]
 
 
 def test_what_is_read_once_more_takes_a_small_share_of_the_time(
