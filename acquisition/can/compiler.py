@@ -136,7 +136,7 @@ class _Compiler:
                 part.epoch = read
                 if self._settings.counters and part.counter is None:
                     what = (
-                        "its message has no counter, so the first sample of an epoch is unknown; name"
+                        "its message has no counter, so the start of an epoch is unknown; name"
                         " the counter of the message in counters, or remove epoch"
                     )
                     raise _misfit(EPOCH, path, what)
