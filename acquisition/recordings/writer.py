@@ -271,10 +271,11 @@ def _cells(block: SampleBlock, calibration: UnitCalibration) -> Iterator[RawBloc
 def _require_fit(raw: RawBlock, unit: RecordedUnit) -> None:
     n_channels, n_slow = len(unit.channels), len(unit.slow_channels)
     found = (len(raw.counts), len(raw.ok), len(raw.slow), raw.counts.dtype.name)
-    if found != (n_channels, n_channels, n_slow, unit.sample_type):
+    expected = (n_channels, n_channels, n_slow, unit.sample_type)
+    if found != expected:
         raise ConfigError(
-            f"expected {n_channels} channels as {unit.sample_type} and {n_slow} slow values,"
-            f" got {len(raw.counts)} channels as {raw.counts.dtype} and {len(raw.slow)} slow values"
+            f"channels, OK flags, slow values and sample type of a block must be {expected},"
+            f" got {found}"
         )
     if raw.rate_hz != unit.rate_hz:
         raise ConfigError(f"expected a block at {unit.rate_hz} Hz, got {raw.rate_hz} Hz")

@@ -102,7 +102,7 @@ MISFITS = [
     ((X,), {"frame_samples": ("WAVE.count",)}, r"frame_samples requires counters"),
     ((X,), {"ok_bits": "SLOW.signed"}, r"ok_bits = \"SLOW.signed\": must be an unsigned integer"),
     ((X,), {"epoch": "SLOW.nix"}, r"epoch = \"SLOW.nix\""),
-    ((X,), {"epoch": "SLOW.bits", "counters": ("WAVE.count",)}, r": message has no counter"),
+    ((X,), {"epoch": "SLOW.bits", "counters": ("WAVE.count",)}, r"its message has no counter"),
     ((X,), {"hold_samples": "SLOW.nix"}, r"hold_samples = \"SLOW.nix\""),
     (
         (X,),
