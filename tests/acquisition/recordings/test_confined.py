@@ -44,7 +44,8 @@ def test_limits_are_never_raised(given: int, memory: int) -> None:
 
 def test_a_library_that_is_not_installed_is_named_with_how_to_get_it() -> None:
     with pytest.raises(
-        ConfigError, match=r"^XYZ needs absent_one: pip install 'padwatch\[imports\]'$"
+        ConfigError,
+        match=r"^importing XYZ requires absent_one; run pip install 'padwatch\[imports\]'$",
     ):
         library("absent_one", "XYZ")
 
