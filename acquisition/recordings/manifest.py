@@ -208,9 +208,7 @@ class Progress:
 
 def _require_room(rejected: Sequence[Rejection], n_missing: int) -> None:
     if len(rejected) > MAX_REJECTIONS:
-        raise ConfigError(
-            f"a block has {len(rejected)} rejections, allowed are at most {MAX_REJECTIONS}"
-        )
+        raise ConfigError(f"a block has {len(rejected)} rejections, more than {MAX_REJECTIONS}")
     for rejection in rejected:
         if not 1 <= len(rejection.reason) <= MAX_REASON_LENGTH or rejection.n_samples < 1:
             raise ConfigError(
@@ -219,9 +217,7 @@ def _require_room(rejected: Sequence[Rejection], n_missing: int) -> None:
             )
     n_rejected = sum(rejection.n_samples for rejection in rejected)
     if n_rejected > n_missing:
-        raise ConfigError(
-            f"a block has {n_rejected} rejected samples, but only {n_missing} are missing"
-        )
+        raise ConfigError(f"a block has {n_rejected} rejected, but {n_missing} missing samples")
 
 
 class _Head(BaseModel):

@@ -151,9 +151,7 @@ OnlyUnit = Annotated[
 
 def only(description: str, example: str, max_length: int | None = None) -> Any:
     """Return the declaration of a query parameter that selects entries with a given text."""
-    return Query(
-        max_length=max_length, description=f"Value to include: {description}.", examples=[example]
-    )
+    return Query(max_length=max_length, description=f"Only this {description}.", examples=[example])
 
 
 def before_number(description: str) -> Any:

@@ -56,7 +56,9 @@ class Problem(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     type: str = Field(
-        default="about:blank", description="Always `about:blank`.", examples=["about:blank"]
+        default="about:blank",
+        description="URI of the kind of problem; always `about:blank`.",
+        examples=["about:blank"],
     )
     title: str = Field(description="Kind of problem.", examples=["Unknown unit"])
     status: int = Field(description="HTTP status.", examples=[404])
@@ -184,9 +186,7 @@ def install_problem_handlers(app: FastAPI) -> None:
     @app.exception_handler(StoreError)
     async def _store(request: Request, error: StoreError) -> Response:
         log.error("database query failed", path=request.url.path, reason=str(error))
-        return _render(
-            request, 503, "Store not available", "the store cannot be read at the moment"
-        )
+        return _render(request, 503, "Store not available", "the store cannot be read now")
 
     @app.exception_handler(NotAvailableError)
     async def _not_here(request: Request, error: NotAvailableError) -> Response:

@@ -254,9 +254,7 @@ def daq_of(
         case CanSettings():
             return can_daq_of(unit, source, feed, clock, patient=recorded)
         case SimulatedSettings():
-            raise LookupError(
-                f'unit {unit.id} has a source of kind "simulated", which needs no DAQ'
-            )
+            raise LookupError(f'unit {unit.id} has source kind "simulated", which needs no DAQ')
 
 
 def _ring_shape(unit: UnitSettings, source: ModbusRingSettings) -> RingDeviceSettings:

@@ -29,9 +29,7 @@ from service.settings.units import UnitSettings
 
 SpeedOption = Annotated[
     float,
-    typer.Option(
-        min=0.0, max=1000.0, help="Seconds of the recording per second; 0: as fast as possible."
-    ),
+    typer.Option(min=0.0, max=1000.0, help="Playback speed; 0: as fast as possible."),
 ]
 
 

@@ -343,5 +343,5 @@ def _read(adapter: TypeAdapter[T], head: bytes) -> T:
 def _require_own(unit: str, identity: UnitIdentity) -> None:
     if unit != identity.unit:
         raise WireError(
-            "other_unit", f"a message of unit {unit!r} in the subject of unit {identity.unit!r}"
+            "other_unit", f"a message of unit {unit!r} in the subject of {identity.unit!r}"
         )

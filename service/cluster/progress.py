@@ -41,9 +41,7 @@ def memories_of(stored: Iterable[StreamPosition]) -> dict[str, UnitMemory]:
     found = {position.unit: read(position.memory) for position in stored}
     for unit, memory in found.items():
         if memory is None:
-            log.error(
-                "the stored alarms of a unit have another version and are discarded", unit=unit
-            )
+            log.error("stored alarms of another version are discarded", unit=unit)
     return {unit: memory for unit, memory in found.items() if memory is not None}
 
 

@@ -120,9 +120,7 @@ class CommandClient:
 
 READ_EVERY_S = 0.25
 
-TOO_LATE = Answer(
-    CommandState.WITHDRAWN, "no process accepted the command in time; it was not executed"
-)
+TOO_LATE = Answer(CommandState.WITHDRAWN, "no process accepted the command in time")
 INTERRUPTED = Answer(
     CommandState.INTERRUPTED,
     "the process ended during the execution of the command; check the result",

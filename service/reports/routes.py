@@ -167,9 +167,7 @@ def is_there(found: Occurrence) -> bool:
 
 ID = re.compile(r"([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([a-z0-9_]+)")
 
-Number = Annotated[
-    int, Path(ge=1, le=10**12, description="Number of the occurrence.", examples=[3])
-]
+Number = Annotated[int, Path(ge=1, le=10**12, description="Occurrence number.", examples=[3])]
 
 LIST_PROBLEMS = problem_responses(422, 503, own={404: "Unknown alarm"})
 PROBLEMS = problem_responses(

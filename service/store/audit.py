@@ -111,7 +111,7 @@ class AuditChain:
             return None
         if head.number > newest.number:
             return f"the head names entry {head.number}, but the trail ends at {newest.number}"
-        return f"entry {head.number} does not match the hash in the head"
+        return f"entry {head.number} does not match the head's hash"
 
     def _update_head(self) -> None:
         """Write the head file in a transaction, so that no process can write an older head later.

@@ -256,9 +256,7 @@ def _layout(first: RawBlock, settings: RingDeviceSettings) -> RingLayout:
     Raises `ConfigError` if the slot has no int16 counts or the ring does not fit.
     """
     if first.counts.dtype != np.int16:
-        raise ConfigError(
-            f"simulated block ring: samples must be 16-bit counts, got {first.counts.dtype}"
-        )
+        raise ConfigError(f"block ring: samples must be 16-bit counts, got {first.counts.dtype}")
     n_slow = len(first.slow)
     layout = RingLayout(
         n_channels=len(first.counts),

@@ -137,9 +137,7 @@ def _needs_of(app: FastAPI, method: str, path: str, context: Any, route: BaseRou
         return Needs(None, Reach.NO_UNIT)
     found = _needs_in(context.dependencies) if isinstance(route, APIRoute) else []
     if not found:
-        raise UndeclaredRouteError(
-            f"{method} {path}: route declares no permission; add needs() or OPEN"
-        )
+        raise UndeclaredRouteError(f"{method} {path}: route needs a permission or OPEN")
     return found[-1]
 
 

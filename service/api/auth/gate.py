@@ -111,7 +111,7 @@ class Gate:
         try:
             caller = await self._desk.caller(scope)
         except StoreError as error:
-            detail = "the store cannot be read at the moment"
+            detail = "the store cannot be read now"
             raise ProblemError(503, "Store not available", detail) from error
         scope.setdefault("state", {})[CALLER] = caller
         if caller.identity is None and not self._is_open(scope):

@@ -56,9 +56,7 @@ def new_password(written: str, name: str) -> str:
             f"a password must have {MIN_LENGTH} to {MAX_LENGTH} characters, got {len(password)}"
         )
     if len(set(password.casefold())) < MIN_DIFFERENT:
-        raise PasswordRefusedError(
-            f"a password must have at least {MIN_DIFFERENT} different characters"
-        )
+        raise PasswordRefusedError(f"a password must have {MIN_DIFFERENT} different characters")
     if len(name) > 2 and name in password.casefold():
         raise PasswordRefusedError("a password must not contain the name of the account")
     return password

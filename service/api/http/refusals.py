@@ -72,9 +72,7 @@ TOO_SLOW = Refusal(408, "Request timeout", "the request was not received in time
 BODY_TOO_LARGE = Refusal(413, "Body too large", "the body is larger than allowed")
 TARGET_TOO_LONG = Refusal(414, "URI too long", "path and query are longer than allowed")
 WRONG_HOST = Refusal(421, "Unknown host", "the Host header is not a name of this service")
-HEAD_TOO_LARGE = Refusal(
-    431, "Headers too large", "request line and headers are larger than allowed"
-)
+HEAD_TOO_LARGE = Refusal(431, "Headers too large", "request line and headers are too large")
 BUSY = Refusal(503, "Busy", "too many concurrent requests; try again", retry_after_s=1)
 FULL = Refusal(503, "Busy", "too many connections; try again", retry_after_s=5)
 NO_ANSWER = Refusal(503, "Response timeout", "the request timed out; request a shorter range", 5)

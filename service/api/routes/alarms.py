@@ -220,9 +220,7 @@ def operation_router(context: Context) -> APIRouter:
     async def shelve(alarm: AlarmId, asked: ShelveModel) -> AlarmModel:
         """Hide an alarm for a limited time; an alarm still active afterwards is announced again."""
         if asked.duration_s > context.max_shelf_s:
-            detail = (
-                f"duration_s must be at most {context.max_shelf_s:g} s, got {asked.duration_s:g} s"
-            )
+            detail = f"duration_s must be at most {context.max_shelf_s:g}, got {asked.duration_s:g}"
             raise ProblemError(422, "Wrong parameter", detail, "duration_s")
         until_ns = context.clock.now_ns() + ns_from_s(asked.duration_s)
         return await _done(context, alarm, Shelve(actor_or(asked.actor), asked.reason, until_ns))
@@ -263,9 +261,7 @@ def operation_router(context: Context) -> APIRouter:
         now_s = context.clock.monotonic_s()
         new = TokenBucket(N_COMMENTS, S_PER_COMMENT, now_s)
         if not allowances.setdefault(identity_of(request).actor, new).take(now_s):
-            detail = (
-                f"too many comments; after {N_COMMENTS}, one is accepted every {S_PER_COMMENT:g} s"
-            )
+            detail = f"after {N_COMMENTS} comments, one is accepted every {S_PER_COMMENT:g} s"
             wait = {"Retry-After": f"{S_PER_COMMENT:.0f}"}
             raise ProblemError(429, "Wait", detail, headers=wait)
         return await _done(context, alarm, Comment(actor_or(asked.actor), asked.text))

@@ -243,9 +243,7 @@ def bearing_router(context: Context) -> APIRouter:
             raise ProblemError(404, "No uncertainty budget", detail)
         found = _budget(context.live.current(unit, bearing), quantity)
         if found is None:
-            detail = (
-                f"{quantity} has no uncertainty budget, because it has no value or too few segments"
-            )
+            detail = f"{quantity} has no uncertainty budget; it has no value or too few segments"
             raise ProblemError(409, "No result", detail)
         return found
 

@@ -322,9 +322,7 @@ async def _download(
 def library_of(context: Context) -> RecordingLibrary:
     """Return the library of recordings; raise a problem of status 404 if none are kept here."""
     if context.recordings is None:
-        words = (
-            "this process has no recordings; request them from the process that analyses the unit"
-        )
+        words = "this process has no recordings; request them where the unit is analysed"
         raise ProblemError(404, "No recordings", words)
     return RecordingLibrary(context.recordings, context.faults())
 

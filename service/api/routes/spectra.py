@@ -229,9 +229,7 @@ def spectra_router(context: Context) -> APIRouter:
         ] = 200,
         max_frequency_hz: Annotated[
             float | None,
-            Query(
-                gt=0.0, allow_inf_nan=False, description="Maximum frequency, Hz.", examples=[6.0]
-            ),
+            Query(gt=0.0, allow_inf_nan=False, description="Maximum frequency.", examples=[6.0]),
         ] = None,
     ) -> Response:
         """List stored averaged amplitude spectra, all as displacement.

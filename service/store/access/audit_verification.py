@@ -200,9 +200,7 @@ def _wrong_head(
     if number - head.number > MAX_BEHIND and not is_shared:
         return Finding(None, f"the head names entry {head.number}, but the trail ends at {number}")
     if (at_head if head.number else FIRST) != head.hash:
-        return Finding(
-            head.number or None, f"entry {head.number} does not match the hash in the head"
-        )
+        return Finding(head.number or None, f"entry {head.number} does not match the head's hash")
     return None
 
 

@@ -225,7 +225,7 @@ def change_block(folder: Path, number: int, **changes: Any) -> None:
         ({"ok": 7}, "block 3: OK bits are set for channels that are not recorded"),
         (
             {"rejected": [{"reason": "torn", "n_samples": 10}]},
-            "block 3: a block has 10 rejected samples, but only 0",
+            "block 3: a block has 10 rejected, but 0 missing",
         ),
         (
             {"rejected": [{"reason": "x", "n_samples": 0}]},
@@ -237,7 +237,7 @@ def change_block(folder: Path, number: int, **changes: Any) -> None:
         ),
         (
             {"rejected": [{"reason": "x", "n_samples": 1}] * 100},
-            "block 3: a block has 100 rejections, allowed are at most 32",
+            "block 3: a block has 100 rejections, more than 32",
         ),
     ],
     ids=lambda value: str(value)[:40],

@@ -197,7 +197,7 @@ def test_a_recording_that_was_broken_off_or_is_empty_leaves_nothing(
         ({"slow": (math.nan,)}, r"got \(2, 2, 1"),
         ({"first_index": -1}, "first index of a block .* got -1"),
         ({"epoch": 2**60}, "epoch of a block .* got 1152921504606846976"),
-        ({"rejected": (Rejection("torn", 11),)}, "11 rejected samples, but only 10"),
+        ({"rejected": (Rejection("torn", 11),)}, "11 rejected, but 10 missing"),
         ({"rejected": (Rejection("x" * 65, 1),)}, "reason of 1 to 64 characters"),
     ],
     ids=str,

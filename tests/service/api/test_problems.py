@@ -140,7 +140,7 @@ async def test_a_store_that_cannot_be_read_is_503_without_its_innards(running: A
 
     for path, query in ((TRENDS, GOOD), ("/api/v1/units/U1/gaps", WHOLE)):
         problem = await running.problem(path, 503, **query)
-        assert problem["detail"] == "the store cannot be read at the moment"
+        assert problem["detail"] == "the store cannot be read now"
 
 
 async def test_far_years_are_no_error(read_only: Any) -> None:

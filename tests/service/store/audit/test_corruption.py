@@ -193,4 +193,4 @@ def test_a_whole_trail_of_another_database_is_not_taken_for_this_one(
     bench.path.write_bytes((tmp_path / "other.sqlite3").read_bytes())
 
     found: Any = file_trail(bench.path).verify().finding
-    assert found.detail == "entry 9 does not match the hash in the head"
+    assert found.detail == "entry 9 does not match the head's hash"
