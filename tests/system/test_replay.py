@@ -179,4 +179,4 @@ async def test_a_replay_whose_daq_is_killed_ends_and_says_that_results_are_incom
     async with asyncio.timeout(PATIENCE_S):
         assert await program.process.wait() == 1
     await program.end()
-    assert "ended before its recordings did: results are incomplete" in program.errors
+    assert "ended before its recordings; results are incomplete" in program.errors
