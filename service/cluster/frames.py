@@ -320,7 +320,7 @@ def _side_values(head: BlockHead) -> SideValues:
         or any(start >= stop for start, stop in itertools.pairwise(edges))
         or any(len(cell.slow) != n_slow or cell.ok >> n_channels for cell in head.cells)
     ):
-        raise WireError("not_understood", "a block with cells of other lengths than its samples")
+        raise WireError("not_understood", "a block whose cells and samples differ in length")
     slow = np.array([cell.slow for cell in head.cells], dtype=np.float64)
     return SideValues(
         starts=np.array(starts, dtype=np.int64),

@@ -85,7 +85,7 @@ class CommandClient:
             raise CommandFailedError("Command not executed", f"unit {unit}: {answer.words}")
         if answer.state in OPEN:
             detail = f"unit {unit}: the command is in progress but not stored yet"
-            raise CommandFailedError("Not on the disk yet", detail)
+            raise CommandFailedError("Not stored yet", detail)
         return answer
 
     def _command(self, unit: str, task: OperatorCommand, actor: str) -> Command:

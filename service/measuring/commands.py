@@ -36,7 +36,7 @@ class LocalCommands:
                 await self._recorder.stored()
         except TimeoutError as error:
             raise CommandFailedError(
-                "Not on the disk yet",
+                "Not stored yet",
                 f"alarm {id_} is {alarm.state.value}, but the store does not respond:"
                 " a restart now would undo the action; storing is retried until it succeeds",
             ) from error

@@ -76,7 +76,7 @@ def refusing(service: Any, table: str) -> Iterator[None]:
 
 @pytest.mark.parametrize(
     ("table", "title"),
-    [("high_water", "Action not applied"), ("alarm_event", "Not on the disk yet")],
+    [("high_water", "Action not applied"), ("alarm_event", "Not stored yet")],
 )
 async def test_an_acknowledgement_that_cannot_be_stored_is_refused_and_may_be_repeated(
     service: Any, probes: Probes, monkeypatch: pytest.MonkeyPatch, table: str, title: str
