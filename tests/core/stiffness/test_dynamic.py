@@ -285,7 +285,7 @@ def test_channels_of_different_segments_are_refused(recording: Recording) -> Non
     usable = np.ones((24, 4), dtype=bool)
     usable[0, 2] = False
     spectrum = average(FREQUENCY_HZ, recording(), usable)
-    with pytest.raises(ValueError, match="different segments"):
+    with pytest.raises(ValueError, match="must have the same segments"):
         dynamic_stiffness(spectrum, BRACKET, TURN_HZ, NOISE_FREE)
 
 

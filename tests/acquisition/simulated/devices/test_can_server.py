@@ -193,7 +193,7 @@ async def test_the_port_of_a_real_device_is_never_taken_away(serve, tmp_path, wh
     else:
         os.mkfifo(line)
     before = line.lstat()
-    with pytest.raises(ConfigError, match=f"{line}: something else is there; .* a free name"):
+    with pytest.raises(ConfigError, match=f"{line}: the path is in use; .* a free path"):
         await serve(line).__aenter__()
     after = line.lstat()
     assert (after.st_ino, after.st_mtime_ns) == (before.st_ino, before.st_mtime_ns)

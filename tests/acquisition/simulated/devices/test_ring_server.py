@@ -171,7 +171,7 @@ def test_a_restarted_device_has_an_empty_ring_and_counts_from_zero(device):
 
 
 def test_a_ring_that_does_not_fit_into_the_address_space_is_refused(counting_feed):
-    with pytest.raises(ConfigError, match="end of the ring is"):
+    with pytest.raises(ConfigError, match="end of the ring must be"):
         RingDevice(counting_feed(n_channels=12), settings=RingDeviceSettings(n_slots=200))
 
 
