@@ -57,7 +57,7 @@ class FastClock:
 
     def __init__(self, clock: Clock, speed: float) -> None:
         if not speed > 0.0:
-            raise ValueError(f"a clock runs at a positive speed, not {speed}")
+            raise ValueError(f"speed must be above 0, got {speed}")
         self._clock, self._speed = clock, speed
         self._start_ns, self._start_s = clock.now_ns(), clock.monotonic_s()
 

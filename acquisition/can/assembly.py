@@ -102,9 +102,9 @@ class FrameAssembler:
     def trouble(self) -> str:
         """Reason why all samples are refused, in words; empty if they are valid."""
         if self._senders.found:
-            return "frames contradict each other; do two devices send the same ids?"
+            return "frames contradict each other; do two devices send the same CAN ids?"
         if not self._plan.counted and self._n_fast_windows >= _FAST_WINDOWS:
-            return "more frames come than rate_hz says; do two devices send the same ids?"
+            return "frames arrive faster than rate_hz; do two devices send the same CAN ids?"
         return ""
 
     def listen(self) -> None:

@@ -63,7 +63,7 @@ def open_bus(settings: CanLinkSettings, ids: Iterable[int]) -> can.BusABC:
         except OSError as exc:
             if exc.errno == _NO_SUCH_FAMILY:
                 raise ConfigError(
-                    f"{where}: this system's kernel has no SocketCAN; load its can modules, or use"
+                    f"{where}: the kernel does not support SocketCAN; load its CAN modules or use"
                     " another interface"
                 ) from exc
             if exc.errno is None:  # the vendor's library is not installed
@@ -74,7 +74,7 @@ def open_bus(settings: CanLinkSettings, ids: Iterable[int]) -> can.BusABC:
             # libraries
             if isinstance(exc, can.CanError | UnicodeError):
                 raise
-            raise ConfigError(f"{where}: cannot be opened with these settings: {exc}") from exc
+            raise ConfigError(f"{where}: bus cannot be opened with these settings: {exc}") from exc
 
 
 def _opened(settings: CanLinkSettings, ids: list[int]) -> can.BusABC:

@@ -57,14 +57,13 @@ class _Compiler:
         ):
             if getattr(settings, key) and None in readers:
                 raise ConfigError(
-                    f"{key}: message {self._waves[readers.index(None)].message} carries waveforms"
-                    " but none of the signals named; name one for each such message, or none at all"
+                    f"{key}: no signal of message {self._waves[readers.index(None)].message} is"
+                    " named; name one signal of each message with waveforms, or none"
                 )
         if not settings.counters and rate_hz / n_per_frame > MAX_INSTANTS_PER_S:
             raise ConfigError(
-                f"counters: none is named, and {rate_hz / n_per_frame:.6g} frames a second of each"
-                " message are too many to find losses by the clock alone, which can"
-                f" {MAX_INSTANTS_PER_S:g}; name the counters, or let the device send fewer"
+                f"counters: required for {rate_hz / n_per_frame:.6g} frames/s of each message;"
+                f" without counters, losses are detected up to {MAX_INSTANTS_PER_S:g} frames/s"
             )
         self._add_values()
         hold = settings.hold_samples
@@ -82,11 +81,11 @@ class _Compiler:
             key = f"signals.{channel.id}"
             parts = {self._part_of(signal, key) for signal in signals}
             if len(parts) > 1:
-                raise ConfigError(f"{key}: its signals must all be in one message")
+                raise ConfigError(f"{key}: all signals must be in one message")
             if len(signals) != len(found[0]):
                 raise ConfigError(
-                    f"{key}: has {len(signals)} samples in a frame, {settings.channels[0].id} has"
-                    f" {len(found[0])}; all channels must have as many"
+                    f"{key}: names {len(signals)} signals, but {settings.channels[0].id} has"
+                    f" {len(found[0])}; all channels must have the same number of samples per frame"
                 )
             part = parts.pop()
             if part.wave is None:
@@ -99,17 +98,18 @@ class _Compiler:
     def _signals_of(self, channel: CanChannel) -> list[DbcSignal]:
         key = f"signals.{channel.id}"
         if not channel.signals:
-            raise ConfigError(f"{key}: names no signal; needed is one for each sample in a frame")
+            raise ConfigError(f"{key}: must name one signal for each sample in a frame")
         return [self._own_signal(path, key) for path in channel.signals]
 
     def _add_counter(self, path: str, step: int) -> None:
         signal = self._integer(path, "counters")
         n_bits = signal.source.length
         if n_bits < _MIN_COUNTER_BITS:
-            raise ConfigError(f"counters: {path} has {n_bits} bits, too few to count")
+            least = f"at least {_MIN_COUNTER_BITS} bits, got {n_bits}"
+            raise ConfigError(f"counters: {path} must have {least}")
         for part in self._parts_of(signal):
             if part.counter is not None:
-                raise ConfigError(f"counters: {path} is a second counter of message {part.message}")
+                raise ConfigError(f"counters: message {part.message} has a second counter {path}")
             part.counter, part.counter_step = scalar_reader(signal), step
             part.modulus = step << n_bits
 
@@ -118,7 +118,7 @@ class _Compiler:
         if settings.frame_samples and not (
             settings.counters and settings.counter_counts == "samples"
         ):
-            raise ConfigError('frame_samples needs counters with counter_counts = "samples"')
+            raise ConfigError('frame_samples requires counters with counter_counts = "samples"')
         for path in settings.frame_samples:
             signal = self._integer(path, "frame_samples")
             for part in self._parts_of(signal):
@@ -136,8 +136,8 @@ class _Compiler:
                 part.epoch = read
                 if self._settings.counters and part.counter is None:
                     what = (
-                        "its message has no counter, so that it is unknown from which sample on it"
-                        " holds; name its counter under counters, or leave epoch out"
+                        "its message has no counter, so the start of an epoch is unknown; name"
+                        " the counter of the message in counters, or remove epoch"
                     )
                     raise _misfit(EPOCH, path, what)
         for number, slow in enumerate(self._settings.slow):
@@ -153,21 +153,21 @@ class _Compiler:
             raise _misfit(
                 key,
                 path,
-                f"no message {name} in the DBC; there are {_shown(self._messages)};"
-                " write Message.Signal",
+                f"unknown message {name}; the DBC file has {_shown(self._messages)};"
+                " the form is Message.Signal",
             )
         if message.nested:
             raise _misfit(
                 key,
                 path,
-                f"message {name} is multiplexed twice over, which is not supported; let the device"
-                " send the signal in a message of its own",
+                f"message {name} has nested multiplexing, which is not supported; let the device"
+                " send the signal in another message",
             )
         if signal not in message.signals:
             raise _misfit(
                 key,
                 path,
-                f"message {name} has no signal {signal or '(none given)'}; there are"
+                f"message {name} has no signal {signal or '(none given)'}; its signals are"
                 f" {_shown(message.signals)}",
             )
         return message.signals[signal]
@@ -176,7 +176,7 @@ class _Compiler:
         """Return a signal; raise ConfigError if another channel already uses it."""
         signal = self._signal(path, key)
         if path in self._taken:
-            what = f"is already the signal of {self._taken[path]}; each channel needs its own"
+            what = f"is already the signal of {self._taken[path]}; each channel requires its own"
             raise _misfit(key, path, what)
         self._taken[path] = key
         return signal
@@ -195,7 +195,8 @@ class _Compiler:
         ids = signal.multiplexer_ids
         if len(ids) > 1 or (signal.message.multiplexer is not None and not ids):
             what = (
-                "is in every frame of a multiplexed message; only counters and frame_samples may be"
+                "must be multiplexed like the other signals of its message; only counters and"
+                " frame_samples may be in every frame"
             )
             raise _misfit(key, signal.path, what)
         return self._part(signal, ids[0] if ids else 0)
@@ -218,7 +219,7 @@ class _Compiler:
 def _scaled(slow: CanSlowChannel, signal: DbcSignal) -> ScalarReader:
     if known_unit(signal.unit) != slow.unit:
         raise ConfigError(
-            f'slow.{slow.id}: {signal.path} has unit "{signal.unit}" in the DBC; needed is'
+            f'slow.{slow.id}: {signal.path} has unit "{signal.unit}" in the DBC file, expected'
             f" {spellings(slow.unit)}"
         )
     read, scale, offset = scalar_reader(signal), signal.source.scale, signal.source.offset

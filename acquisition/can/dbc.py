@@ -121,9 +121,9 @@ def load_dbc(path: Path, text: str | None = None) -> dict[str, DbcMessage]:
         database = load_string(text, database_format="dbc")
     except (DatabaseError, ValueError, KeyError) as exc:
         reason = str(exc)[:MAX_REASON]  # cantools repeats a line, which may be the whole file
-        raise ConfigError(f"{path}: not a DBC file that can be used: {reason}") from exc
+        raise ConfigError(f"{path}: invalid DBC file: {reason}") from exc
     if not isinstance(database, Database) or not database.messages:
-        raise ConfigError(f"{path}: no message in it; a DBC has lines that begin with BO_")
+        raise ConfigError(f"{path}: the DBC file defines no message (lines that begin with BO_)")
     by_name: dict[str, DbcMessage] = {}
     by_key: dict[int, DbcMessage] = {}
     for message in map(DbcMessage, database.messages):
@@ -132,10 +132,10 @@ def load_dbc(path: Path, text: str | None = None) -> dict[str, DbcMessage]:
             kind = "extended" if message.extended else "standard"
             raise ConfigError(
                 f"{path}: messages {other.name} and {message.name} share the {kind} id"
-                f" {message.frame_id} ({message.frame_id:#x}); give each its own"
+                f" {message.frame_id} ({message.frame_id:#x}); ids must be unique"
             )
         if by_name.setdefault(message.name, message) is not message:
-            raise ConfigError(f"{path}: two messages are called {message.name}; rename one")
+            raise ConfigError(f"{path}: two messages have the name {message.name}; rename one")
     return by_name
 
 
@@ -143,7 +143,7 @@ def _text(path: Path) -> str:
     try:
         content = read_small_file(path, MAX_FILE_BYTES)
     except OSError as exc:
-        raise ConfigError(f"{path}: {exc.strerror}; dbc must name a DBC file") from exc
+        raise ConfigError(f"{path}: {exc.strerror}; dbc must be the path of a DBC file") from exc
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError:
@@ -159,6 +159,6 @@ def _refuse_wide_ranges(text: str, path: Path) -> None:
     )
     if n_values > _MAX_MULTIPLEXER_VALUES:
         raise ConfigError(
-            f"{path}: ranges of SG_MUL_VAL_ have {n_values} values, at most"
-            f" {_MAX_MULTIPLEXER_VALUES} are allowed; leave out those that no frame has"
+            f"{path}: the ranges of SG_MUL_VAL_ have {n_values} values, allowed are at most"
+            f" {_MAX_MULTIPLEXER_VALUES}; remove the values that no frame has"
         )

@@ -76,9 +76,9 @@ def require_bus(message: Message) -> None:
         If the controller is bus-off or error-passive; the received frames are then incomplete.
     """
     if message.arbitration_id & BUS_OFF:
-        raise LinkError("the CAN controller is bus-off: wrong bitrate, wiring or termination")
+        raise LinkError("the CAN controller is bus-off; check bit rate, wiring and termination")
     if _controller_state(message) & (RX_PASSIVE | TX_PASSIVE):
-        raise LinkError("the CAN controller is error-passive: too many errors on the bus")
+        raise LinkError("the CAN controller is error-passive after too many errors on the bus")
 
 
 def lost_in_controller(message: Message) -> bool:

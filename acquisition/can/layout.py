@@ -171,7 +171,7 @@ def wave_channel(
     """
     scalings = {_gain_and_offset(channel, calibration, signal) for signal in signals}
     if len(scalings) > 1:
-        raise ConfigError(f"signals.{channel.id}: its signals have different factors")
+        raise ConfigError(f"signals.{channel.id}: all signals must have the same factor and offset")
     for signal in filter(is_counts, signals):
         _require_full_scale(channel, calibration, signal)
     return WaveChannel(wave, tuple(column_reader(s) for s in signals), *scalings.pop())
@@ -190,8 +190,8 @@ def _gain_and_offset(
     if unit == channel.unit:
         return source.scale, source.offset
     raise ConfigError(
-        f'channel {channel.id}: {signal.path} has unit "{signal.unit}" in the DBC; needed is'
-        f" {spellings(channel.unit)}, or V or mV"
+        f'channel {channel.id}: {signal.path} has unit "{signal.unit}" in the DBC file, expected'
+        f" {spellings(channel.unit)}, V or mV"
     )
 
 
@@ -205,7 +205,7 @@ def _require_full_scale(
     by_dbc_v = signal.source.scale * v_per_unit * COUNTS_FULL_SCALE
     if abs(by_dbc_v - calibration.full_scale_v) > _FACTOR_TOLERANCE * calibration.full_scale_v:
         raise ConfigError(
-            f"channel {channel.id}: {signal.path} has factor {signal.source.scale!r} {signal.unit},"
-            f" which is full_scale_v = {by_dbc_v:.9g}, but the plant file says"
-            f" {calibration.full_scale_v:.9g}; correct the one that is wrong"
+            f"channel {channel.id}: full_scale_v is {calibration.full_scale_v:.9g} in the plant"
+            f" file, but factor {signal.source.scale!r} {signal.unit} of {signal.path} in the DBC"
+            f" file corresponds to {by_dbc_v:.9g}"
         )

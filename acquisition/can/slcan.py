@@ -81,7 +81,7 @@ class SlcanBus(slcanBus):
             return None, False
         message = self._found.popleft()
         if message is None:
-            raise FrameError("a line that is neither an slcan frame nor an answer")
+            raise FrameError("malformed slcan line")
         return message, True
 
     def _read_chunk(self, timeout: float | None) -> None:
@@ -124,7 +124,7 @@ class SlcanBus(slcanBus):
         ):
             if speed is not None and speed not in known:
                 words = ", ".join(str(n) for n in known if n)
-                raise ConfigError(f"slcan: {name} is {speed}, allowed are {words}")
+                raise ConfigError(f"slcan: {name} is {speed} bit/s, allowed are {words}")
 
     def shutdown(self) -> None:
         """Close the adapter's channel and the port, even if the adapter is gone."""
@@ -160,12 +160,12 @@ def _parsed(line: bytes, ids: Container[int]) -> Message | None:
         code = unhexlify(b"0" + line[end : end + 1])[0]
         data = unhexlify(line[end + 1 :])
     except (HexError, IndexError) as exc:
-        raise FrameError(f"not an slcan frame: {line[:40]!r}") from exc
+        raise FrameError(f"malformed slcan frame: {line[:40]!r}") from exc
     length = CAN_FD_DLC[code] if fd else code
     if len(data) != (0 if remote else length) or length > (64 if fd else 8):
-        raise FrameError(f"an slcan frame of {len(data)} bytes with length {length}")
+        raise FrameError(f"slcan frame has {len(data)} bytes of data, expected {length}")
     if frame_id >= (1 << 29 if extended else 1 << 11):
-        raise FrameError(f"not a CAN id: {line[1:end]!r}")
+        raise FrameError(f"invalid CAN id: {line[1:end]!r}")
     return Message(
         arbitration_id=frame_id,
         is_extended_id=extended,
@@ -190,7 +190,7 @@ def _state(line: bytes) -> Message | None:
     if kind == b"e" and what.isdigit() and len(line) == 2 + int(what):
         overflow = RX_OVERFLOW if b"o" in line[2:] else 0
         return _error(PROTOCOL | BUS_ERROR | (CONTROLLER if overflow else 0), bytes([0, overflow]))
-    raise FrameError(f"not an slcan line: {line[:40]!r}")
+    raise FrameError(f"malformed slcan line: {line[:40]!r}")
 
 
 def _error(bits: int, data: bytes) -> Message:

@@ -146,9 +146,9 @@ class CanSource:
             refused = ", ".join(f"{reason} {n}" for reason, n in self.refused_frames.items())
             trouble = self._assembler.trouble
             if is_doubtful and not trouble:
-                trouble = "they come ever later than rate_hz says;"
+                trouble = "samples arrive more slowly than rate_hz;"
             raise LinkError(
-                f"{self._settings.link}: no {'credible' if trouble else 'complete'} sample for"
+                f"{self._settings.link}: no {'plausible' if trouble else 'complete'} sample for"
                 f" {doubtful_s:.1f} s;{f' {trouble}' if trouble else ''}"
                 f" frames refused so far: {refused or 'none'}"
             )

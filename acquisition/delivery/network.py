@@ -63,7 +63,7 @@ class KnownAddresses:
                 self._found = await self._look_up.addresses()
         except TimeoutError:
             if not self._found:
-                raise OSError(f"no name server answers within {limit_s} s") from None
+                raise OSError(f"no name server answered within {limit_s} s") from None
         except OSError:
             if not self._found:
                 raise
@@ -78,7 +78,7 @@ def _look_up(
         infos = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
         found = list(dict.fromkeys(str(info[4][0]) for info in infos))[:MAX_ADDRESSES]
     except (OSError, UnicodeError) as error:
-        found = error if isinstance(error, OSError) else OSError(f"{host} is no name")
+        found = error if isinstance(error, OSError) else OSError(f"{host} is not a valid host name")
     try:
         loop.call_soon_threadsafe(_answer, answer, found)
     except RuntimeError:

@@ -114,6 +114,5 @@ class Freshness:
         if standing_s > self._stale_after_s:
             self._stood_still = True
             raise LinkError(
-                f"the device answers but its data stand still: {self._what} has not changed for"
-                f" {standing_s:.1f} s"
+                f"the device replies, but {self._what} has not changed for {standing_s:.1f} s"
             )

@@ -22,5 +22,5 @@ def read_small_file(path: Path, max_bytes: int) -> bytes:
     with path.open("rb") as file:
         content = file.read(max_bytes + 1)
     if len(content) > max_bytes:
-        raise OSError(errno.EFBIG, f"larger than {max_bytes} bytes")
+        raise OSError(errno.EFBIG, f"file is larger than {max_bytes} bytes")
     return content

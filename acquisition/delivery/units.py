@@ -119,9 +119,11 @@ def require_unit(place: object, found: str | None, mapped: str) -> None:
     """
     if found and found.strip() and canonical(found) != canonical(mapped):
         raise ConfigError(
-            f"column {str(place)[:200]!r} is in {found[:40]!r}, the mapping says {mapped!r}"
+            f"column {str(place)[:200]!r} has unit {found[:40]!r}, expected {mapped!r}"
         )
 
 
 def _misfit(unit: str, wanted: str, known: Iterable[str]) -> ConfigError:
-    return ConfigError(f"unit {unit[:40]!r} does not fit {wanted}; use one of {', '.join(known)}")
+    return ConfigError(
+        f"unit {unit[:40]!r} cannot be converted to {wanted}; use one of {', '.join(known)}"
+    )

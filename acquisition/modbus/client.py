@@ -130,7 +130,7 @@ class ModbusClient:
             misfit = await self._misfit(identity)
             if misfit is None:
                 return
-        raise ConfigError(f"{self.where}: another device answers: {misfit}")
+        raise ConfigError(f"{self.where}: wrong device: {misfit}")
 
     def close(self) -> None:
         """Close the connection; no effect on a closed connection."""
@@ -194,7 +194,9 @@ class ModbusClient:
             if following is None:
                 return Identification.of_objects(objects)
         self.close()
-        raise LinkError(f"{self.where}: the identification has no end")
+        raise LinkError(
+            f"{self.where}: identification takes more than {_MAX_IDENTIFICATION_REPLIES} replies"
+        )
 
     async def _misfit(self, identity: Identity) -> str | None:
         if isinstance(identity, ExpectedIdentification):
@@ -239,10 +241,14 @@ class ModbusClient:
         except (LinkError, FrameError) as error:
             self.close()
             is_wrong = isinstance(error, FrameError)
-            words = f"wrong reply, connection dropped: {error}" if is_wrong else str(error)
+            words = (
+                f"closed the connection after a malformed reply: {error}"
+                if is_wrong
+                else str(error)
+            )
             if len(burst) > 1 and self._shows_too_many(error):
                 self.requests_in_flight = 1
-                words += f", {len(burst)} requests in flight; one at a time from now on"
+                words += f"; {len(burst)} requests were in flight, from now on one at a time"
             raise LinkError(words) from error
         self._n_closed_bursts = 0
         if not self.is_kept:
@@ -307,7 +313,7 @@ class ModbusClient:
                 if not protocol.unsolicited:
                     return
             raise LinkError(
-                f"{self.where}: the line was not silent for {timeout_s} s"
+                f"{self.where}: the serial line was not silent for {timeout_s} s"
                 f" within {_MAX_SILENCE_TRIES * timeout_s:g} s: {protocol.unsolicited}"
             )
         except (LinkError, asyncio.CancelledError):

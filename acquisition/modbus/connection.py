@@ -22,7 +22,7 @@ def reason_of(error: OSError | EOFError) -> str:
     """Return the cause of a failed connection, without text added by asyncio or pyserial."""
     code = error.errno if isinstance(error, OSError) else None
     if code == errno.EWOULDBLOCK:
-        return "another program has the port"
+        return "the port is in use by another program"
     return os.strerror(code) if code is not None and code > 0 else str(error)
 
 
@@ -101,7 +101,7 @@ class ReplyProtocol(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """Parse received bytes as replies to the requests in flight."""
         if not self._in_flight:
-            self.unsolicited = f"{len(data)} bytes came unsolicited: {data[:_SHOWN_BYTES].hex()}"
+            self.unsolicited = f"{len(data)} unsolicited bytes: {data[:_SHOWN_BYTES].hex()}"
             return
         received = memoryview(self._received + data if self._received else data)
         try:
@@ -122,7 +122,7 @@ class ReplyProtocol(asyncio.Protocol):
             self._in_flight.popleft()
             self._replies.append(reply)
         if at < len(received):
-            raise FrameError(f"{len(received) - at} bytes follow the reply")
+            raise FrameError(f"{len(received) - at} excess bytes after the reply")
         if self._done is not None and not self._done.done():
             self._done.set_result(self._replies)
         return at
@@ -136,9 +136,9 @@ class ReplyProtocol(asyncio.Protocol):
         if len(self._replies) > n_seen:
             self._watch_for(timeout_s)
             return
-        words = f"no answer within {timeout_s} s"
+        words = f"no reply within {timeout_s} s"
         if self._received:
-            words = f"{len(self._received)} bytes of an answer, and no more within {timeout_s} s"
+            words = f"incomplete reply of {len(self._received)} bytes within {timeout_s} s"
         self._fail(SilenceError(f"{self._where}: {words}"))
 
     def _fail(self, error: LinkError | FrameError) -> None:
@@ -207,7 +207,7 @@ def open_line(settings: SerialTransport, protocol: asyncio.Protocol) -> SerialLi
     except termios.error as error:  # the port exists but rejects the settings
         port.close()
         kind = ConfigError if error.args[0] == errno.EINVAL else LinkError
-        raise kind(f"{settings}: the port refuses its settings: {error.args[-1]}") from None
+        raise kind(f"{settings}: the port rejects the settings: {error.args[-1]}") from None
     except (OSError, EOFError) as error:
         port.close()
         raise LinkError(f"{settings}: {reason_of(error)}") from None

@@ -171,7 +171,7 @@ def place_records(
     counters = () if piece.counters is None else piece.counters
     places = [samples.place(int(counter), now_s) for counter in counters]
     if len({place.epoch for place in places if place is not None}) > _MAX_EPOCHS:
-        raise LinkError("FIFO: the counter channel does not count")
+        raise LinkError("FIFO: the sample counter restarts more than once in a read")
     return list(_joined(places, piece.counts))
 
 
@@ -226,7 +226,7 @@ class ChannelAssembly:
             return
         apart = signed_distance(int(piece.counters[0]), self._newest, WRAP)
         if abs(apart) > _MAX_APART:
-            raise LinkError(f"FIFO: channel {channel} counts {apart} samples apart from channel 0")
+            raise LinkError(f"FIFO: channel {channel} is {apart} samples ahead of channel 0")
         start = self._newest + apart
         self._add(channel, range(start, start + piece.n_samples), piece.counts[0])
 

@@ -88,7 +88,7 @@ class FifoLayout:
             return self._decode_channel(words)
         if words.size % self.record_registers:
             raise LinkError(
-                f"FIFO of {words.size} registers holds no whole records of {self.record_registers}"
+                f"FIFO: {words.size} registers are not whole records of {self.record_registers}"
             )
         records = words.reshape(-1, self.record_registers)
         counters = records[:, 0].astype(np.int64) if self.has_counter else None

@@ -160,9 +160,9 @@ class FifoSource:
     def _require_in_time(self, reading_s: float) -> None:
         if reading_s > self._settings.stale_after_s:
             raise LinkError(
-                f"{self._settings.transport}: the queue has not run empty for"
-                f" {self._settings.stale_after_s:g} s: the link is too slow for"
-                f" {self._calibration.rate_hz:g} samples per second"
+                f"{self._settings.transport}: the FIFO queue has not been empty for"
+                f" {self._settings.stale_after_s:g} s; the link is too slow for"
+                f" {self._calibration.rate_hz:g} samples/s"
             )
 
     def _raw_blocks(self, placed: list[PlacedSamples], arrived_ns: int) -> list[RawBlock]:

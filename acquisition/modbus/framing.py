@@ -54,7 +54,7 @@ class TcpFraming:
         n_arrived, n_min = len(pdu), pending.request.min_bytes(pdu)
         # the two lengths of a reply of variable length must agree
         if n_stated < n_min or n_stated > MAX_PDU_BYTES or (n_arrived >= n_min < n_stated):
-            raise FrameError(f"length is {length}, expected {n_min + 1}")
+            raise FrameError(f"length is {length} bytes, expected {n_min + 1}")
         return (_MBAP.size + n_stated, pdu) if n_arrived == n_stated else None
 
 

@@ -35,7 +35,7 @@ class ExpectedIdentification:
         for field in fields(self):
             expected, value = getattr(self, field.name), getattr(found, field.name)
             if expected not in (None, value):
-                return f"its {field.name} is {value!r}, expected is {expected!r}"
+                return f"{field.name} is {value!r}, expected {expected!r}"
         return None
 
 
@@ -63,7 +63,7 @@ class ExpectedRegisters:
         if content == expected:
             return None
         found, wanted = (_hex(data) for data in (content, expected))
-        return f"its registers at {self.address} are {found}, expected are {wanted}"
+        return f"registers from {self.address} are {found}, expected {wanted}"
 
 
 Identity: TypeAlias = ExpectedRegisters | ExpectedIdentification

@@ -84,7 +84,7 @@ class MapReader:
             number = numbers[part.cell]
             if not reads_as(number, part.cell.type, part.expected):
                 raise ConfigError(
-                    f"{self._client.where}: another device than configured: register"
+                    f"{self._client.where}: wrong device: register"
                     f" {part.cell.address} is {number:g}, expected {part.expected:g}"
                 )
 
@@ -136,7 +136,7 @@ class PolledSource:
         ]
         self._reader = MapReader(settings, MapDecoder(registers))
         self._ticks = PollClock(clock, settings.poll_period_s)
-        self._freshness = Freshness("the content of its registers", settings.stale_after_s)
+        self._freshness = Freshness("the content of the registers", settings.stale_after_s)
         self._stamps = HostStamps(self._rate_hz)
         time = registers.time
         self._stamped = (

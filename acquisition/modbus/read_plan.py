@@ -76,8 +76,8 @@ def plan_reads(registers: RegisterMap) -> ReadPlan:
             continue
         first = min(value.cell.address, scale.cell.address)
         raise MapError(
-            "is read in another request than its value, so that they may not belong together;"
-            f" read both as one block: [[together]] with address = {first}",
+            "must be read in the same request as its value; add a [[together]] table with"
+            f" address = {first}",
             *("value", n, "scale_register"),
         )
     return plan
@@ -118,15 +118,15 @@ def _wanted(
     for (_, stop), (start, _) in pairwise(sorted(blocks)):
         if start < stop:
             raise MapError(
-                f"two blocks share register {start + registers.base}; each register is in one",
+                f"two blocks contain register {start + registers.base}; blocks must not overlap",
                 "together",
             )
     for start, stop in stretches:
         for first, last in blocks:
             if start < last and first < stop and not first <= start < stop <= last:
                 raise MapError(
-                    f"the block from {first + registers.base} cuts the number at"
-                    f" {start + registers.base} in two",
+                    f"the block from register {first + registers.base} contains only a part of the"
+                    f" value at register {start + registers.base}",
                     "together",
                 )
     return [b for b in blocks if any(b[0] <= start < b[1] for start, _ in stretches)]

@@ -33,14 +33,14 @@ BUSY = 6
 
 _EXCEPTIONS = {
     1: "illegal function",
-    2: "illegal address",
-    3: "illegal value",
-    4: "device failure",
+    2: "illegal data address",
+    3: "illegal data value",
+    4: "server device failure",
     5: "acknowledge",
-    BUSY: "busy",
+    BUSY: "server device busy",
     8: "memory parity error",
     10: "gateway path unavailable",
-    11: "gateway target does not answer",
+    11: "gateway target device failed to respond",
 }
 _CONFIG_EXCEPTIONS = (1, 2, 3)
 
@@ -79,11 +79,11 @@ class Span:
 
     def __post_init__(self) -> None:
         if self.function not in SPAN_FUNCTIONS:
-            raise ConfigError(f"modbus: function is {self.function}, allowed are 1, 2, 3 and 4")
+            raise ConfigError(f"Modbus function must be 1, 2, 3 or 4, got {self.function}")
         if not 0 <= self.address < self.stop <= ADDRESS_SPACE:
             raise ConfigError(
-                f"modbus: {self.count} at {self.address} are requested, addresses are 0 to"
-                f" {ADDRESS_SPACE - 1}"
+                f"Modbus addresses must be 0 to {ADDRESS_SPACE - 1}, got {self.count} from"
+                f" {self.address}"
             )
 
     @property
@@ -117,16 +117,16 @@ class ReadRequest:
         )
         if function not in READ_FUNCTIONS or is_other_service:
             raise ConfigError(
-                f"function code {function} is never sent, only {READ_FUNCTIONS} to read"
+                f"Modbus function must be one of {READ_FUNCTIONS}, which only read, got {function}"
             )
 
     def __str__(self) -> str:
         """Description of the request; example: "a read of 2 at 100, function 3"."""
         match self.pdu[0]:
             case 0x18:
-                return f"a read of the queue at {int.from_bytes(self.pdu[1:3], 'big')}"
+                return f"a read of the FIFO queue at {int.from_bytes(self.pdu[1:3], 'big')}"
             case 43:
-                return "a read of its identification"
+                return "a read of the device identification"
         function, address, count = _SPAN_REQUEST.unpack(self.pdu)
         return f"a read of {count} at {address}, function {function}"
 
@@ -167,9 +167,11 @@ def _fifo_bytes(reply: memoryview) -> int:
     n_registers: int
     _, n_bytes, n_registers = _FIFO_HEAD.unpack_from(reply)
     if n_registers > MAX_FIFO_REGISTERS:
-        raise FrameError(f"FIFO count is {n_registers}, allowed is 0 to {MAX_FIFO_REGISTERS}")
+        raise FrameError(f"FIFO count must be 0 to {MAX_FIFO_REGISTERS}, got {n_registers}")
     if n_bytes != 2 + 2 * n_registers:
-        raise FrameError(f"byte count is {n_bytes} with a FIFO count of {n_registers}")
+        raise FrameError(
+            f"byte count is {n_bytes}, expected {2 + 2 * n_registers} for FIFO count {n_registers}"
+        )
     return _FIFO_HEAD.size + 2 * n_registers
 
 
@@ -177,7 +179,7 @@ def _identification_bytes(reply: memoryview, expected: bytes) -> int:
     """Return the minimum length of an identification reply in bytes, given its first bytes."""
     found = bytes(reply[1:3])
     if not expected.startswith(found):
-        raise FrameError(f"MEI type and read code are {found.hex()}, not {expected.hex()}")
+        raise FrameError(f"MEI type and read code are {found.hex()}, expected {expected.hex()}")
     end = _IDENTIFICATION_HEAD.size
     if len(reply) < end:
         return end
@@ -187,7 +189,7 @@ def _identification_bytes(reply: memoryview, expected: bytes) -> int:
             break
         end += 2 + reply[end + 1]
     if end > MAX_PDU_BYTES:
-        raise FrameError(f"identification of more than {MAX_PDU_BYTES} bytes")
+        raise FrameError(f"identification is longer than {MAX_PDU_BYTES} bytes")
     return end
 
 
@@ -244,4 +246,4 @@ def exception_error(where: str, code: int, request: ReadRequest) -> AcquisitionE
     """
     kind = ConfigError if code in _CONFIG_EXCEPTIONS else LinkError
     name = _EXCEPTIONS.get(code, "unknown")
-    return kind(f"{where}: device answers exception {code} ({name}) to {request}")
+    return kind(f"{where}: device returned exception {code} ({name}) for {request}")

@@ -187,8 +187,8 @@ class RingFollower:
         again = await self.header()
         if (again.epoch, again.layout) != (header.epoch, header.layout):
             raise LinkError(
-                f"{self._reader.where}: block ring: epoch or layout change from one reading of the"
-                " header to the next"
+                f"{self._reader.where}: block ring: epoch or layout differ between two reads of"
+                " the header"
             )
 
     def _go_back_to_start(self, newest: Slot | None, header: RingHeader) -> None:

@@ -112,9 +112,7 @@ class RingLayout:
             ("end of the ring", self.end_address, 1, ADDRESS_SPACE),
         ):
             if not lowest <= value <= highest:
-                raise ConfigError(
-                    f"block ring: {name} is {value}, allowed is {lowest} to {highest}"
-                )
+                raise ConfigError(f"block ring: {name} must be {lowest} to {highest}, got {value}")
 
 
 @dataclass(frozen=True)
@@ -146,11 +144,11 @@ def decode_header(data: bytes) -> RingHeader:
     if magic != MAGIC:
         raise ConfigError(f"block ring: magic is {magic:#06x}, expected {MAGIC:#06x}")
     if version != VERSION:
-        raise ConfigError(f"block ring: profile version is {version}, known is {VERSION}")
+        raise ConfigError(f"block ring: profile version is {version}, expected {VERSION}")
     found = int.from_bytes(data[HEADER.size : 2 * HEADER_REGISTERS], "big")
     expected = zlib.crc32(data[: HEADER.size])
     if found != expected:
-        raise FrameError(f"block ring: checksum of the header is {found:#x}, not {expected:#x}")
+        raise FrameError(f"block ring: header checksum is {found:#x}, expected {expected:#x}")
     layout = _possible_layout(
         n_channels, samples_per_slot, n_slots, rate_mhz, n_slow, ring_address, slot_stride
     )

@@ -100,7 +100,6 @@ class RingSource:
         if standing_s > self._stale_after_s and self._follower.newest is not None:
             epoch, newest = self._follower.newest
             raise LinkError(
-                f"{self._settings.transport}: the device answers but its data"
-                f" stand still: no usable slot for {standing_s:.1f} s,"
-                f" the newest is {newest} of epoch {epoch}"
+                f"{self._settings.transport}: the device replies, but has sent no usable slot for"
+                f" {standing_s:.1f} s; the newest slot is {newest} of epoch {epoch}"
             )

@@ -46,7 +46,7 @@ class PolledSlowValues:
         self._reader = MapReader(settings, MapDecoder(registers))
         position = {id_: n for n, id_ in enumerate(registers.ids)}
         self._channels = {position[channel.id]: channel for channel in channels}
-        self._freshness = Freshness("the content of its registers", settings.stale_after_s)
+        self._freshness = Freshness("the content of the registers", settings.stale_after_s)
         self._newest: tuple[float, Mapping[str, Reading]] | None = None
         self._task: asyncio.Task[None] | None = None
         self._tried = asyncio.Event()

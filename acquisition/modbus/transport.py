@@ -37,7 +37,7 @@ class TcpTransport:
 
     def __post_init__(self) -> None:
         if self.port == 0:
-            raise ConfigError("modbus: port is 0, allowed is 1 to 65535")
+            raise ConfigError("Modbus TCP port must be 1 to 65535, got 0")
 
     def __str__(self) -> str:
         return f"{self.host}:{self.port}"

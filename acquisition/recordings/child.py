@@ -110,7 +110,7 @@ def answer(request: Mapping[str, Any], out: BinaryIO) -> None:
     except (ConfigError, MemoryError) as error:
         words, number = str(error), getattr(error.__cause__, "errno", None)
         if isinstance(error, MemoryError) or isinstance(error.__cause__, MemoryError):
-            words = f"needs more than {_memory_bytes(request) >> 20} MiB of memory to read"
+            words = f"reading requires more than {_memory_bytes(request) >> 20} MiB of memory"
         words = words if words.startswith(str(path)) else f"{path}: {words}"
         send(out, {"kind": "error", "message": words[:1000], "errno": number})
     out.flush()
@@ -169,7 +169,7 @@ class _Counts:
 
     def read(self, first_row: int, n_rows: int) -> RawArray:
         if first_row + n_rows > self._n_rows:
-            raise ConfigError("blocks exceed the number of samples")
+            raise ConfigError("the blocks have more samples than the samples file")
         parts: list[Any] = []
         while n_rows > 0:
             group, offset = divmod(first_row, ROWS_PER_GROUP)

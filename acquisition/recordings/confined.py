@@ -78,12 +78,12 @@ class ConfinedProcess:
         """Wait for the end of the child; return its last log line, or the signal that ended it."""
         code = self._process.wait()
         if code < 0:
-            return f"reading it was ended by {signal.Signals(-code).name}"
+            return f"the reading process was ended by {signal.Signals(-code).name}"
         size = self._log.seek(0, os.SEEK_END)
         self._log.seek(max(0, size - _LOG_BYTES_SHOWN))
         text = self._log.read(_LOG_BYTES_SHOWN).decode("utf-8", "replace")
         lines = [line.strip() for line in text.splitlines() if line.strip()]
-        return printable(lines[-1] if lines else f"reading it ended with code {code}")
+        return printable(lines[-1] if lines else f"the reading process ended with exit code {code}")
 
     def close(self) -> None:
         """Kill the child and its process group, and close its streams."""

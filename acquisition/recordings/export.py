@@ -60,7 +60,7 @@ def export_recording(
         the recording cannot be read.
     """
     if os.path.lexists(out):
-        raise ConfigError(f"{out}: already exists; nothing is overwritten")
+        raise ConfigError(f"{out}: the file exists already and is not overwritten")
     aside = out.with_name(out.name + ".incomplete")
     try:
         with foreign_errors_of(out):
@@ -124,7 +124,7 @@ def parquet_schema(manifest: Manifest) -> Any:
     columns = _columns(manifest)
     for id_, _ in columns:
         if id_ in _OWN:
-            raise ConfigError(f"channel {id_!r} has a name that the format reserves; export as csv")
+            raise ConfigError(f"channel {id_!r} has a name that Parquet exports reserve; use CSV")
     schema = _schema(manifest, "ns", [id_ for id_, _ in columns])
     for at, (_, unit) in enumerate(columns, start=len(_OWN)):
         schema = schema.set(at, schema.field(at).with_metadata({"unit": unit}))

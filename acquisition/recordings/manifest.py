@@ -114,7 +114,7 @@ class RecordedUnit(ManifestPart):
         ids = [c.id for c in self.channels] + [c.id for c in self.slow_channels]
         twice = {id_ for id_ in ids if ids.count(id_) > 1}
         if twice:
-            raise ValueError(f"channel {min(twice)!r} is present twice")
+            raise ValueError(f"channel {min(twice)!r} occurs twice; ids must be unique")
         return self
 
     @property
@@ -194,11 +194,11 @@ class Progress:
         """
         if not 1 <= n_samples <= MAX_BLOCK_SAMPLES:
             raise ConfigError(
-                f"a block of {n_samples} samples; it must have 1 to {MAX_BLOCK_SAMPLES}"
+                f"number of samples of a block must be 1 to {MAX_BLOCK_SAMPLES}, got {n_samples}"
             )
         for name, value in (("epoch", epoch), ("first index", first_index)):
             if not 0 <= value <= MAX_INDEX:
-                raise ConfigError(f"a block with {name} {value}; it must be 0 to {MAX_INDEX}")
+                raise ConfigError(f"{name} of a block must be 0 to {MAX_INDEX}, got {value}")
         expected = self.stop_index if epoch == self.epoch else 0
         n_missing = max(first_index - expected, 0)
         _require_room(rejected, n_missing)
@@ -208,16 +208,16 @@ class Progress:
 
 def _require_room(rejected: Sequence[Rejection], n_missing: int) -> None:
     if len(rejected) > MAX_REJECTIONS:
-        raise ConfigError(f"a block with {len(rejected)} rejections; at most {MAX_REJECTIONS}")
+        raise ConfigError(f"a block has {len(rejected)} rejections, more than {MAX_REJECTIONS}")
     for rejection in rejected:
         if not 1 <= len(rejection.reason) <= MAX_REASON_LENGTH or rejection.n_samples < 1:
             raise ConfigError(
-                f"a rejection of {rejection.n_samples} samples for {rejection.reason[:80]!r}; it"
-                f" needs at least one, and a reason of 1 to {MAX_REASON_LENGTH} letters"
+                f"a rejection must have at least 1 sample and a reason of 1 to {MAX_REASON_LENGTH}"
+                f" characters, got {rejection.n_samples} and {rejection.reason[:80]!r}"
             )
     n_rejected = sum(rejection.n_samples for rejection in rejected)
     if n_rejected > n_missing:
-        raise ConfigError(f"a block with {n_rejected} samples rejected in a jump of {n_missing}")
+        raise ConfigError(f"a block has {n_rejected} rejected, but {n_missing} missing samples")
 
 
 class _Head(BaseModel):
@@ -237,16 +237,16 @@ def read_manifest(folder: Path) -> Manifest:
     """
     path = folder / MANIFEST
     if not folder.is_dir():
-        raise ConfigError(f"{folder}: no such folder")
+        raise ConfigError(f"{folder}: folder does not exist")
     if not path.is_file():
-        raise ConfigError(f"{folder}: no {MANIFEST}, so no recording or an unfinished one")
+        raise ConfigError(f"{folder}: {MANIFEST} is missing; not a recording, or an unfinished one")
     try:
         text = read_small_file(path, MAX_MANIFEST_BYTES)
         head = _Head.model_validate_json(text, strict=True)
         if head.format != FORMAT or head.version != VERSION:
             raise ConfigError(
-                f"{path}: {head.format[:40]!r} version {head.version},"
-                f" this padwatch reads {FORMAT!r} version {VERSION}"
+                f"{path}: format is {head.format[:40]!r} version {head.version},"
+                f" expected {FORMAT!r} version {VERSION}"
             )
         found = Manifest.model_validate_json(text, strict=True)
     except ValidationError as error:
@@ -257,7 +257,7 @@ def read_manifest(folder: Path) -> Manifest:
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror}") from error
     if found.checksum != checksum_of(json.loads(text)):
-        raise ConfigError(f"{path}: damaged, or edited by hand: not what its checksum says")
+        raise ConfigError(f"{path}: checksum does not match; the file is damaged or was edited")
     return found
 
 

@@ -59,7 +59,7 @@ def receive(stream: BinaryIO) -> Message:
     lengths = _read(stream, 8)
     n_head, n_body = (int.from_bytes(lengths[at : at + 4], "little") for at in (0, 4))
     if n_head > MAX_HEAD_BYTES or n_body > MAX_BODY_BYTES:
-        raise ConfigError(f"a message of {n_head} + {n_body} bytes from the reading process")
+        raise ConfigError(f"message from the reading process is too long: {n_head + n_body} bytes")
     try:
         head = json.loads(_read(stream, n_head))
     except (ValueError, RecursionError) as error:
@@ -264,4 +264,4 @@ def frames_of(message: Message) -> Frames:
 
 
 def _malformed() -> ConfigError:
-    return ConfigError("a malformed message from the reading process")
+    return ConfigError("malformed message from the reading process")

@@ -97,14 +97,15 @@ def _require_file(path: Path, expected: RecordedFile) -> None:
         if not stat.S_ISREG(status.st_mode):
             raise ConfigError(f"{path}: not a regular file")
         if status.st_size != expected.size:
-            raise ConfigError(f"{path}: {status.st_size} bytes, the manifest says {expected.size}")
+            raise ConfigError(f"{path}: file has {status.st_size} bytes, expected {expected.size}")
         with path.open("rb") as file:
             found = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror}") from error
     if found != expected.sha256:
         raise ConfigError(
-            f"{path}: damaged: checksum {found[:12]}…, the manifest says {expected.sha256[:12]}…"
+            f"{path}: file is damaged: its checksum is {found[:12]}…, expected"
+            f" {expected.sha256[:12]}…"
         )
 
 
@@ -120,7 +121,7 @@ def _require_lengths(recording: Recording) -> None:
         for row in np.flatnonzero(~is_plain).tolist():
             try:
                 if has_more[row]:
-                    raise ConfigError("OK bits of more than the recorded channels")
+                    raise ConfigError("OK bits are set for channels that are not recorded")
                 before = progress if row == 0 else _end_of(rows[row - 1])
                 epoch, first, n = rows[["epoch", "first_index", "n_samples"]][row].tolist()
                 before.after(epoch, first, n, rejected.get(row, ()))
@@ -129,9 +130,7 @@ def _require_lengths(recording: Recording) -> None:
         progress = _end_of(rows[-1])
         n_samples, n_blocks = n_samples + int(length.sum()), n_blocks + len(rows)
     if n_samples != manifest.n_samples:
-        raise ConfigError(
-            f"{path}: {n_samples} samples in all, the manifest says {manifest.n_samples}"
-        )
+        raise ConfigError(f"{path}: blocks have {n_samples} samples, expected {manifest.n_samples}")
 
 
 def _end_of(row: np.void) -> Progress:

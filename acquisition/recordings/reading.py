@@ -69,7 +69,7 @@ def confined_messages(
     try:
         process = _idle_or_new()
     except OSError as error:
-        raise ConfigError(f"{path}: no process to read it: {error.strerror}") from error
+        raise ConfigError(f"{path}: reading process cannot be started: {error.strerror}") from error
     has_ended, refusal = False, None
     try:
         question = {"path": str(path.absolute()), "format": format_} | dict(request)
@@ -83,13 +83,13 @@ def confined_messages(
             elif found == kind:
                 yield message
             elif found != "end":
-                raise ConfigError(f"{path}: unexpected answer from the reading process")
+                raise ConfigError(f"{path}: unexpected message from the reading process")
             has_ended = found == "end"
         if refusal is not None:
             raise refusal
     except (EOFError, OSError) as error:
         reason, cause = _why_broken(process, error)
-        raise ConfigError(f"{path}: not readable as {format_}: {reason}") from cause or EOFError()
+        raise ConfigError(f"{path}: cannot be read as {format_}: {reason}") from cause or EOFError()
     finally:
         if has_ended and len(_idle) < _MAX_IDLE:
             _idle.append(process)
@@ -100,7 +100,9 @@ def confined_messages(
 def _why_broken(process: ConfinedProcess, error: Exception) -> tuple[str, OSError | None]:
     """Return the reason why the child failed, and a system error if the file is not the cause."""
     if isinstance(error, TimeoutError):
-        return f"no answer for {SILENCE_S:g} s", _system_error(errno.ETIMEDOUT)
+        return f"the reading process sent nothing for {SILENCE_S:g} s", _system_error(
+            errno.ETIMEDOUT
+        )
     words, code = process.last_words(), process.exit_code()
     is_of_file = code == FAILED or -code in _SIGNALS_OF_FAULTS
     return words, None if is_of_file else _system_error(errno.EINTR)
@@ -130,7 +132,7 @@ def _idle_or_new() -> ConfinedProcess:
 
 
 def _started() -> ConfinedProcess:
-    module, words = "acquisition.recordings.child", f"no answer for {SILENCE_S:g} s"
+    module, words = "acquisition.recordings.child", f"no start within {SILENCE_S:g} s"
     process = ConfinedProcess(module, silence_s=SILENCE_S)
     with suppress(TimeoutError):
         if process.output.read(len(READY)):

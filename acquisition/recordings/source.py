@@ -65,8 +65,8 @@ def select(recorded: RecordedUnit, unit: Unit, slow_units: Mapping[str, str]) ->
     """
     if recorded.rate_hz != unit.rate_hz:
         raise ConfigError(
-            f"the recording has {recorded.rate_hz:.9g} Hz, unit {unit.id} is configured for"
-            f" {unit.rate_hz:.9g} Hz"
+            f"the recording has a sampling rate of {recorded.rate_hz:.9g} Hz, but unit {unit.id}"
+            f" of {unit.rate_hz:.9g} Hz"
         )
     measurands = {c.id: c.measurand.value for c in recorded.channels}
     units = {c.id: c.unit for c in recorded.slow_channels}
@@ -92,12 +92,12 @@ def _positions(
     missing = [id_ for id_ in wanted if id_ not in recorded]
     if missing:
         raise ConfigError(
-            f"{owner} needs {kind} {_listed(missing)}, the recording has {_listed(recorded)}"
+            f"{owner} requires {kind} {_listed(missing)}, but the recording has {_listed(recorded)}"
         )
     for id_, unit in wanted.items():
         if recorded[id_] != unit:
             raise ConfigError(
-                f"{kind} {id_} is recorded as {recorded[id_]}, {owner} is configured for {unit}"
+                f"{kind} {id_} is recorded as {recorded[id_]}, but configured as {unit} in {owner}"
             )
     ids = list(recorded)
     return tuple(ids.index(id_) for id_ in wanted)
@@ -139,7 +139,7 @@ class RecordingSource:
         block_s: float = MIN_BLOCK_S,
     ) -> None:
         if speed is not None and not speed > 0.0:
-            raise ValueError(f"a recording runs at a positive speed, not {speed}")
+            raise ValueError(f"speed must be above 0, got {speed}")
         self._recording = recording
         self._clock = clock
         self._selection = selection or all_of(recording.manifest)

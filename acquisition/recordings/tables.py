@@ -153,10 +153,12 @@ def _require_shape(file: Any, path: Path, schema: Any, n_rows: int, group_rows: 
     found, metadata = file.schema_arrow, file.metadata
     if not found.equals(schema):
         name = next((a for a, b in zip(found, schema, strict=False) if a != b), None)
-        words = f"column {name.name!r} of type {name.type}" if name else f"{len(found)} columns"
-        raise ConfigError(f"{path}: {words} where the manifest says otherwise")
+        words = f"column {name.name!r} ({name.type})" if name else "the number of columns"
+        raise ConfigError(f"{path}: {words} does not match the manifest")
     if metadata.num_rows != n_rows:
-        raise ConfigError(f"{path}: {metadata.num_rows} rows, the manifest says {n_rows}")
+        raise ConfigError(f"{path}: file has {metadata.num_rows} rows, expected {n_rows}")
     found_rows = [metadata.row_group(n).num_rows for n in range(metadata.num_row_groups)]
     if found_rows != group_rows:
-        raise ConfigError(f"{path}: not in row groups of {group_rows[0]}")
+        raise ConfigError(
+            f"{path}: row groups must have {group_rows[0]} rows, got {found_rows[:3]}"
+        )

@@ -81,11 +81,11 @@ class RecordingWriter:
         self._n_waiting = 0
         self._blocks: list[RawBlock] = []
         if os.path.lexists(folder):
-            raise ConfigError(f"{folder}: already exists; a recording is never overwritten")
+            raise ConfigError(f"{folder}: folder exists already; a recording is not overwritten")
         if os.path.lexists(self._aside):
             raise ConfigError(
-                f"{self._aside}: already exists: being written, or left by a program that was"
-                " killed; delete it then"
+                f"{self._aside}: the folder exists already; delete it unless another program is"
+                " writing to it"
             )
         with foreign_errors_of(self._aside):
             self._aside.mkdir()
@@ -125,7 +125,7 @@ class RecordingWriter:
         n_samples = raw.counts.shape[1]
         progress = self._progress.after(raw.epoch, raw.first_index, n_samples, raw.rejected)
         if self.n_samples + n_samples > MAX_SAMPLES:
-            raise ConfigError(f"more than {MAX_SAMPLES} samples per channel: begin another one")
+            raise ConfigError(f"more than {MAX_SAMPLES} samples per channel; begin a new recording")
         self._progress = progress
         if self.n_blocks == 0:
             self._start_ns = raw.start_ns
@@ -164,7 +164,7 @@ class RecordingWriter:
         """
         if self.n_blocks == 0:
             self.abandon()
-            raise ConfigError(f"{self._folder}: no samples arrived, nothing was recorded")
+            raise ConfigError(f"{self._folder}: nothing was recorded, because no samples arrived")
         with foreign_errors_of(self._aside):
             self._write_counts(self._n_waiting)
             self._write_blocks()
@@ -249,8 +249,8 @@ def _require_calibration(block: SampleBlock, calibration: UnitCalibration) -> No
         known.get(channel.id) != channel for channel in own.slow
     ):
         raise ConfigError(
-            f"the samples of unit {own.unit!r} from index {block.first_index} on are not those"
-            " with the calibration they are to be recorded with"
+            f"the samples of unit {own.unit!r} from index {block.first_index} on have another"
+            " calibration than the recording"
         )
 
 
@@ -271,14 +271,14 @@ def _cells(block: SampleBlock, calibration: UnitCalibration) -> Iterator[RawBloc
 def _require_fit(raw: RawBlock, unit: RecordedUnit) -> None:
     n_channels, n_slow = len(unit.channels), len(unit.slow_channels)
     found = (len(raw.counts), len(raw.ok), len(raw.slow), raw.counts.dtype.name)
-    if found != (n_channels, n_channels, n_slow, unit.sample_type):
+    expected = (n_channels, n_channels, n_slow, unit.sample_type)
+    if found != expected:
         raise ConfigError(
-            f"a block of {len(raw.counts)} channels and {len(raw.slow)} slow values as"
-            f" {raw.counts.dtype}, to be recorded are {n_channels} and {n_slow} as"
-            f" {unit.sample_type}"
+            f"channels, OK flags, slow values and sample type of a block must be {expected},"
+            f" got {found}"
         )
     if raw.rate_hz != unit.rate_hz:
-        raise ConfigError(f"a block at {raw.rate_hz} Hz in a recording at {unit.rate_hz} Hz")
+        raise ConfigError(f"expected a block at {unit.rate_hz} Hz, got {raw.rate_hz} Hz")
 
 
 def _sync(path: Path) -> None:

@@ -145,7 +145,7 @@ ALARM_KINDS = kind_table(
         None,
         DEVICE,
         TIME_STAMPS,
-        advice="Look at the clock of the device: its time jumps, repeats or runs backwards.",
+        advice="Check the clock of the device; its time jumps, repeats or runs backwards.",
     ),
     AlarmKind(
         LINK_LOST,
@@ -153,7 +153,7 @@ ALARM_KINDS = kind_table(
         None,
         LINK,
         "link",
-        advice="Find out why the device does not answer; padwatch connects again by itself.",
+        advice="Find out why the device does not respond; padwatch reconnects automatically.",
     ),
 )
 """All alarm kinds of a unit. The alarms of a bearing are judged in this order."""

@@ -89,8 +89,8 @@ def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[Ala
         case Acknowledge(occurrence=occurrence):
             if occurrence != alarm.occurrence:
                 raise ActionRefusedError(
-                    f"occurrence {occurrence} was meant, the newest is {alarm.occurrence}:"
-                    " look at it before acknowledging it"
+                    f"occurrence {occurrence} is not the newest; check occurrence"
+                    f" {alarm.occurrence} before acknowledging it"
                 )
             if alarm.is_acknowledged:
                 return alarm, ()
@@ -117,7 +117,7 @@ def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[Ala
             )
         case Reset():
             if not alarm.is_latched:
-                raise ActionRefusedError("nothing to reset: the alarm is not latched")
+                raise ActionRefusedError("the alarm is not latched, so there is nothing to reset")
             if not alarm.is_acknowledged:
                 raise ActionRefusedError("the alarm must be acknowledged before it is reset")
             after = replace(alarm, level=standing_level(alarm.timers), is_latched=False)
@@ -139,9 +139,9 @@ def expire(alarm: Alarm, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
     if shelf is None:
         return alarm, ()
     if shelf.until_ns is not None and shelf.until_ns <= now_ns:
-        reason = "the time it was shelved for is up"
+        reason = "the shelving time has ended"
     elif now_ns < shelf.since_ns - CLOCK_MARGIN_NS:
-        reason = "the clock was set back since it was shelved"
+        reason = "the clock was set back after the alarm was shelved"
     else:
         return alarm, ()
     after = shown_again(replace(alarm, shelf=None))

@@ -128,4 +128,4 @@ def far_readings(
             counts.append(f"{n} of {deviation.size} readings in {learned.direction}")
     if not counts:
         return None
-    return f"{' and '.join(counts)} are at least twice or at most half of the others; a wrong unit?"
+    return f"{' and '.join(counts)} are at least twice or at most half of the others; check units"

@@ -30,7 +30,8 @@ class TimeScatter:
 
     def __post_init__(self) -> None:
         if not (self.time_scale_h > 0.0 and self.share > 0.0):
-            raise ValueError(f"time_scale_h = {self.time_scale_h:g}, share = {self.share:g}")
+            found = f"{self.time_scale_h:g} and {self.share:g}"
+            raise ValueError(f"time_scale_h and share must be above 0, got {found}")
 
 
 @dataclass(frozen=True)
@@ -131,18 +132,18 @@ class QuantityBaseline:
 
     def __post_init__(self) -> None:
         if self.direction not in DIRECTIONS:
-            raise ValueError(f"direction = {self.direction!r}: not one of {DIRECTIONS}")
+            raise ValueError(f"direction must be one of {DIRECTIONS}, got {self.direction!r}")
         if not (self.scatter > 0.0 and self.u_random >= 0.0 and self.reading_h > 0.0):
             raise ValueError(
-                f"scatter = {self.scatter:g}, u_random = {self.u_random:g},"
-                f" reading_h = {self.reading_h:g}"
+                "scatter and reading_h must be above 0 and u_random not below 0, got"
+                f" {self.scatter:g}, {self.reading_h:g} and {self.u_random:g}"
             )
         n_terms = ATTITUDE_TERMS if self.surface.shape.has_attitude else 0
         if [len(row) for row in self.attitude_covariance] != [n_terms] * n_terms:
-            raise ValueError(f"attitude_covariance: not {n_terms} by {n_terms}")
+            raise ValueError(f"attitude_covariance must be {n_terms} by {n_terms}")
         times_h = [time.time_scale_h for time in self.time_scatter]
         if times_h != sorted(set(times_h)):
-            raise ValueError(f"time_scatter: {times_h} must increase")
+            raise ValueError(f"time scales of time_scatter must increase, got {times_h} h")
 
     def compare(
         self, conditions: FilmConditions, value: FloatArray, u_random: FloatArray

@@ -64,15 +64,18 @@ class CellStatistics:
 
     def __post_init__(self) -> None:
         if min(self.n_readings, self.n_days) < 0:
-            raise ValueError(f"n_readings = {self.n_readings}, n_days = {self.n_days}: below 0")
+            raise ValueError(
+                f"n_readings = {self.n_readings} and n_days = {self.n_days} must not be below 0"
+            )
         if not (self.scatter > 0.0 and self.surface_std >= 0.0):
-            raise ValueError(f"scatter = {self.scatter:g}, surface_std = {self.surface_std:g}")
+            found = f"{self.scatter:g} and {self.surface_std:g}"
+            raise ValueError(f"scatter must be above 0 and surface_std not below 0, got {found}")
         if not 0.0 <= self.lasting < self.scatter:
             raise ValueError(
                 f"lasting = {self.lasting:g} must be 0 or more and below scatter = {self.scatter:g}"
             )
         if len(self.node_std) != NODES**2 or not min(self.node_std) >= 0.0:
-            raise ValueError(f"node_std = {self.node_std}: not {NODES**2} numbers of 0 or more")
+            raise ValueError(f"node_std must be {NODES**2} numbers >= 0, got {self.node_std}")
 
 
 @dataclass(frozen=True)
@@ -84,9 +87,9 @@ class CellTable:
     def __post_init__(self) -> None:
         names = [cell.cell for cell in self.cells]
         if len(set(names)) < len(names):
-            raise ValueError("cells: one of them is repeated")
+            raise ValueError("cells must be unique")
         if len({len(name) for name in names}) > 1:
-            raise ValueError("cells: not all have as many axes")
+            raise ValueError("cells must all have the same number of axes")
 
     def find(self, cells: CellArray) -> npt.NDArray[np.int64]:
         """Return the table row of each of n cells; -1 for a missing or unsupported cell."""

@@ -114,7 +114,7 @@ class Surface:
     def __post_init__(self) -> None:
         if len(self.coefficients) != self.shape.n_coefficients:
             raise ValueError(
-                f"coefficients: {len(self.coefficients)}, expected {self.shape.n_coefficients}"
+                f"expected {self.shape.n_coefficients} coefficients, got {len(self.coefficients)}"
             )
 
     @cached_property

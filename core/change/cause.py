@@ -77,13 +77,13 @@ SHARE_SPREAD, COVERAGE = 0.3, 2.0
 """`SHARE_SPREAD`: relative standard uncertainty of the film share due to the predicted motion.
 `COVERAGE`: number of standard uncertainties by which the film share may lie outside 0 to 1."""
 
-FILM_REASON = "the shaft moves as it does with films of the stiffness that is measured"
-OIL_REASON = "all films changed alike, and the shaft moves as it does with such films"
-TRANSDUCER_REASON = "the shaft moves as if the film had not changed"
-PROBE_REASON = "shaft probes read more or less than films and other probes account for"
-BRACKET_REASON = "the shaft moves as if the bracket had changed"
-ALIKE_REASON = "all films changed alike; look at oil and cooling first"
-ALONE_REASON = "whether other films changed with it is not known"
+FILM_REASON = "shaft motion agrees with films of the measured stiffness"
+OIL_REASON = "all films changed alike, and shaft motion agrees with these changes"
+TRANSDUCER_REASON = "shaft motion agrees with an unchanged film"
+PROBE_REASON = "amplitudes of the shaft probes disagree with films and other probes"
+BRACKET_REASON = "shaft motion agrees with a changed bracket"
+ALIKE_REASON = "all films changed alike; check oil and cooling first"
+ALONE_REASON = "it is unknown whether other films changed as well"
 AMBIGUOUS_REASON = "shaft motion agrees with more than one cause"
 NO_FIT_REASON = "shaft motion agrees with no single cause"
 
@@ -139,7 +139,7 @@ def attribute(
     usable = np.all(np.isfinite(readings.ln_k) & np.isfinite(readings.ln_shaft), axis=0)
     usable &= np.isfinite(readings.deviation[row])
     if not usable.any():
-        return Attribution(Cause.UNKNOWN, "stiffness or shaft motion is not known everywhere")
+        return Attribution(Cause.UNKNOWN, "stiffness or shaft motion of some bearing is unknown")
     seen = _Residuals(row, response, readings.columns(usable))
     cause, reason = _cause(seen, bracket_n_per_m)
     unchanged = seen.if_unchanged

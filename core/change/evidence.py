@@ -99,7 +99,7 @@ class GatheredEvidence:
         times = baseline.time_scatter
         scales = self.scales or (ScaleSums(),) * len(times)
         if len(scales) != len(times):
-            raise ValueError(f"evidence on {len(scales)} time scales, baseline on {len(times)}")
+            raise ValueError(f"evidence has {len(scales)} time scales, the baseline {len(times)}")
         newest = (*self.newest, compared.deviation)[-MEDIAN_READINGS:]
         middle = median(newest)
         return GatheredEvidence(

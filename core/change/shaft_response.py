@@ -63,9 +63,9 @@ class ShaftResponse:
         n = len(self.places)
         shape = [len(row) for row in self.coefficients]
         if len(self.centre) != n or len(self.std) != n or shape != [_n_terms(n)] * n:
-            raise ValueError(f"coefficients: not {n} by {_n_terms(n)}, or centre or std not {n}")
+            raise ValueError(f"coefficients must be {n} by {_n_terms(n)}, centre and std {n}")
         if not all(std > 0.0 for std in self.std):
-            raise ValueError(f"std: {self.std} must be above 0")
+            raise ValueError(f"std must be above 0, got {self.std}")
 
     @cached_property
     def _coefficients(self) -> FloatArray:

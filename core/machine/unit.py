@@ -250,7 +250,7 @@ def require_same_machine(here: Unit, there: Unit) -> None:
     before, after = _fixed_parts(here), _fixed_parts(there)
     for name, value in before.items():
         if after[name] != value:
-            raise ValueError(f"{name} is {after[name]!r}, is {value!r} here")
+            raise ValueError(f"{name} is {after[name]!r}, expected {value!r}")
 
 
 def bearings_with_new_references(here: Unit, there: Unit) -> list[str]:

@@ -182,12 +182,10 @@ class UnitMonitor:
             If the unit, rate or number of channels differs; the message gives both values.
         """
         if block.unit != self.unit.id:
-            raise BlockMisfitError(
-                f"block of unit {block.unit!r} in the monitor of {self.unit.id!r}"
-            )
+            raise BlockMisfitError(f"expected a block of unit {self.unit.id!r}, got {block.unit!r}")
         if block.rate_hz != self.unit.rate_hz:
             raise BlockMisfitError(
-                f"samples at {block.rate_hz} Hz, configured {self.unit.rate_hz} Hz"
+                f"expected samples at {self.unit.rate_hz} Hz, got {block.rate_hz} Hz"
             )
         self._ring.require(block)
 

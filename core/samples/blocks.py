@@ -273,7 +273,7 @@ class SampleBlock:
         """
         stop = self.n_samples if stop is None else min(stop, self.n_samples)
         if not 0 <= start <= self.n_samples:
-            raise ValueError(f"part from sample {start} of a block of {self.n_samples}")
+            raise ValueError(f"part begins at sample {start} of {self.n_samples} samples")
         if (start, stop) == (0, self.n_samples):
             return self
         return replace(

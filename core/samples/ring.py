@@ -138,7 +138,7 @@ class Ring:
         """Check the number of channels of a block; raise `BlockMisfitError` if it differs."""
         if len(block.counts) != self._n_channels:
             raise BlockMisfitError(
-                f"{len(block.counts)} channels offered to a ring of {self._n_channels}"
+                f"expected a block of {self._n_channels} channels, got {len(block.counts)}"
             )
 
     def _n_missing_before(self, block: SampleBlock) -> int:
@@ -160,7 +160,7 @@ class Ring:
             If the ring does not hold all of these samples, or the range is empty.
         """
         if first_index == stop_index or not self.holds(first_index, stop_index):
-            raise LookupError(f"samples {first_index} to {stop_index} are not in the ring")
+            raise LookupError(f"samples {first_index} to {stop_index} are not in the buffer")
         parts = [
             _Part.of(block, first_index, stop_index)
             for block in self._blocks

@@ -115,9 +115,9 @@ class PollTransform(KeptSegments):
         known = {channel.id for channel in unit.channels}
         for row in rows:
             if row.channel not in known:
-                raise ValueError(f"row {row.id!r} is of no channel of unit {unit.id!r}")
+                raise ValueError(f"row {row.id!r} belongs to no channel of unit {unit.id!r}")
         if len(self._row) < len(rows):
-            raise ValueError(f"two of {len(rows)} rows are the same")
+            raise ValueError("rows must be unique")
         # the phase reference of a rack differs from that of padwatch's slow-roll vectors
         self._runout = {
             c.id: runout_verdict(c.slow_roll, c.probe, unit.rated_speed_rpm, has_key_phase=False)

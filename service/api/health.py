@@ -27,15 +27,15 @@ def health_router(context: Context) -> APIRouter:
     """Return the router for liveness and readiness."""
     router = APIRouter(tags=["health"], dependencies=[OPEN])
 
-    @router.get("/livez", summary="Is the process alive?")
+    @router.get("/livez", summary="Liveness")
     async def livez() -> HealthModel:
         """Answer 200 while the event loop runs, independent of data acquisition and disk."""
         return HealthModel(status="ok", checks={"event_loop": "turning"})
 
     @router.get(
         "/readyz",
-        summary="Can it do its work?",
-        responses={503: {"model": HealthModel, "description": "Something does not work"}},
+        summary="Readiness",
+        responses={503: {"model": HealthModel, "description": "At least one check fails"}},
     )
     async def readyz(response: Response) -> HealthModel:
         """Answer 200 if results can be stored and every background loop runs, else 503.
@@ -85,7 +85,7 @@ def metrics_router(look: Callable[[], Awaitable[Collector]]) -> APIRouter:
 
     @router.get(
         "/metrics",
-        summary="How the service does, for Prometheus",
+        summary="Metrics for Prometheus",
         response_class=Response,
         responses={200: ANSWER},
     )

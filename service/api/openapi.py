@@ -228,7 +228,7 @@ HEADERS = {
         "example": "live",
     },
     EDITION_HEADER: {
-        "description": "Edition of the program; changes with an upgrade.",
+        "description": "Version of the program; changes with an upgrade.",
         "schema": {"type": "string"},
         "example": "1.0.0-1f2e3d4c",
     },
@@ -245,7 +245,7 @@ PROBLEM_HEADERS: dict[str, dict[str, Any]] = {
     },
     "429": {
         "Retry-After": {
-            "description": "Seconds to wait.",
+            "description": "Time to wait before the next request, s.",
             "schema": {"type": "integer"},
             "example": 4,
         }
@@ -310,12 +310,12 @@ SCHEMES = {
         "type": "apiKey",
         "in": "cookie",
         "name": COOKIE,
-        "description": "A login of a person (POST /api/v1/session).",
+        "description": "Session cookie of a person (POST /api/v1/session).",
     },
     "key": {
         "type": "http",
         "scheme": "bearer",
-        "description": "A key of a machine (padwatch keys create).",
+        "description": "API key of a machine (padwatch keys create).",
     },
 }
 

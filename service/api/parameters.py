@@ -24,7 +24,7 @@ def written_as_date(text: object) -> object:
         If the text is a bare number.
     """
     if isinstance(text, str) and "-" not in text[1:]:
-        raise ValueError("a time is written like 2026-11-21T08:00:00Z")
+        raise ValueError("a time must be RFC 3339, such as 2026-11-21T08:00:00Z")
     return text
 
 
@@ -42,7 +42,7 @@ def ns_from_datetime(moment: datetime, parameter: str) -> int:
         If the time has no offset from UTC.
     """
     if moment.tzinfo is None:
-        detail = f"{parameter} needs an offset from UTC, such as a trailing Z"
+        detail = f"{parameter} requires an offset from UTC, such as a trailing Z"
         raise ProblemError(422, "Wrong parameter", detail, parameter)
     elapsed = min(max(moment, FIRST), LAST) - EPOCH
     return (elapsed.days * 86_400 + elapsed.seconds) * NS_PER_S + elapsed.microseconds * 1000
@@ -102,8 +102,8 @@ async def optional_time_range(
 
 
 async def eccentricity_range(
-    eccentricity_min: Annotated[float | None, _bound("Lowest eccentricity ratio.", 0.2)] = None,
-    eccentricity_max: Annotated[float | None, _bound("Highest eccentricity ratio.", 0.4)] = None,
+    eccentricity_min: Annotated[float | None, _bound("Minimum eccentricity ratio.", 0.2)] = None,
+    eccentricity_max: Annotated[float | None, _bound("Maximum eccentricity ratio.", 0.4)] = None,
 ) -> ValueRange:
     """Return the requested range of eccentricity ratios; unlimited by default."""
     return _ordered(eccentricity_min, eccentricity_max, "eccentricity_min")
@@ -141,11 +141,11 @@ def _ordered(low: float | None, high: float | None, parameter: str) -> ValueRang
 
 States = Annotated[
     list[OperatingStateName] | None,
-    Query(description="Only in this operating state; may be repeated.", examples=[["full_load"]]),
+    Query(description="Operating state to include; may be repeated.", examples=[["full_load"]]),
 ]
 
 OnlyUnit = Annotated[
-    str | None, Query(max_length=32, description="Only this unit.", examples=["U1"])
+    str | None, Query(max_length=32, description="Unit to include; default: all.", examples=["U1"])
 ]
 
 

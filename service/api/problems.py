@@ -28,7 +28,7 @@ SCHEMAS = "#/components/schemas/"
 WORDS = {
     403: "Not allowed, or requested by a page of another site",
     404: "Unknown unit or bearing",
-    409: "Does not fit the present state",
+    409: "Conflict with the present state",
     410: "Damaged on the disk",
     422: "A wrong parameter",
     503: "The store cannot be used",
@@ -43,9 +43,10 @@ class Mistake(BaseModel):
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
-    parameter: str = Field(description="Its name.", examples=["max_points"])
+    parameter: str = Field(description="Name of the parameter.", examples=["max_points"])
     detail: str = Field(
-        description="What is allowed.", examples=["Input should be less than or equal to 5000"]
+        description="What is wrong with the value.",
+        examples=["Input should be less than or equal to 5000"],
     )
 
 
@@ -54,14 +55,20 @@ class Problem(BaseModel):
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
-    type: str = Field(default="about:blank", description="Always this.", examples=["about:blank"])
+    type: str = Field(
+        default="about:blank",
+        description="URI of the kind of problem; always `about:blank`.",
+        examples=["about:blank"],
+    )
     title: str = Field(description="Kind of problem.", examples=["Unknown unit"])
     status: int = Field(description="HTTP status.", examples=[404])
     detail: str = Field(
-        description="This problem.", examples=["there is no unit 'U9' in this plant"]
+        description="Description of this problem.", examples=["there is no unit 'U9' in this plant"]
     )
     instance: str = Field(description="Path of the request.", examples=["/api/v1/units/U9"])
-    errors: list[Mistake] = Field(description="The first wrong parameters.", default_factory=list)
+    errors: list[Mistake] = Field(
+        description="Wrong parameters; at most the first few.", default_factory=list
+    )
 
 
 class ProblemError(Exception):
@@ -130,7 +137,7 @@ async def refuse_unknown_parameters(request: Request) -> None:
     known = request.app.declared[operation].query_parameters
     for name in request.query_params:
         if name not in known:
-            detail = f"there is no parameter {name!r} here; known: {', '.join(known) or 'none'}"
+            detail = f"unknown parameter {name!r}; known parameters: {', '.join(known) or 'none'}"
             raise ProblemError(422, "Wrong parameter", detail, name)
 
 
@@ -160,7 +167,10 @@ def install_problem_handlers(app: FastAPI) -> None:
             return _not_allowed(request, methods)
         found = error.errors()
         mistakes = [
-            Mistake(parameter=".".join(str(p) for p in e["loc"][1:]), detail=str(e["msg"]))
+            Mistake(
+                parameter=".".join(str(p) for p in e["loc"][1:]),
+                detail=str(e["msg"]).removeprefix("Value error, "),
+            )
             for e in found[:MAX_MISTAKES]
         ]
         detail = "; ".join(f"{mistake.parameter}: {mistake.detail}" for mistake in mistakes)
@@ -176,7 +186,7 @@ def install_problem_handlers(app: FastAPI) -> None:
     @app.exception_handler(StoreError)
     async def _store(request: Request, error: StoreError) -> Response:
         log.error("database query failed", path=request.url.path, reason=str(error))
-        return _render(request, 503, "Store not available", "the store cannot be read just now")
+        return _render(request, 503, "Store not available", "the store cannot be read now")
 
     @app.exception_handler(NotAvailableError)
     async def _not_here(request: Request, error: NotAvailableError) -> Response:
@@ -189,7 +199,7 @@ def install_problem_handlers(app: FastAPI) -> None:
     @app.exception_handler(Exception)
     async def _bug(request: Request, _: Exception) -> Response:
         """Return a problem of status 500 without details; the server logs the traceback."""
-        return _render(request, 500, "Fault in padwatch", "a fault of the program; see its log")
+        return _render(request, 500, "Internal error", "padwatch has failed; see the log")
 
 
 def problem_answer(request: Request, error: ProblemError) -> Response:
@@ -203,7 +213,7 @@ def _methods(request: Request) -> list[str]:
 
 
 def _not_allowed(request: Request, methods: Sequence[str]) -> Response:
-    detail = f"{request.method} is not allowed here; use {' or '.join(methods)}"
+    detail = f"method {request.method} is not allowed; use {' or '.join(methods)}"
     allow = {"Allow": ", ".join(methods)}
     return _render(request, 405, "Method not allowed", detail, headers=allow)
 

@@ -81,7 +81,7 @@ class RequestModel(ApiModel):
         """Reject a body with too many members; an error for each member would take 10 µs."""
         if isinstance(body, dict) and len(body) > len(cls.model_fields) + MAX_UNKNOWN:
             known = ", ".join(cls.model_fields)
-            raise ValueError(f"{len(body)} members are too many; known: {known}")
+            raise ValueError(f"the body has {len(body)} members; known members: {known}")
         return body
 
 

@@ -57,7 +57,7 @@ class Scrape:
         units = {unit.id: [bearing.id for bearing in unit.bearing] for unit in process.plant.unit}
         yield gauge(
             "build_info",
-            "1; which padwatch this is, and by which Python it runs.",
+            "Versions of padwatch and Python; always 1.",
             ("version", "python"),
             [((version("padwatch"), platform.python_version()), 1)],
         )
@@ -89,12 +89,12 @@ def evidence_metrics(captures: Captures, evidence: EvidenceCollector) -> Iterato
     """Yield the metric families of captures and evidence."""
     counts = (
         ("captures_written", "Captures of samples around alarms.", captures.n_written),
-        ("captures_failed", "Attempts to write such captures in vain.", captures.n_failed),
+        ("captures_failed", "Failed attempts to write captures.", captures.n_failed),
         ("evidence_written", "Bundles of evidence of alarms.", evidence.n_written),
-        ("evidence_failed", "Attempts to write such bundles in vain.", evidence.n_failed),
-        ("evidence_lost", "Occurrences whose evidence was given up.", evidence.n_lost),
+        ("evidence_failed", "Failed attempts to write evidence bundles.", evidence.n_failed),
+        ("evidence_lost", "Occurrences of alarms whose evidence was lost.", evidence.n_lost),
     )
     for name, meaning, number in counts:
         yield counter(name, meaning, (), [((), number)])
-    yield one("captures_running", "Captures that are being made.", captures.n_running)
-    yield one("evidence_pending", "Bundles that are still to be written.", evidence.n_pending)
+    yield one("captures_running", "Captures in progress.", captures.n_running)
+    yield one("evidence_pending", "Evidence bundles that wait to be written.", evidence.n_pending)

@@ -124,9 +124,9 @@ class Supervision:
         if set(troubles) != self._logged:
             self._logged = set(troubles)
             if words:
-                log.error("a loop of the program is not alive", loops=words)
+                log.error("a loop of the program has failed", loops=words)
             else:
-                log.info("all loops are alive again")
+                log.info("all loops of the program run again")
         if words:
             self._manager.notify(STATUS="; ".join(words))
         else:

@@ -47,9 +47,9 @@ def recordings_by_unit(folders: Iterable[Path], plant: PlantFile) -> dict[str, P
     for folder in folders:
         unit = read_manifest(folder).unit
         if unit not in known:
-            raise ConfigError(f"{folder}: is of unit {unit}, the plant has {', '.join(known)}")
+            raise ConfigError(f"{folder}: unknown unit {unit}; known units: {', '.join(known)}")
         if unit in found:
-            raise ConfigError(f"{folder}: is of unit {unit}, like {found[unit]}; play one of them")
+            raise ConfigError(f"{folder} and {found[unit]} are both of unit {unit}; replay one")
         found[unit] = folder
     return found
 

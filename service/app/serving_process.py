@@ -68,7 +68,7 @@ def serving_of(
 
     async def prepare() -> None:
         if token := await desk.offer_set_up():
-            announce(f"to make the first account, within one hour and once: {token}")
+            announce(f"token to create the first account, valid once within one hour: {token}")
         await asyncio.to_thread(app.rendered)
         gc.collect()
         gc.freeze()  # objects of the start are permanent; scanning them takes 0.1 s
@@ -153,8 +153,8 @@ class Replica:
     def _signs_of(self, unit: str) -> str:
         silence_s = self.live.silence_s(unit)
         if silence_s is None:
-            return "no sign of life yet"
-        said = f"last sign of life {silence_s:.1f} s ago"
+            return "no heartbeat yet"
+        said = f"last heartbeat {silence_s:.1f} s ago"
         return said if self.live.is_alive(unit) else f"silent: {said}"
 
     def context(

@@ -121,12 +121,12 @@ def execute_command(servers: Mapping[str, DaqServer], line: str) -> dict[str, st
     """
     words = line.split()
     if len(words) not in (2, 3) or (len(words) == 3 and not words[2].isdecimal()):
-        return {"refused": f"{line.strip()!r} is not UNIT FAULT [COUNT]"}
+        return {"refused": f"command must be UNIT FAULT [COUNT], got {line.strip()!r}"}
     unit, fault, *count = words
     if count and int(count[0]) > MAX_COUNT:
-        return {"refused": f"COUNT is {count[0]}, at most {MAX_COUNT}"}
+        return {"refused": f"COUNT must be at most {MAX_COUNT}, got {count[0]}"}
     if unit not in servers:
-        return {"refused": f"no unit {unit} here; known are {', '.join(servers)}"}
+        return {"refused": f"unknown unit {unit}; known units: {', '.join(servers)}"}
     try:
         servers[unit].inject(fault, *map(int, count))
     except LookupError as error:
@@ -169,7 +169,7 @@ def vector_device(
         If the unit has no speed channel.
     """
     if unit.speed_channel is None:
-        raise LookupError(f"a simulated rack of unit {unit.id} needs its speed_channel")
+        raise LookupError(f"a simulated rack of unit {unit.id} requires speed_channel")
     step_samples = max(1, round(min(source.poll_period_s, 1.0) * calibration.rate_hz))
     window_samples = max(1, round(VECTOR_WINDOW_S * calibration.rate_hz))
     device = VectorDevice(
@@ -254,7 +254,7 @@ def daq_of(
         case CanSettings():
             return can_daq_of(unit, source, feed, clock, patient=recorded)
         case SimulatedSettings():
-            raise LookupError(f'the source of unit {unit.id} is of kind "simulated": no DAQ')
+            raise LookupError(f'unit {unit.id} has source kind "simulated", which needs no DAQ')
 
 
 def _ring_shape(unit: UnitSettings, source: ModbusRingSettings) -> RingDeviceSettings:

@@ -69,7 +69,7 @@ def create(
     known = [settings.id for settings in plant.unit]
     for wanted in unit or ():
         if wanted not in known:
-            fail(f"there is no unit {wanted}; known are {', '.join(known)}", 2)
+            fail(f"unknown unit {wanted}; known units: {', '.join(known)}", 2)
     with access_of(plant, creates=True) as access:
         now_ns = SystemClock().now_ns()
         key, shown = create_key(access, name, role, unit or (), days, now_ns)
@@ -91,14 +91,14 @@ def list_keys(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
 @keys_app.command()
 def revoke(
     plant_file: PlantPath,
-    id_: Annotated[str, argument("As listed.", metavar="ID")],
+    id_: Annotated[str, argument("Id of the key, as listed.", metavar="ID")],
 ) -> None:
     """Revoke a key permanently, from its next request on."""
     with access_of(load_plant_file(plant_file)) as access:
         if access.keys.get(id_) is None:
-            fail(f"there is no key {id_}", 2)
+            fail(f"key {id_} does not exist", 2)
         is_new = access.keys.revoke(id_, SystemClock().now_ns())
-    typer.echo(f"{id_}: revoked" if is_new else f"{id_}: was revoked already")
+    typer.echo(f"{id_}: revoked" if is_new else f"{id_}: was already revoked")
 
 
 def _row(key: ApiKey, now_ns: int) -> dict[str, object]:
@@ -168,7 +168,7 @@ def set_role(
     """Change the role of an account, from its next request on."""
     with access_of(load_plant_file(plant_file)) as access:
         access.accounts.set_role(account_name(name), role, SystemClock().now_ns())
-    typer.echo(f"{account_name(name)}: is {role}")
+    typer.echo(f"{account_name(name)}: role changed to {role}")
 
 
 @users_app.command("password")
@@ -178,7 +178,7 @@ def set_password(plant_file: PlantPath, name: Name, password_fd: PasswordFd = No
     with access_of(plant) as access:
         people = AccountService(access, Hashing())
         people.set_password(account_name(name), password, SystemClock().now_ns())
-    typer.echo(f"{account_name(name)}: has a new password, its sessions are ended")
+    typer.echo(f"{account_name(name)}: password changed, all sessions ended")
 
 
 @users_app.command()

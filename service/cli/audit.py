@@ -42,7 +42,7 @@ def verify(
 @app.command()
 def export(
     plant_file: PlantPath,
-    out: Annotated[Path, argument("CSV file to write, a new one.")],
+    out: Annotated[Path, argument("CSV file to write; must not exist yet.")],
 ) -> None:
     """Write the whole audit trail, oldest first, as a CSV file that spreadsheets read as text."""
     trail = open_trail(load_plant_file(plant_file))
@@ -57,16 +57,16 @@ def export(
 
 
 def _lines(verdict: Verdict, unknown: list[int]) -> Iterator[str]:
-    yield f"{verdict.n_entries} entries are whole; the last has the hash {verdict.hash}"
+    yield f"{verdict.n_entries} entries are intact; the hash of the last is {verdict.hash}"
     if verdict.finding is not None:
         yield f"CORRUPT: {verdict.finding.detail}"
     if verdict.n_behind and verdict.is_shared:
         yield (
             f"the head of this host names entry {verdict.n_entries - verdict.n_behind}; the"
-            f" {verdict.n_behind} after it are other hosts', or this one's just before a crash"
+            f" {verdict.n_behind} later entries are of other hosts, or of this one before a crash"
         )
     elif verdict.n_behind:
-        yield f"the head lags by {verdict.n_behind}, as after a crash; the next entry repairs it"
+        yield f"the head is {verdict.n_behind} entries behind; the next entry repairs it"
     for number in unknown:
         yield (
             f"CORRUPT: entry {number} reports that the head did not match the trail"

@@ -74,7 +74,7 @@ def backtest(
     except ValueError as error:
         fail(str(error), code=2)
     if export is not None and export.exists():
-        fail(f"{export}: exists already", code=2)
+        fail(f"{export}: the file or folder exists already", code=2)
     rules = rules_of(film, plant_file, learning, events, made_by(), clock.now_ns(), estimator)
     with progress("Reading", readings.stat().st_size if readings.is_file() else 1) as bar:
         places = places_of(plant_file) if plant_file else None

@@ -33,7 +33,7 @@ def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
     n_channels = sum(len(unit.channel) for unit in plant.unit)
     counts = {"units": len(plant.unit), "bearings": n_bearings, "channels": n_channels}
     line = (
-        f"{plant_file} is fine: {plant.plant.name}; units: {len(plant.unit)},"
+        f"{plant_file} is valid: {plant.plant.name}; units: {len(plant.unit)},"
         f" bearings: {n_bearings}, waveform channels: {n_channels}"
     )
     print_result({"plant": plant.plant.name, **counts}, [line], json_output, indent=None)

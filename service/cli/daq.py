@@ -29,7 +29,7 @@ from service.settings.units import UnitSettings
 
 SpeedOption = Annotated[
     float,
-    typer.Option(min=0.0, max=1000.0, help="Seconds of the recording in a second; 0: unpaced."),
+    typer.Option(min=0.0, max=1000.0, help="Playback speed; 0: as fast as possible."),
 ]
 
 
@@ -39,11 +39,11 @@ def daq(
         list[Path] | None,
         typer.Option(help="Play this recording of a unit instead of simulations; repeatable."),
     ] = None,
-    through: Annotated[Wire | None, option("Serve over this wire on loopback instead.")] = None,
+    through: Annotated[Wire | None, option("Serve by this protocol on loopback instead.")] = None,
     speed: SpeedOption = 1.0,
     control: Annotated[
         bool,
-        typer.Option(help="Read commands UNIT FAULT [COUNT] from standard input; its end ends it."),
+        typer.Option(help="Read commands UNIT FAULT [COUNT] from standard input; stop at its end."),
     ] = False,
 ) -> None:
     """Serve units over the protocols of their sources, at the addresses in the plant file.

@@ -91,5 +91,5 @@ def _chosen(plant: PlantFile, wanted: str) -> list[Receiver]:
     chosen = [one for one in known if wanted in (one.name, one.name.partition(":")[0])]
     if not chosen:
         names = ", ".join(one.name for one in known) or "none"
-        fail(f"there is no receiver {wanted}; the plant file has {names}", 2)
+        fail(f"unknown receiver {wanted}; known receivers: {names}", 2)
     return chosen

@@ -154,8 +154,8 @@ def plant_store(plant: PlantFile, creates: bool = False) -> Iterator[Store]:
     """
     if not has_store(plant):  # the data folder may be relative to another folder
         if not creates:
-            fail(f"{store_name(plant)}: there is no such database")
-        notice = f"{store_name(plant)}: a new database; is that where the service runs?"
+            fail(f"{store_name(plant)}: the database does not exist")
+        notice = f"{store_name(plant)}: created a new database; check that the service uses it"
         typer.echo(notice, err=True)
     with closing(open_store(plant)) as store:
         yield store
@@ -165,10 +165,10 @@ def one_unit(plant: PlantFile, id_: str | None, path: Path) -> UnitSettings:
     """Return a unit, or end with exit code 2; the name of a plant's only unit is optional."""
     known = ", ".join(unit.id for unit in plant.unit)
     if id_ is None and len(plant.unit) > 1:
-        fail(f"{path}: has units {known}; choose one with --unit", code=2)
+        fail(f"{path}: choose one of the units {known} with --unit", code=2)
     chosen = [unit for unit in plant.unit if id_ in (unit.id, None)]
     if not chosen:
-        fail(f"{path}: has no unit {id_}, it has {known}", code=2)
+        fail(f"{path}: unknown unit {id_}; known units: {known}", code=2)
     return chosen[0]
 
 
@@ -205,7 +205,7 @@ def password_from(descriptor: int | None) -> str:
     """Read a new password from a file descriptor or the terminal, or end with exit code 2."""
     if descriptor is None:
         if not sys.stdin.isatty():
-            fail("there is no terminal to ask on; use --password-fd", 2)
+            fail("no terminal for the password prompt; use --password-fd", 2)
         asked: str = typer.prompt("Password", hide_input=True, confirmation_prompt=True)
         return asked
     found = b""
@@ -213,12 +213,12 @@ def password_from(descriptor: int | None) -> str:
         while len(found) <= MAX_BYTES and (more := os.read(descriptor, MAX_BYTES)):
             found += more
         if len(found) > MAX_BYTES:
-            fail(f"file descriptor {descriptor} holds more than a password", 2)
+            fail(f"file descriptor {descriptor} contains more than a password", 2)
         return found.decode().removesuffix("\n").removesuffix("\r")
     except OSError as error:
         fail(f"file descriptor {descriptor}: {error.strerror}", 2)
     except UnicodeDecodeError:
-        fail(f"file descriptor {descriptor} holds no UTF-8 text", 2)
+        fail(f"file descriptor {descriptor} does not contain UTF-8 text", 2)
 
 
 DEMO = "demo.toml"

@@ -39,7 +39,7 @@ from service.settings.sources.modbus import ModbusLinkSettings
 from service.settings.sources.register_map import load_map_file
 from service.settings.units import UnitSettings
 
-app = command_group("Look into a device: read once, print everything, store nothing.")
+app = command_group("Read a device once and print its data; nothing is stored.")
 
 MAX_COUNT = 1000
 MAX_IN_FLIGHT = 16
@@ -59,8 +59,8 @@ DevicePlace = Annotated[
     typer.Argument(help="HOST[:PORT], or the path of a serial port.", metavar="HOST[:PORT]|/dev/…"),
 ]
 UnitIdOption = Annotated[int, typer.Option("--unit-id", min=1, max=255, help="Modbus unit id.")]
-TimeoutOption = Annotated[float, typer.Option(min=0.05, max=60.0, help="Wait for a reply, s.")]
-BaudOption = Annotated[int, typer.Option(help="Bits per second of a serial port.")]
+TimeoutOption = Annotated[float, typer.Option(min=0.05, max=60.0, help="Time-out of a reply, s.")]
+BaudOption = Annotated[int, typer.Option(help="Bit rate of a serial port, bit/s.")]
 ParityOption = Annotated[str, typer.Option(help='"none", "even" or "odd" of a serial port.')]
 
 
@@ -68,7 +68,7 @@ ParityOption = Annotated[str, typer.Option(help='"none", "even" or "odd" of a se
 def modbus(
     device: DevicePlace,
     address: Annotated[int, typer.Option(min=0, max=65535, help="First register, from 0.")],
-    count: Annotated[int, typer.Option(min=1, max=MAX_COUNT, help="How many.")] = 10,
+    count: Annotated[int, typer.Option(min=1, max=MAX_COUNT, help="Number of values.")] = 10,
     function: Annotated[int, typer.Option(min=1, max=4, help="Function code 1 to 4.")] = 3,
     unit_id: UnitIdOption = 1,
     timeout_s: TimeoutOption = 1.0,
@@ -99,7 +99,7 @@ def map_(
     at: Annotated[
         str | None, typer.Option(help="HOST[:PORT] or /dev/…: try a register map there.")
     ] = None,
-    slow: Annotated[bool, typer.Option(help="The unit's slow_source instead.")] = False,
+    slow: Annotated[bool, typer.Option(help="Read the slow_source of the unit.")] = False,
     unit_id: UnitIdOption = 1,
     timeout_s: TimeoutOption = 1.0,
     baudrate: BaudOption = 115_200,
@@ -125,7 +125,7 @@ def map_(
 @app.command()
 def ring(
     device: DevicePlace,
-    base_address: Annotated[int, typer.Option(min=0, max=65535, help="Of the header.")] = 0,
+    base_address: Annotated[int, typer.Option(min=0, max=65535, help="Address of the header.")] = 0,
     function: Annotated[int, typer.Option(min=3, max=4, help="Function code 3 or 4.")] = 3,
     unit_id: UnitIdOption = 1,
     timeout_s: TimeoutOption = 1.0,
@@ -158,7 +158,7 @@ def identity(
 @app.command("in-flight")
 def in_flight(
     device: DevicePlace,
-    address: Annotated[int, typer.Option(min=0, max=65535, help="Of an existing register.")] = 0,
+    address: Annotated[int, typer.Option(min=0, max=65535, help="Address of a register.")] = 0,
     function: Annotated[int, typer.Option(min=3, max=4, help="Function code 3 or 4.")] = 3,
     unit_id: UnitIdOption = 1,
     timeout_s: TimeoutOption = 1.0,
@@ -166,7 +166,7 @@ def in_flight(
     """Measure how many simultaneous requests a device answers (Modbus TCP)."""
     place = _place(device, unit_id, timeout_s, 115_200, "even")
     if place.host is None:
-        fail("a serial line carries one request at a time", code=2)
+        fail("a serial line allows only one request at a time", code=2)
     found = asyncio.run(measure_in_flight(place, address, function, MAX_IN_FLIGHT))
     typer.echo(f"requests_in_flight = {found}")
 
@@ -195,7 +195,7 @@ def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:
     device = getattr(unit, "slow_source", None) if slow else unit.source
     if not isinstance(device, MappedDeviceSettings):
         key = "slow_source" if slow else "source"
-        fail(f"the {key} of unit {unit.id} has no register map", code=2)
+        fail(f"{key} of unit {unit.id} has no register map", code=2)
     return device
 
 

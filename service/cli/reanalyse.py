@@ -84,7 +84,7 @@ def reanalyse(
     ids = [channel.id for channel in settings.channel]
     configured = calibration_of(settings)
     for difference in calibration_differences(ids, selection.calibration, configured):
-        typer.echo(f"{recording}: {difference}; used is the {calibration} one", err=True)
+        typer.echo(f"{recording}: {difference}; the {calibration} calibration is used", err=True)
     if calibration is CalibrationChoice.PLANT:
         selection = replace(selection, calibration=configured)
     source = RecordingSource(opened, SystemClock(), selection, block_s=BLOCK_S)
@@ -93,7 +93,7 @@ def reanalyse(
     found = _chosen(source, monitor, choice, opened.manifest.n_samples)
     if not uvloop.run(_print(found, json_output)):
         n_samples = plant_file.analysis.segment_samples
-        fail(f"{recording}: no segment of {n_samples} samples without a gap, so no result")
+        fail(f"{recording}: no result, because no {n_samples} successive samples are without a gap")
 
 
 async def _chosen(

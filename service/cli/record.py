@@ -55,7 +55,7 @@ def record(
     """
     settings = one_unit(load_plant_file(plant_file), unit, plant_file)
     if isinstance(settings.source, ModbusVectorSettings):
-        fail(f"the rack of unit {settings.id} delivers vectors, not samples", code=2)
+        fail(f"unit {settings.id} has no samples to record; its rack reports vectors", code=2)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -72,7 +72,7 @@ def record(
     )
     print_result(manifest, [line], json_output)
     if problem:
-        fail(f"ended early: {problem}")
+        fail(f"recording ended early: {problem}")
 
 
 class ReconnectPolicy:

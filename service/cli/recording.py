@@ -40,7 +40,7 @@ from service.settings.sources.mapping import ImportMapping
 from service.settings.toml_file import load_toml
 from service.store.waveforms import WaveformFile, WaveformKind
 
-app = command_group("Look into recordings, check them, export and import them.")
+app = command_group("Inspect, verify, export and import recordings.")
 
 
 @app.command()
@@ -73,7 +73,7 @@ def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
     if not verdicts:
         lines.append(
             f"no recordings in {' or '.join(map(str, roots.values()))};"
-            " padwatch recording verify FOLDER checks one that was made elsewhere (--out)"
+            " use padwatch recording verify FOLDER for a recording in another folder"
         )
     print_result(document, lines, json_output)
     if counts[RecordingState.DAMAGED] or counts[RecordingState.MISSING]:
@@ -193,14 +193,14 @@ def verify(folder: RecordingFolder, json_output: JsonOutput = False) -> None:
             n_samples += block.n_samples
             bar.update(block.n_samples)
     document = {"folder": str(folder), "sound": True, "samples": n_samples}
-    line = f"{folder}: sound, {n_samples} samples of each channel"
+    line = f"{folder}: intact, {n_samples} samples of each channel"
     print_result(document, [line], json_output, indent=None)
 
 
 @app.command()
 def export(
     folder: RecordingFolder,
-    format_: Annotated[ExportFormat, option("Of the file.", "--format")],
+    format_: Annotated[ExportFormat, option("Format of the file.", "--format")],
     out: Annotated[Path, typer.Option(help="File to write; must not exist yet.")],
 ) -> None:
     """Write a recording as a file for other tools: engineering units, UTC, no rows in gaps."""
@@ -213,7 +213,7 @@ def export(
 @app.command("import")
 def import_(
     file: Annotated[Path, argument("The file to import.")],
-    mapping: Annotated[Path, typer.Option(help="Which column is which channel (TOML).")],
+    mapping: Annotated[Path, typer.Option(help="Mapping of columns to channels (TOML).")],
     plant: PlantOption,
     out: NewRecording,
     unit: UnitOption = None,

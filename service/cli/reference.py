@@ -98,7 +98,7 @@ Gap = Annotated[float | None, typer.Option(help="Gap in µm, above 0 up to 10000
 def set_reference(
     plant_file: PlantPath,
     bearing: Annotated[str, typer.Option(help="Bearing of the unit.")],
-    author: Annotated[str, typer.Option(help="Person who sets it, at most 80 characters.")],
+    author: Annotated[str, typer.Option(help="Author of the reference, at most 80 characters.")],
     unit: UnitOption = None,
     x_um: Gap = None,
     y_um: Gap = None,
@@ -107,7 +107,7 @@ def set_reference(
     measured: Annotated[
         bool, typer.Option("--measured", help="Take the mean gaps of the newest stored result.")
     ] = False,
-    note: Annotated[str, typer.Option(help="At most 500 characters.")] = "",
+    note: Annotated[str, typer.Option(help="Note, at most 500 characters.")] = "",
     json_output: JsonOutput = False,
 ) -> None:
     """Set the reference of a bearing from now on; a running service applies it within seconds.
@@ -171,5 +171,5 @@ def _one_bearing(bearings: tuple[Bearing, ...], id_: str, unit: str) -> Bearing:
     chosen = [bearing for bearing in bearings if bearing.id == id_]
     if not chosen:
         known = ", ".join(bearing.id for bearing in bearings)
-        fail(f"unit {unit} has no bearing {id_}, it has {known}", code=2)
+        fail(f"unit {unit}: unknown bearing {id_}; known bearings: {known}", code=2)
     return chosen[0]

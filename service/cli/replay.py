@@ -34,7 +34,7 @@ from service.settings.storage import Origin
 def replay(
     recordings: Annotated[list[Path], typer.Argument(help="Folders of the recordings.")],
     plant: PlantOption,
-    through: Annotated[Wire | None, option("Play through a simulated DAQ over this wire.")] = None,
+    through: Annotated[Wire | None, option("Protocol of a simulated DAQ to play through.")] = None,
     speed: SpeedOption = 1.0,
     out: Annotated[Path | None, option("Folder of the results [<data folder>/replays/…]")] = None,
     serve: Annotated[
@@ -53,7 +53,7 @@ def replay(
     played = replayed_plant(file, units, folder)
     database = database_path(played)
     if database.exists():  # its alarms would be resumed
-        fail(f"{database} holds results already; a replay needs a folder of its own")
+        fail(f"{database} contains results already; use a new folder for each replay")
     with (
         _service_run(played, plant, units, through, speed, serve) as (service_run, daq),
         listener_of(service_run.plant, port) as listener,
@@ -106,8 +106,6 @@ async def _play(
     """
     await run_service(service_run, listener, SystemClock(), announce)
     if daq is not None and daq.has_failed:
-        raise LinkError(
-            "the simulated DAQ has ended before its recordings did: results are incomplete"
-        )
+        raise LinkError("the simulated DAQ ended before its recordings; results are incomplete")
     results = {"database": str(database)}
     print_result(results, [f"results: {database}"], json_output, indent=None)

@@ -90,7 +90,7 @@ def acquire(
     plant_file: PlantPath,
     unit: Annotated[
         list[str] | None,
-        typer.Option(help="Read this unit only; may be given again. Without it, all units."),
+        typer.Option(help="Unit to read; may be repeated. All units by default."),
     ] = None,
     port: HealthPort = None,
 ) -> None:
@@ -101,7 +101,7 @@ def acquire(
     settings, known = stream_settings(plant), {each.id for each in plant.unit}
     for id_ in unit or ():
         if id_ not in known:
-            fail(f"there is no unit {id_!r}; known are {', '.join(sorted(known))}", 2)
+            fail(f"unknown unit {id_!r}; known units: {', '.join(sorted(known))}", 2)
     wanted = set(unit or known)
     with listen(HOST, settings.acquire_port if port is None else port) as listener:
         clock, manager = SystemClock(), ServiceManager(os.environ)
@@ -115,7 +115,7 @@ def acquire(
 def analyse(
     plant_file: PlantPath,
     partition: Annotated[
-        str, typer.Option(help="Which units: i/n for the i-th of n shares, such as 1/2.")
+        str, typer.Option(help="Share of the units: i/n for the i-th of n shares, such as 1/2.")
     ] = "1/1",
     port: HealthPort = None,
 ) -> None:

@@ -36,7 +36,7 @@ from service.store.sqlite.checking import Finding, findings
 def backup(
     plant_file: PlantPath,
     folder: Annotated[Path, argument("Folder of the copies.")],
-    keep: Annotated[int, typer.Option(min=1, max=10_000, help="Copies that are kept.")] = 14,
+    keep: Annotated[int, typer.Option(min=1, max=10_000, help="Number of copies to keep.")] = 14,
     json_output: JsonOutput = False,
 ) -> None:
     """Copy the database, also while padwatch runs; verify the copy and remove the oldest ones.
@@ -82,7 +82,7 @@ def restore(
 
 def _access_lines(after: AccessAfter) -> Iterator[str]:
     """Yield the accounts and keys that are valid after the restore."""
-    yield f"all logins are ended; accounts, with the passwords of then: {_listed(after.accounts)}"
+    yield f"all sessions are ended; accounts, with passwords of the copy: {_listed(after.accounts)}"
     if after.returned:
         names = _listed(after.returned)
         yield f"accounts that did not exist before: {names} (padwatch users remove)"
@@ -99,8 +99,8 @@ def _file(plant: PlantFile) -> Path:
     """Return the plant's database file; PostgreSQL is copied by its own tools."""
     if plant.store.postgresql is not None:
         fail(
-            f"{store_name(plant)} is copied with pg_dump or pg_basebackup and put back with"
-            " pg_restore: docs/how-to/postgresql.md shows how"
+            f"{store_name(plant)} must be copied with pg_dump or pg_basebackup and restored with"
+            " pg_restore; see docs/how-to/postgresql.md"
         )
     return database_path(plant)
 
@@ -126,8 +126,8 @@ def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
     plant = load_plant_file(plant_file)
     if plant.store.postgresql is not None:
         fail(
-            f"{store_name(plant)} is checked by PostgreSQL: enable its data checksums"
-            " (SHOW data_checksums) and check it with pg_amcheck"
+            f"{store_name(plant)} must be checked by PostgreSQL; enable its data checksums"
+            " (SHOW data_checksums) and run pg_amcheck"
         )
     with progress("Checking", STEPS) as bar:
         found = list(
@@ -153,7 +153,7 @@ def _lines(plant: PlantFile, found: Sequence[Finding]) -> Iterator[str]:
 
 readings_app = command_group("Export the stored readings of the films.")
 
-Time = Annotated[str | None, option("Such as 2025-01-01T00:00:00Z.")]
+Time = Annotated[str | None, option("Time such as 2025-01-01T00:00:00Z.")]
 
 
 @readings_app.callback()
@@ -182,7 +182,7 @@ def export(
             with readings_file(out) as write:
                 n_readings = sum(_export(store.films, plant, write, start_ns, end_ns))
                 if not n_readings:
-                    raise StoreError(f"{store_name(plant)}: has no readings of films in this time")
+                    raise StoreError(f"{store_name(plant)}: no film readings in this time range")
         except OSError as error:
             fail(f"{out}: {error.strerror}")
 

@@ -108,7 +108,7 @@ class Consumer:
         newest = max(self._fetched.values(), default=0)
         if self._stream not in (None, found) or state.last_seq < newest:
             raise StreamAnewError(
-                "the stream was replaced, or lost confirmed messages, while it was read:"
+                "the stream was replaced, or lost confirmed messages, while it was read;"
                 " restart `padwatch analyse`"
             )
         if self._stream is None:
@@ -215,13 +215,13 @@ def consumer_metrics(consumer: Consumer) -> Iterator[Metric]:
     yield one("stream_connected", "1 while blocks are read from the stream.", connected)
     yield gauge(
         "stream_pending",
-        "Messages of the unit on the stream that were not fetched yet.",
+        "Messages of the unit in the stream that are not fetched yet.",
         UNIT,
         (((unit,), n) for unit, n in consumer.n_pending.items()),
     )
     yield gauge(
         "stream_analysis_behind_seconds",
-        "Delay of the newest analysed block of the unit against its device.",
+        "Age of the newest analysed block of the unit, by the time of the device.",
         UNIT,
         (((unit,), its.behind_s) for unit, its in units),
     )

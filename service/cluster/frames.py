@@ -109,8 +109,8 @@ def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b""
     """Return a message with header and checksum. Raises `ValueError` if a part is too large."""
     if len(head) > MAX_HEAD_BYTES or len(samples) > MAX_SAMPLE_BYTES:
         raise ValueError(
-            f"a message holds at most {MAX_HEAD_BYTES} bytes of head and {MAX_SAMPLE_BYTES} of"
-            f" samples, not {len(head)} and {len(samples)}"
+            f"a message has at most {MAX_HEAD_BYTES} bytes of head and {MAX_SAMPLE_BYTES} of"
+            f" samples, got {len(head)} and {len(samples)}"
         )
     start = _START.pack(
         MAGIC, VERSION, kind, identity.plant, identity.make, len(head), len(samples)
@@ -126,23 +126,25 @@ def unframed(message: bytes, identity: UnitIdentity) -> Frame:
     or configuration. Invalid bytes raise no other exception.
     """
     if len(message) < _START.size + _CRC.size or message[:4] != MAGIC:
-        raise WireError("not_a_message", f"{len(message)} bytes that are not a message of padwatch")
+        raise WireError(
+            "not_a_message", f"{len(message)} bytes that do not begin like a message of padwatch"
+        )
     _, version, kind, plant, make, n_head, n_samples = _START.unpack_from(message)
     if version not in READABLE:
         raise WireError("other_version", _other_version(version))
     whole = _START.size + n_head + n_samples + _CRC.size
     if n_head > MAX_HEAD_BYTES or n_samples > MAX_SAMPLE_BYTES or whole != len(message):
-        raise WireError("wrong_length", f"a message of {len(message)} bytes that claims {whole}")
+        raise WireError("wrong_length", f"a message of {len(message)} bytes, expected {whole}")
     (crc,) = _CRC.unpack_from(message, whole - _CRC.size)
     body = memoryview(message)
     if crc != zlib.crc32(body[: whole - _CRC.size]):
         raise WireError("damaged", "a message with a wrong checksum")
     if plant != identity.plant:
-        raise WireError("other_plant", "a message of another plant: use one stream for each plant")
+        raise WireError("other_plant", "a message of another plant; use one stream for each plant")
     if make != identity.make:
         raise WireError(
             "other_configuration",
-            f"channels or rate of a block of {identity.unit} differ from the plant file: use"
+            f"channels or rate of a block of {identity.unit} differ from the plant file; use"
             " the same plant file for acquire and analyse",
         )
     if kind not in Kind.__members__.values():
@@ -155,7 +157,7 @@ def unframed(message: bytes, identity: UnitIdentity) -> Frame:
 def _other_version(version: int) -> str:
     known = " and ".join(str(each) for each in READABLE)
     newer = "upgrade `padwatch analyse`" if version > VERSION else "upgrade `padwatch acquire`"
-    return f"a message of format version {version}, this program reads {known}: {newer}"
+    return f"a message of format version {version}, but this program supports {known}; {newer}"
 
 
 SAMPLE: Mapping[str, np.dtype[Any]] = {"int16": np.dtype("<i2"), "float32": np.dtype("<f4")}
@@ -318,7 +320,7 @@ def _side_values(head: BlockHead) -> SideValues:
         or any(start >= stop for start, stop in itertools.pairwise(edges))
         or any(len(cell.slow) != n_slow or cell.ok >> n_channels for cell in head.cells)
     ):
-        raise WireError("not_understood", "a block whose cells do not fit its samples")
+        raise WireError("not_understood", "a block whose cells and samples differ in length")
     slow = np.array([cell.slow for cell in head.cells], dtype=np.float64)
     return SideValues(
         starts=np.array(starts, dtype=np.int64),
@@ -341,5 +343,5 @@ def _read(adapter: TypeAdapter[T], head: bytes) -> T:
 def _require_own(unit: str, identity: UnitIdentity) -> None:
     if unit != identity.unit:
         raise WireError(
-            "other_unit", f"a message of unit {unit!r} among those of {identity.unit!r}"
+            "other_unit", f"a message of unit {unit!r} in the subject of {identity.unit!r}"
         )

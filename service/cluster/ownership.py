@@ -143,9 +143,7 @@ class Partition:
         found = FORM.fullmatch(text)
         part = cls(int(found[1]), int(found[2])) if found else cls(0, 0)
         if not 1 <= part.number <= part.n_parts:
-            raise ValueError(
-                f"invalid partition {text!r}: use i/n with i from 1 to n, such as 1/2 and 2/2"
-            )
+            raise ValueError(f"invalid partition {text!r}; use i/n with i from 1 to n, such as 1/2")
         return part
 
     def units(self, units: Sequence[str]) -> list[str]:

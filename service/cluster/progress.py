@@ -41,9 +41,7 @@ def memories_of(stored: Iterable[StreamPosition]) -> dict[str, UnitMemory]:
     found = {position.unit: read(position.memory) for position in stored}
     for unit, memory in found.items():
         if memory is None:
-            log.error(
-                "the stored state of a unit has another version: its alarms start anew", unit=unit
-            )
+            log.error("stored alarms of another version are discarded", unit=unit)
     return {unit: memory for unit, memory in found.items() if memory is not None}
 
 
@@ -299,5 +297,5 @@ class UnitProgress:
         if self._stored is None or sequence > self._stored.sequence:
             self._analyser.refuse(self.unit, str(error))
         if not self.refused[error.kind]:
-            log.error("a message is refused", unit=self.unit, reason=str(error))
+            log.error("a message is rejected", unit=self.unit, reason=str(error))
         self.refused[error.kind] += 1

@@ -123,7 +123,7 @@ class Outbound:
 
 FULL_RETRY_S = 1.0
 
-UNCONFIRMED = "the servers do not confirm blocks: check their disks and the cluster"
+UNCONFIRMED = "the NATS servers do not confirm blocks; check their disks and the cluster"
 MAX_UNCONFIRMED = 3
 """Number of consecutive unconfirmed attempts after which the connection is renewed."""
 
@@ -238,8 +238,8 @@ class Publisher:
             return False
         except MaxPayloadError:
             raise StreamMisfitError(
-                f"a block has {len(message.payload)} bytes, more than the servers accept: raise"
-                " max_payload in their configuration"
+                f"a block has {len(message.payload)} bytes, more than the servers accept; raise"
+                " max_payload in the configuration of NATS"
             ) from None
         except APIError as error:
             self._state.note(_refusal(error, stream_name(self._plant)))
@@ -256,7 +256,7 @@ def _refusal(error: APIError, name: str) -> str:
             f"the stream {name!r} is full: raise [stream] max_gb or lower max_age_h; meanwhile"
             " blocks wait at the devices"
         )
-    return f"the servers reject blocks for the stream {name!r}: {error.description}"
+    return f"the NATS servers reject blocks for the stream {name!r}: {error.description}"
 
 
 def publisher_metrics(publisher: Publisher) -> Iterator[Metric]:
@@ -277,11 +277,11 @@ def publisher_metrics(publisher: Publisher) -> Iterator[Metric]:
     yield one("stream_waiting_bytes", "Bytes that wait for the servers.", waiting.n_bytes)
     yield one(
         "stream_waiting_share",
-        "Filled share of the queue, 0 to 1; devices wait when it is full.",
+        "Filled share of the queue, 0 to 1; devices wait at 1.",
         waiting.n_bytes / waiting.capacity,
     )
     yield one(
         "stream_behind_seconds",
-        "Time for which messages have waited without any being confirmed.",
+        "Time since messages wait without any being confirmed.",
         waiting.behind_s,
     )

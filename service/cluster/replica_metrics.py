@@ -84,7 +84,7 @@ class ReplicaMetrics:
         """Yield all metrics of the replica."""
         yield gauge(
             "build_info",
-            "1; which padwatch this is, and by which Python it runs.",
+            "Versions of padwatch and Python; always 1.",
             ("version", "python"),
             [((version("padwatch"), platform.python_version()), 1)],
         )
@@ -97,7 +97,7 @@ class ReplicaMetrics:
         )
         yield gauge(
             "bearings",
-            "Bearings by the quality of what is known of them now; bad without a current result.",
+            "Bearings by the quality of their newest result; bad without a current result.",
             ("unit", "quality"),
             (((u, lev.name.lower()), levels[u, lev]) for u in self.bearings for lev in Level),
         )
@@ -112,10 +112,10 @@ def unit_metrics(live: ReplicaLive, units: Sequence[str]) -> Iterator[Metric]:
     connected = (((u,), live.status(u).state is LinkState.CONNECTED) for u in units)
     yield gauge("link_connected", "1 while the device is connected.", UNIT, connected)
     alive = (((u,), live.is_alive(u)) for u in units)
-    yield gauge("unit_analysed", "1 while a process reports on the unit.", UNIT, alive)
+    yield gauge("unit_analysed", "1 while a process reports the state of the unit.", UNIT, alive)
     silence = (((u,), s) for u in units if (s := live.silence_s(u)) is not None)
-    meaning = "Since the last report of the process that analyses the unit."
+    meaning = "Time since the last report of the process that analyses the unit."
     yield gauge("unit_silence_seconds", meaning, UNIT, silence)
     ages = (((u,), age) for u in units if (age := live.data_age_s(u)) is not None)
-    yield gauge("data_age_seconds", "Since samples arrived last.", UNIT, ages)
+    yield gauge("data_age_seconds", "Time since the newest samples arrived.", UNIT, ages)
     yield one("reports_readable", "1 if the database could be read.", live.read_error is None)

@@ -31,7 +31,7 @@ MAX_DRIFT = 1e-3
 SILENT_AFTER_S = 5.0
 """Age of the last report above which a unit is not analysed, s; reports have a period of 1 s."""
 
-NOT_ANALYSED = "no process that analyses this unit is alive"
+NOT_ANALYSED = "no process is analysing this unit"
 
 NOT_REPORTED = UnitStatus(LinkState.NOT_CONNECTED, NOT_ANALYSED)
 

@@ -82,10 +82,10 @@ class CommandClient:
         await asyncio.to_thread(self._store.commands.ask, command)
         answer = await self._answer(command)
         if answer.state in (CommandState.WITHDRAWN, CommandState.INTERRUPTED):
-            raise CommandFailedError("Not carried out", f"unit {unit}: {answer.words}")
+            raise CommandFailedError("Command not executed", f"unit {unit}: {answer.words}")
         if answer.state in OPEN:
-            detail = f"unit {unit}: the command is being carried out but is not on the disk yet"
-            raise CommandFailedError("Not on the disk yet", detail)
+            detail = f"unit {unit}: the command is in progress but not stored yet"
+            raise CommandFailedError("Not stored yet", detail)
         return answer
 
     def _command(self, unit: str, task: OperatorCommand, actor: str) -> Command:
@@ -110,7 +110,7 @@ class CommandClient:
 
     def _give_up(self, command: Command, found: Answer) -> Answer:
         words = (
-            f"the process that analyses it has not answered within {WAIT_S:g} s; the command was"
+            f"the process of the unit has not replied within {WAIT_S:g} s; the command was"
             " withdrawn"
         )
         if self._store.commands.withdraw(command.id, words, self._clock.now_ns()):
@@ -120,12 +120,10 @@ class CommandClient:
 
 READ_EVERY_S = 0.25
 
-TOO_LATE = Answer(
-    CommandState.WITHDRAWN, "no process took the command in time; it was not carried out"
-)
+TOO_LATE = Answer(CommandState.WITHDRAWN, "no process accepted the command in time")
 INTERRUPTED = Answer(
     CommandState.INTERRUPTED,
-    "the process ended while it carried out the command; check the result",
+    "the process ended during the execution of the command; check the result",
 )
 
 
@@ -148,7 +146,7 @@ class CommandWorker:
     ) -> None:
         self._process, self._held, self._store, self._clock = process, held, store, clock
         self._alarms, self._films, self._recorder = alarms, films, recorder
-        self._trouble = TroubleLog("commands are not carried out", "commands are carried out again")
+        self._trouble = TroubleLog("commands are not executed", "commands are executed again")
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Execute open commands periodically, until cancelled."""
@@ -196,13 +194,13 @@ class CommandWorker:
             with acting_as(who):
                 await self._do(decoded(command.kind, command.document))
         except LookupError:
-            return Answer(CommandState.UNKNOWN, "there is no such alarm")
+            return Answer(CommandState.UNKNOWN, "the alarm does not exist")
         except (ActionRefusedError, BaselineRefusedError) as error:
             return Answer(CommandState.REFUSED, str(error))
         except NotStoredError as error:
             return Answer(
                 CommandState.INTERRUPTED,
-                f"the command was carried out but not stored, and a restart undoes it: {error}",
+                f"the command was executed but not stored, and a restart undoes it: {error}",
             )
         return DONE
 

@@ -80,7 +80,7 @@ class Reporter:
         self._live, self._alarms, self._films = live, alarms, films
         self._written: dict[str, tuple[int, UnitState | None]] = {}
         self._n_beats = 0
-        self._trouble = TroubleLog("units are not reported on", "units are reported on again")
+        self._trouble = TroubleLog("unit states are not reported", "unit states are reported again")
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Write reports periodically, until cancelled."""
@@ -182,7 +182,7 @@ class Feed:
         self._live, self._alarms, self._films = live, alarms, films
         self._revisions: dict[str, Revision] = {}
         self._unreadable: str | None = None
-        self._trouble = TroubleLog("units cannot be read", "units can be read again")
+        self._trouble = TroubleLog("unit states cannot be read", "unit states can be read again")
 
     async def start(self) -> None:
         """Read the stored alarms and the reports, before the first request is served.
@@ -226,7 +226,7 @@ class Feed:
         except UnreadableStateError as error:
             if str(error) != self._unreadable:
                 reason = self._unreadable = str(error)
-                log.error("unreadable report on a unit", unit=beat.unit, reason=reason)
+                log.error("a reported unit state is unreadable", unit=beat.unit, reason=reason)
             return None
         baselines = self._films.fetch(beat.unit, state)
         return Report(beat, signs, ((process, revision), state, baselines))

@@ -44,7 +44,7 @@ RETRY_S = 1.0
 MISFIT_RETRY_S = 5.0
 """Delay of the next attempt after a `StreamMisfitError`, s; `RETRY_S` after other errors."""
 
-NOT_REACHED = "the servers have not been reached yet"
+NOT_REACHED = "the NATS servers have not been reached yet"
 
 ROOT = "padwatch"
 
@@ -184,7 +184,7 @@ def _require_version(client: Client) -> None:
     if (version.major, version.minor) < OLDEST_SERVER:
         oldest = ".".join(str(part) for part in OLDEST_SERVER)
         raise StreamMisfitError(
-            f"the NATS server has version {version}; padwatch needs {oldest} or newer"
+            f"the NATS server has version {version}; padwatch requires {oldest} or newer"
         )
 
 
@@ -298,7 +298,7 @@ async def require(stream: JetStreamContext, plant: PlantFile) -> str:
 
 
 NOT_ENABLED = (
-    "JetStream does not answer: start nats-server with -js or with a jetstream block in its"
+    "JetStream does not respond; start nats-server with -js or with a jetstream block in its"
     " configuration; in a cluster most of its servers must run"
 )
 
@@ -332,7 +332,7 @@ async def _made(stream: JetStreamContext, config: StreamConfig, *, update: bool 
         ) from None
     except APIError as error:
         raise StreamMisfitError(
-            f"the servers do not create the stream {config.name!r}: {error.description}; lower"
+            f"the NATS servers do not create the stream {config.name!r}: {error.description}; lower"
             " [stream] max_gb or replicas, or give the servers more"
         ) from None
 

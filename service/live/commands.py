@@ -108,9 +108,9 @@ def baseline_step(
         case Renew():
             step, version, from_ns = BaselineStep.RENEWED, None, action.from_ns
             if from_ns > now_ns:
-                raise BaselineRefusedError("a machine event cannot lie in the future")
+                raise BaselineRefusedError("the time of a machine event must not be in the future")
             if versions.renewed_ns is not None and from_ns < versions.renewed_ns:
-                raise BaselineRefusedError("there is already a later machine event")
+                raise BaselineRefusedError("a later machine event exists already")
     return StoredStep(place.unit, place.bearing, version, step, now_ns, actor, reason, from_ns)
 
 
@@ -118,7 +118,7 @@ def _entry(version: int, entries: list[BaselineEntry]) -> BaselineEntry:
     for entry in entries:
         if entry.version == version:
             return entry
-    raise BaselineRefusedError(f"there is no version {version}")
+    raise BaselineRefusedError(f"version {version} does not exist")
 
 
 def _require_acceptable(

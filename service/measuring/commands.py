@@ -36,8 +36,8 @@ class LocalCommands:
                 await self._recorder.stored()
         except TimeoutError as error:
             raise CommandFailedError(
-                "Not on the disk yet",
-                f"alarm {id_} is {alarm.state.value}, but the store does not answer:"
+                "Not stored yet",
+                f"alarm {id_} is {alarm.state.value}, but the store does not respond:"
                 " a restart now would undo the action; storing is retried until it succeeds",
             ) from error
         except NotStoredError as error:
@@ -54,9 +54,9 @@ class LocalCommands:
                 await self._recorder.require_store()
         except (StoreError, TimeoutError) as error:
             raise CommandFailedError(
-                "Nothing was done",
+                "Action not applied",
                 f"alarm {alarm.identity.id} is {alarm.state.value}, as before: an action is applied"
-                f" only if it can be stored ({error or 'the store does not answer'})",
+                f" only if it can be stored ({error or 'the store does not respond'})",
             ) from error
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:

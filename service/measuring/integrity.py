@@ -101,7 +101,7 @@ class IntegrityMonitor:
         found = self._store.integrity.adopt(self._clock.now_ns())
         if found:
             self.rolled_back = "; ".join(finding.detail for finding in found)
-            log.error("the database is not the one of the last run", reason=self.rolled_back)
+            log.error("the database is not that of the last run", reason=self.rolled_back)
         news = [place for place in self._store.integrity.damaged if place not in self._reported]
         news = news[: max(0, MAX_REPORTED - len(self._reported))]
         if news:

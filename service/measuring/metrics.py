@@ -37,7 +37,7 @@ def sample_metrics(live: LiveView, units: Iterable[str]) -> Iterator[Metric]:
     accounts = [((unit,), live.status(unit).account) for unit in units]
     yield counter(
         "samples_offered",
-        "Samples per channel counted by the device since the first that arrived.",
+        "Samples per channel counted by the device since the first sample.",
         UNIT,
         ((unit, account.n_offered) for unit, account in accounts),
     )
@@ -53,13 +53,13 @@ def sample_metrics(live: LiveView, units: Iterable[str]) -> Iterator[Metric]:
     )
     yield counter(
         "samples_missing",
-        "Samples per channel that the device has counted and that did not arrive.",
+        "Samples per channel that the device counted but that did not arrive.",
         UNIT,
         ((unit, account.n_gap) for unit, account in accounts),
     )
     yield counter(
         "samples_rejected",
-        "Samples per channel that were refused, by reason.",
+        "Samples per channel that were rejected, by reason.",
         ("unit", "reason"),
         _by_reason((unit, account.rejected) for (unit,), account in accounts),
     )
@@ -253,7 +253,7 @@ def store_metrics(
     yield one("store_waiting_findings", "Findings that wait for the store.", recorder.n_waiting)
     yield one(
         "store_behind_seconds",
-        "Time for which findings have waited without any being written.",
+        "Time since findings wait without any being written.",
         recorder.behind_s,
     )
     yield counter(
@@ -266,7 +266,7 @@ def store_metrics(
 
 def store_info(kind: str) -> Metric:
     """Return the metric with the kind of the database as a label."""
-    return gauge("store_info", "1; kind of the database.", ("kind",), [((kind,), 1)])
+    return gauge("store_info", "Kind of the database; always 1.", ("kind",), [((kind,), 1)])
 
 
 def soundness_metrics(found: IntegrityMonitor | None) -> Iterator[Metric]:

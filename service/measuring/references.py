@@ -162,13 +162,11 @@ def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
     """
     x, y = near
     if x is None or y is None:
-        raise ReferenceRefusedError(
-            "give the gaps of both axes, x and y, or neither to use the newest result"
-        )
+        raise ReferenceRefusedError("give the gaps in x and y, or neither to use the newest result")
     for axis, gap_um, is_there in zip("xy", opposite, opposite_axes(bearing), strict=True):
         if gap_um is None and is_there:
             raise ReferenceRefusedError(
-                f"bearing {bearing.id} has an opposite probe in {axis}: give its gap as well"
+                f"bearing {bearing.id} has an opposite probe in {axis}; give its gap as well"
             )
         if gap_um is not None and not is_there:
             raise ReferenceRefusedError(f"bearing {bearing.id} has no opposite probe in {axis}")
@@ -184,7 +182,7 @@ def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) 
         If there is no result, its age exceeds ten minutes, or its gaps are not usable.
     """
     if newest is None:
-        raise ReferenceRefusedError("there is no stored result yet")
+        raise ReferenceRefusedError("no result is stored yet")
     _check_age(newest.time_ns, now_ns)
     near = (_usable(newest, NEAR_GAPS[0]), _usable(newest, NEAR_GAPS[1]))
     x, y = (
@@ -251,7 +249,7 @@ def measured_vectors(assessment: Assessment | None) -> VectorReference:
         If there is no result, an amplitude has no value, or the machine did not run steadily.
     """
     if assessment is None:
-        raise VectorRefusedError("there is no current result")
+        raise VectorRefusedError("the bearing has no current result")
     condition = assessment.condition
     return VectorReference(
         unit=assessment.unit,

@@ -59,7 +59,7 @@ def report_silence(
 
     A unit is silent if no process has analysed it for ``after_s`` seconds.
     """
-    reason = f"no sign of life for {after_s:g} s: is `padwatch analyse` running?"
+    reason = f"no report for {after_s:g} s; check that `padwatch analyse` is running"
     gone = Judgement(AlarmLevel.DANGER, reason=reason)
     for units, condition in ((silent, gone), (alive, WITHIN)):
         for unit in units:

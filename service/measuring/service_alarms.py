@@ -271,7 +271,7 @@ class ServiceAlarms(AlarmBoard):
         match name:
             case "results_not_stored":
                 found = self._compared(name, health.store_behind_s)
-                reason = health.store_error or "the store does not answer"
+                reason = health.store_error or "the store does not respond"
                 return found if found.level is None else replace(found, reason=reason)
             case "results_lost":
                 reason = health.unstored_reason or "given_up"

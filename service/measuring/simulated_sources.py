@@ -107,7 +107,7 @@ def _refuse_misfit(unit: UnitSettings, simulation: SimulationSettings) -> None:
 
 def _compare(unit: UnitSettings, key: str, found: float, wanted: float) -> None:
     if abs(found - wanted) > MAX_MISFIT * wanted:
-        raise ConfigError(f"unit {unit.id}: {key} = {found:g}, but its life requires {wanted:g}")
+        raise ConfigError(f"unit {unit.id}: {key} = {found:g}, but life_seed requires {wanted:g}")
 
 
 def simulated_feed(unit: UnitSettings, clock: Clock) -> SimulatedUnit:
@@ -143,7 +143,7 @@ def scenario_of(simulation: SimulationSettings) -> Scenario:
         If the unit has a machine life instead of constant films.
     """
     if simulation.speed_rpm is None or simulation.power_mw is None:
-        raise LookupError("a simulated unit with a life has no constant scenario")
+        raise LookupError("a unit with life_seed has no constant scenario")
     return Scenario(
         bearings={bearing.bearing: _bearing_scenario(bearing) for bearing in simulation.bearing},
         speed_rpm=simulation.speed_rpm,

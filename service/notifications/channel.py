@@ -78,7 +78,7 @@ def read_secret(settings: SecretSettings) -> str:
     except OSError as error:
         raise SecretError(f"{place}: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise SecretError(f"{place} is not UTF-8 text") from error
+        raise SecretError(f"{place} is not valid UTF-8") from error
     text = text.strip()
     if not text or not text.isprintable():
         raise SecretError(f"{place} must hold a single line of printable text")
@@ -120,7 +120,7 @@ async def connected_socket(look_up: NameLookUp, port: int, timeout_s: float) -> 
     `timeout_s` limits the name resolution and each attempt. Raises the `OSError` of the last
     address if no address accepts a connection.
     """
-    failure: OSError = OSError("has no address")
+    failure: OSError = OSError("the host has no address")
     async with asyncio.timeout(timeout_s):
         addresses = await look_up.addresses()
     for address in addresses:
@@ -147,7 +147,7 @@ async def _connected(address: str, port: int) -> socket.socket:
 def error_text(error: BaseException) -> str:
     """Return the message of an exception; if empty, a text for time-outs, or the class name."""
     if isinstance(error, TimeoutError) and not str(error):
-        return "no answer in time"
+        return "no reply within the time-out"
     text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     return text or type(error).__name__
 

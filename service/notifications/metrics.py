@@ -29,7 +29,7 @@ def delivery_metrics(views: Sequence[ReceiverView] | None, now_ns: int) -> Itera
     yield gauge("outbox_readable", "1 if the outbox could be read.", (), [((), views is not None)])
     yield family(
         "waiting_messages",
-        "Messages that wait for a receiver.",
+        "Messages that wait for delivery to a receiver.",
         lambda its: sum(view.backlog.n_waiting for view in its if view.backlog),
     )
     yield family(

@@ -205,12 +205,12 @@ class Sender:
             set_forward_s + S_PER_H * self.receiver.settings.max_age_h
         )
         name = self.receiver.name
-        words = f"too old after: {answer}"
+        words = f"expired after the last failure: {answer}"
         n_given_up = await self._stored(
             lambda: self._outbox.expire(name, before_ns, words, now.host_ns)
         )
         if n_given_up:
-            log.error("letters expired", receiver=name, n_messages=n_given_up, reason=answer)
+            log.error("messages expired", receiver=name, n_messages=n_given_up, reason=answer)
 
     async def _stored(self, work: Callable[[], T], to_the_end: bool = False) -> T:
         """Run a store operation in a thread; repeat it until it succeeds, and return its result.

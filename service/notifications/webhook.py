@@ -175,8 +175,8 @@ class Webhook:
         if 200 <= status < 300:
             return Delivered(f"{status}")
         if 300 <= status < 400:
-            where = headers.get(b"location", "an unknown place")
-            return Failed(printable(f"{status}: redirects to {where}, which is not followed"))
+            where = headers.get(b"location", "an unknown address")
+            return Failed(printable(f"{status}: redirect to {where} is not followed"))
         answer = printable(f"{status} {await _excerpt(response)}")
         if 400 <= status < 500 and status not in RETRY_STATUSES:
             return Refused(answer)

@@ -217,7 +217,7 @@ class Captures(WriterThread):
         """Reason why captures are not written, an error or a disk timeout; None otherwise."""
         since_s = self._busy_since_s
         if since_s is not None and self._clock.monotonic_s() - since_s > MAX_BUSY_S:
-            return "the disk does not answer"
+            return "the disk does not respond"
         return self.error
 
     @property
@@ -326,7 +326,7 @@ class Captures(WriterThread):
         """Write the pending blocks of a capture; runs in the writer thread."""
         try:
             if capture.is_replaced:
-                capture.file.abandon("another capture contains them")
+                capture.file.abandon("another capture contains the samples")
                 return
             pending = capture.pending
             capture.file.write([pending.popleft() for _ in range(len(pending))])

@@ -157,7 +157,7 @@ def reinspected(known: WaveformFile, folder: Path, now_ns: int) -> WaveformFile:
     found = inspected(folder, known.place, known.kind, now_ns)
     if found.state is WaveformState.PRESENT and found.checksum == known.checksum:
         return replace(known, checked_ns=now_ns)
-    reason = found.reason or "its manifest is not the one that it was finished with"
+    reason = found.reason or "the manifest has changed since the recording was finished"
     state = WaveformState.DAMAGED
     return replace(known, state=state, reason=reason, changed_ns=now_ns, checked_ns=now_ns)
 
@@ -237,12 +237,12 @@ class RecordingCheck:
         for kind, name in self._there:
             yield self._read(kind, name)
         for kind, name in sorted(set(self._known) - set(self._there)):
-            reason = "the index lists it, but its folder is missing"
+            reason = "the folder of the recording is missing"
             yield CheckResult(kind, name, RecordingState.MISSING, reason)
         for kind, root in self._roots.items():
             for path in sorted(root.iterdir()) if root.is_dir() else ():
                 if path.name.endswith(UNFINISHED):
-                    reason = "it is being written, or the next start of the service finishes it"
+                    reason = "in progress, or to be finished at the next start of the service"
                     yield CheckResult(kind, path.name, RecordingState.UNFINISHED, reason)
 
     def _read(self, kind: WaveformKind, name: str) -> CheckResult:
@@ -253,12 +253,12 @@ class RecordingCheck:
             else:
                 found = reinspected(known, folder, self._now_ns)
         except OSError as error:  # reported as damaged, for attention
-            reason = f"it cannot be read: {error.strerror}"
+            reason = f"the recording cannot be read: {error.strerror}"
             return CheckResult(kind, name, RecordingState.DAMAGED, reason)
         if found.state is WaveformState.DAMAGED:
             return CheckResult(kind, name, RecordingState.DAMAGED, found.reason)
         if known is None:
-            reason = "the running service adds it to the index"
+            reason = "not in the index yet; the running service adds it"
             return CheckResult(kind, name, RecordingState.NOT_ENTERED, reason)
         return CheckResult(kind, name, RecordingState.SOUND)
 

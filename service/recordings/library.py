@@ -93,7 +93,7 @@ class RecordingLibrary:
         """
         folder = self._folder(name)
         if folder is None:
-            raise ConfigError(f"{name}: no such recording")
+            raise ConfigError(f"{name}: recording does not exist")
         if name in self._faults:
             raise ConfigError(f"{name}: {self._faults[name]}")
         return open_recording(folder)
@@ -199,7 +199,7 @@ def window_of(recording: Recording, start_s: float, seconds: float) -> Recording
     rate_hz = recording.manifest.rate_hz
     spans = [(h.start_ns, h.start_ns + ns_from_s(h.n_samples / rate_hz)) for h in recording.heads()]
     if not spans:
-        raise ConfigError(f"{recording.folder}: no blocks")
+        raise ConfigError(f"{recording.folder}: recording has no blocks")
     from_ns = spans[0][0] + ns_from_s(start_s)
     to_ns = from_ns + ns_from_s(seconds)
     wanted = [n for n, (begin, end) in enumerate(spans) if end > from_ns and begin < to_ns]

@@ -211,8 +211,8 @@ def recorded_motion(
     if not window.blocks:
         total_s = s_from_ns(window.stop_ns - window.start_ns)
         raise NoMotionError(
-            f"it has no samples from {start_s:g} s to {start_s + seconds:g} s;"
-            f" it is {total_s:g} s long"
+            f"the recording has no samples from {start_s:g} s to {start_s + seconds:g} s;"
+            f" its length is {total_s:g} s"
         )
     first_index, n_samples = _indices(window, start_s, seconds)
     samples = sample_window(window.blocks, rows, first_index, n_samples)
@@ -228,10 +228,10 @@ def _rows(manifest: Manifest, unit: Unit, bearing: Bearing) -> Mapping[str, int]
     configured = {channel.id: channel.measurand for channel in unit.channels}
     for id_ in (bearing.shaft_x, bearing.shaft_y):
         if id_ not in recorded:
-            raise NoMotionError(f"it has no channel {id_}, which bearing {bearing.id} needs")
+            raise NoMotionError(f"channel {id_} of bearing {bearing.id} was not recorded")
         if recorded[id_][1] is not configured[id_]:
             then, now = recorded[id_][1], configured[id_]
-            raise NoMotionError(f"channel {id_} is recorded as {then}, and configured as {now}")
+            raise NoMotionError(f"channel {id_} is recorded as {then}, but configured as {now}")
     wanted = channels_for(unit, bearing)
     return {id_: recorded[id_][0] for id_ in wanted if id_ in recorded}
 

@@ -128,7 +128,7 @@ def make_room(
         elif short_bytes[WaveformKind.CONTINUOUS] > n_freed:
             why = "the disk is nearly full"
         elif age_limit.is_old(file):
-            why = "it is older than max_days"
+            why = "the recording is older than max_days"
         else:
             continue
         n_freed += file.n_bytes if remove(file, why) else 0
@@ -311,19 +311,19 @@ class RecordingRetention:
         for name in being_removed(root):
             known = self._index.get(kind, name)
             if known is not None and not (root / name).exists():
-                self._note_removed(known, "its removal was interrupted")
+                self._note_removed(known, "the removal was interrupted")
             with errors.deferred():
                 delete_files(root / name)
 
     def _survey(self, kind: WaveformKind, root: Path, until_s: float) -> None:
         known, there = self._index.names(kind), set(finished(root))
         if known and not root.is_dir():
-            raise OSError(f"{root}: the folder of {len(known)} recordings is not there")
+            raise OSError(f"{root}: the folder of {len(known)} recordings does not exist")
         self._retry.keep(kind, there)
         missing = [file for name in known - there if (file := self._index.get(kind, name))]
         if missing:
             state, now_ns = WaveformState.MISSING, self._clock.now_ns()
-            reason = "it is not in its folder"
+            reason = "the recording is not in the folder"
             self._index.put(
                 replace(file, state=state, reason=reason, changed_ns=now_ns) for file in missing
             )

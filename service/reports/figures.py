@@ -134,9 +134,9 @@ def condition_figure(case: Case) -> Figure | None:
     _draw_films(plot, found, recent, y)
     return Figure(
         plot,
-        f"Grey: the {members.n_in_all if members else 0} readings of the cell (pink) that the"
-        " baseline stands on. Dashed: expected at this oil temperature. Blue: the last 24 hours."
-        " Red: the reading of the alarm; its bar holds 95 % of what chance does.",
+        f"Grey: the {members.n_in_all if members else 0} readings of the cell (pink) of the"
+        " baseline. Dashed: expected at this oil temperature. Blue: the last 24 hours."
+        " Red: the reading of the alarm with its 95 % interval of random errors.",
     )
 
 
@@ -160,8 +160,8 @@ def map_figure(case: Case) -> Figure | None:
     plot.points([found.eccentricity_ratio], [found.oil_temperature_c], "alarm", 2.2)
     return Figure(
         plot,
-        f"What the baseline knows: the darker, the stiffer, {low / GN_PER_M:.3g} to"
-        f" {high / GN_PER_M:.3g} GN/m. Dashed: known from neighbours. White: too few readings to"
+        f"Stiffness of the baseline, darker if stiffer, {low / GN_PER_M:.3g} to"
+        f" {high / GN_PER_M:.3g} GN/m. Dashed: from neighbours. White: too few readings to"
         " compare. Red: the cell and reading of the alarm.",
     )
 

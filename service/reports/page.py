@@ -216,7 +216,7 @@ def story(case: Case) -> str:
     )
     sentence = (
         f"The stiffness of the film in {case.direction} has changed by {change_words(found)}"
-        f" against what it was under this condition{hours}."
+        f" against the baseline under this condition{hours}."
     )
     cause = found.attribution
     if cause is None:

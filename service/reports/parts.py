@@ -159,7 +159,7 @@ class CausePart(EvidencePart):
     cause: Annotated[str, Field(examples=["film"])]
     """Cause: film, oil, bracket_or_transducer or unknown."""
 
-    reason: Annotated[str, Field(examples=["shaft motion does not tell"])]
+    reason: Annotated[str, Field(examples=["shaft motion agrees with no single cause"])]
     """Reason for the attribution."""
 
     film_share: float | None

@@ -167,9 +167,7 @@ def is_there(found: Occurrence) -> bool:
 
 ID = re.compile(r"([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([a-z0-9_]+)")
 
-Number = Annotated[
-    int, Path(ge=1, le=10**12, description="Which occurrence of the alarm.", examples=[3])
-]
+Number = Annotated[int, Path(ge=1, le=10**12, description="Occurrence number.", examples=[3])]
 
 LIST_PROBLEMS = problem_responses(422, 503, own={404: "Unknown alarm"})
 PROBLEMS = problem_responses(
@@ -181,7 +179,7 @@ PROBLEMS = problem_responses(
 )
 
 WHY_NOT = {
-    EvidenceState.LOST: "was lost: the service ended, or the disk refused, before it was written",
+    EvidenceState.LOST: "was lost, because the service ended or the disk failed before",
     EvidenceState.REMOVED: "was removed to free space for newer evidence",
     EvidenceState.NOT_KEPT: "was never kept",
 }
@@ -203,7 +201,7 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
     async def occurrences(
         alarm: AlarmId,
         limit: Annotated[
-            int, Query(ge=1, le=1000, description="Most occurrences in the answer.")
+            int, Query(ge=1, le=1000, description="Maximum number of occurrences in the answer.")
         ] = 100,
     ) -> OccurrencesModel:
         """Return the newest occurrences of an alarm, and the state of their evidence."""
@@ -214,7 +212,7 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
             occurrences=[_occurrence_model(each) for each in found],
         )
 
-    @router.get("/{occurrence}", summary="All that was known", responses=PROBLEMS)
+    @router.get("/{occurrence}", summary="Evidence document", responses=PROBLEMS)
     async def document(alarm: AlarmId, occurrence: Number) -> Evidence:
         """Return the evidence document: the state of the unit when the alarm was raised."""
         held = _there(desk)
@@ -229,7 +227,7 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
 
     @router.get(
         "/{occurrence}/report",
-        summary="Report on one page",
+        summary="Evidence report as a page",
         response_class=HTMLResponse,
         responses=PROBLEMS,
     )
@@ -245,7 +243,7 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
 
     @router.get(
         "/{occurrence}/bundle.zip",
-        summary="Everything to take away",
+        summary="Evidence bundle as a ZIP file",
         response_class=StreamingResponse,
         responses={**PROBLEMS, 200: _zip_content()},
     )
@@ -282,7 +280,7 @@ def _known(context: Context, alarm: str) -> str:
         try:
             context.alarms.alarm(alarm)
         except LookupError as error:
-            raise ProblemError(404, "Unknown alarm", f"there is no alarm {alarm!r}") from error
+            raise ProblemError(404, "Unknown alarm", f"unknown alarm {alarm!r}") from error
     return alarm
 
 
@@ -296,7 +294,7 @@ async def _complete(
         raise ProblemError(404, "Unknown occurrence", detail)
     name = f"evidence of alarm {alarm}, occurrence {occurrence},"
     if found.state is EvidenceState.WAITING:
-        raise ProblemError(409, "Not on the disk yet", f"{name} is being written")
+        raise ProblemError(409, "Not complete yet", f"{name} is being written")
     if found.state is not EvidenceState.COMPLETE:
         raise ProblemError(404, "No evidence", f"{name} {WHY_NOT[found.state]}")
     return found

@@ -56,7 +56,7 @@ class Durations:
 
     def __init__(self, bounds_s: Sequence[float], clock: Clock) -> None:
         if not bounds_s or list(bounds_s) != sorted(set(bounds_s)):
-            raise ValueError(f"bounds of buckets must rise: {list(bounds_s)}")
+            raise ValueError(f"bounds of buckets must increase, got {list(bounds_s)}")
         self._bounds_s, self._clock = tuple(bounds_s), clock
         self._n_in = [0] * (len(bounds_s) + 1)
         self._sum_s = 0.0

@@ -81,8 +81,8 @@ def can_shape_of(unit: UnitSettings, source: settings.CanSettings) -> CanShape:
     """
     if source.profile is None:
         raise LookupError(
-            f"unit {unit.id} reads CAN by its own DBC; a simulated DAQ sends profile"
-            ' "padwatch_int16" or "padwatch_float32"'
+            f"unit {unit.id}: a simulated CAN DAQ cannot send the messages of a DBC file;"
+            ' use profile "padwatch_int16" or "padwatch_float32"'
         )
     floats = source.profile == "padwatch_float32"
     return CanShape(
@@ -142,7 +142,7 @@ def can_daq_of(
     if not source.channel.startswith("socket://") or not port.isdecimal():
         raise LookupError(
             f"unit {unit.id}: a simulated DAQ cannot use channel {source.channel!r}; use"
-            ' "socket://127.0.0.1:0", "pty" or the path of a link to a pty'
+            ' "socket://127.0.0.1:0", "pty" or a path for the link to a pseudo-terminal'
         )
     return SlcanTcpServer(device, clock, host=host, port=int(port), **waiting)
 

@@ -29,7 +29,7 @@ SERVICE_KINDS = kind_table(
     AlarmKind("results_lost", "Results lost", "findings", STORE, "lasting"),
     AlarmKind(
         "blocks_waiting",
-        "Queue to the analysis fills",
+        "Analysis queue filling up",
         "1",
         SERVICE,
         "waiting",
@@ -47,7 +47,7 @@ SERVICE_KINDS = kind_table(
     ),
     AlarmKind(
         "captures_not_kept",
-        "Samples around alarms not kept",
+        "Samples around alarms not saved",
         None,
         CAPTURES,
         "at_once",
@@ -74,8 +74,8 @@ SERVICE_KINDS = kind_table(
         "at_once",
         "stored_trouble",
     ),
-    AlarmKind(MESSAGES_REFUSED, "Messages on the stream refused", None, STREAM, "lasting"),
-    AlarmKind("stream_away", "Stream does not answer", None, STREAM, "steady", "stream_trouble"),
+    AlarmKind(MESSAGES_REFUSED, "Messages in the stream rejected", None, STREAM, "lasting"),
+    AlarmKind("stream_away", "Stream unavailable", None, STREAM, "steady", "stream_trouble"),
     AlarmKind(ANALYSIS_GONE, "No process analyses this unit", None, UNIT, "at_once"),
 )
 """Alarm kinds of the service. `rule` is a field of `ServiceRules`; `reading` is a key of

@@ -147,6 +147,6 @@ class CaptureSettings(Settings):
     def _check(self) -> Self:
         if self.max_s < self.pre_s + self.post_s:
             raise MisfitError(
-                f"must be at least pre_s + post_s, {self.pre_s + self.post_s:g}", "max_s"
+                f"must be at least pre_s + post_s = {self.pre_s + self.post_s:g} s", "max_s"
             )
         return self

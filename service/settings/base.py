@@ -48,7 +48,7 @@ class Settings(BaseModel):
     def _has_no_control_characters(cls, value: Any) -> Any:
         """Refuse control characters: names are printed, and paths must not contain NUL."""
         if isinstance(value, str) and CONTROL.search(value):
-            raise SecretMisfitError("must not have control characters")
+            raise SecretMisfitError("must not contain control characters")
         return value
 
 
@@ -57,7 +57,7 @@ def refuse_twice(entries: Iterable[tuple[int | str, ...]]) -> None:
     seen: set[int | str] = set()
     for *at, value in entries:
         if value in seen:
-            raise MisfitError("is used twice; each must be unique", *at)
+            raise MisfitError("is used twice; each value must be unique", *at)
         seen.add(value)
 
 
@@ -65,4 +65,4 @@ def refuse_unknown_units(units: Iterable[str], known: Iterable[str], *at: int | 
     """Raise `MisfitError` if one of ``units``, a list at location ``at``, is not ``known``."""
     for n, unit in enumerate(units):
         if unit not in known:
-            raise MisfitError(f"is no unit of this plant, it has {', '.join(known)}", *at, n)
+            raise MisfitError(f"unknown unit; known units: {', '.join(known)}", *at, n)

@@ -141,11 +141,12 @@ class BearingSettings(Settings):
         probes = (self.opposite_x, self.opposite_y)
         if any(probes) != (self.opposite_reference_um is not None):
             raise MisfitError(
-                "must be given with opposite probes, and only with them", "opposite_reference_um"
+                "must be given if and only if opposite_x or opposite_y is given",
+                "opposite_reference_um",
             )
         if self.alarms.oil_temperature_c is not None and self.oil_temperature is None:
             raise MisfitError(
-                "needs the bearing's oil_temperature, the slow channel that measures it",
+                "requires oil_temperature, the slow channel of the bearing's oil temperature",
                 *("alarms", "oil_temperature_c"),
             )
         return self

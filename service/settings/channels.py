@@ -218,9 +218,8 @@ class ChannelSettings(Settings):
         )
         for key in (*others, *(VOLTAGE_KEYS if in_counts else ())):
             if getattr(self, key) is not None:
-                raise MisfitError(
-                    "must not be given: a channel is either in volts or in scaled counts", key
-                )
+                which = "without" if in_counts else "with"
+                raise MisfitError(f"applies only to a channel {which} unit_per_count", key)
         for key in keys:
             if getattr(self, key) is None:
                 raise MissingError("is missing", key)
@@ -228,32 +227,32 @@ class ChannelSettings(Settings):
             raise MisfitError("must be a number other than 0", "unit_per_count")
         low, high = keys[1:]
         if not getattr(self, low) < getattr(self, high):
-            raise MisfitError(f"must be below {high} {getattr(self, high):g}", low)
+            raise MisfitError(f"must be below {high} = {getattr(self, high):g}", low)
 
     def _check_key_phase(self) -> None:
         for key in NO_KEY_PHASE_KEYS:
             if getattr(self, key) not in (None, (), 0.0):
-                raise MisfitError("does not apply to a key_phase; remove it", key)
+                raise MisfitError("does not apply to a key_phase channel; remove it", key)
 
     def _check_runout(self) -> None:
         for key in ("probe", "slow_roll"):
             if getattr(self, key) is not None and self.transducer not in SHAFT_TRANSDUCERS:
-                words = " or ".join(SHAFT_TRANSDUCERS)
-                raise MisfitError(f"applies to a {words}; this is a {self.transducer}", key)
+                words = " or ".join(f'"{name}"' for name in SHAFT_TRANSDUCERS)
+                raise MisfitError(f"applies only to transducer {words}, not {self.transducer}", key)
         if self.slow_roll is not None and self.probe is None:
-            raise MisfitError("must be given with slow_roll, which belongs to one probe", "probe")
+            raise MisfitError("is required with slow_roll, which applies to one probe", "probe")
 
     def _check_sensitivity(self) -> None:
         allowed = ALLOWED_UNITS[self.transducer]
         if self.sensitivity_unit not in allowed:
             words = " or ".join(f'"{unit}"' for unit in allowed)
-            raise MisfitError(f"must be {words} for a {self.transducer}", "sensitivity_unit")
+            raise MisfitError(f"must be {words} for {self.transducer}", "sensitivity_unit")
         low, high = PLAUSIBLE_V_PER_UNIT[self.transducer]
         scale = V_PER_ENGINEERING_UNIT[self.sensitivity_unit]
         if self.sensitivity is None or not low <= abs(self.sensitivity) * scale <= high:
             raise MisfitError(
-                f"must be {low / scale:g} to {high / scale:g} {self.sensitivity_unit} for a"
-                f" {self.transducer}, positive or negative",
+                f"must be {low / scale:g} to {high / scale:g} {self.sensitivity_unit} (positive"
+                f" or negative) for transducer {self.transducer}",
                 "sensitivity",
             )
 
@@ -318,5 +317,5 @@ class SlowChannelSettings(Settings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if not self.minimum < self.maximum:
-            raise MisfitError(f"must be below maximum {self.maximum:g}", "minimum")
+            raise MisfitError(f"must be below maximum = {self.maximum:g}", "minimum")
         return self

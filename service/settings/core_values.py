@@ -222,14 +222,14 @@ def _clock_limit(limit: float, delay_s: float) -> LimitRule:
 def film_rules_of(unit: UnitSettings, settings: FilmAlarmSettings) -> FilmRules | str:
     """Return the film rules of a unit, or the reason why its films cannot be monitored."""
     if unit.power_channel is None or unit.rated_power_mw is None:
-        return "operating states need power_channel and rated_power_mw"
+        return "operating states require power_channel and rated_power_mw"
     estimators = {
         bearing.id: watched_estimator(unit, bearing)
         for bearing in unit.bearing
         if bearing.oil_temperature is not None
     }
     if not estimators:
-        return "conditions need the oil_temperature of a bearing"
+        return "operating conditions require oil_temperature of at least one bearing"
     return FilmRules(
         estimators=estimators,
         grid=settings.baseline.settings().grid,

@@ -49,9 +49,11 @@ class ChangeLimitSettings(Settings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.alert_change >= self.danger_change:
-            raise MisfitError(f"must be above alert_change, {self.alert_change:g}", "danger_change")
+            raise MisfitError(
+                f"must be above alert_change = {self.alert_change:g}", "danger_change"
+            )
         if self.deadband >= self.alert_change:
-            raise MisfitError(f"must be below alert_change, {self.alert_change:g}", "deadband")
+            raise MisfitError(f"must be below alert_change = {self.alert_change:g}", "deadband")
         return self
 
     def limits(self) -> ChangeLimits:
@@ -94,7 +96,7 @@ class BaselineModel(Settings):
     def _check(self) -> Self:
         turn = 360.0 / (self.attitude_width_deg or 360.0)
         if abs(turn - round(turn)) > 1e-9:
-            raise MisfitError("must divide 360", "attitude_width_deg")
+            raise MisfitError("must divide 360 without remainder", "attitude_width_deg")
         return self
 
     def settings(self, reading_h: float = BaselineSettings.reading_h) -> BaselineSettings:
@@ -153,8 +155,8 @@ class OperatingModel(Settings):
         for lower, upper, band in BANDS:
             low, high, width = (getattr(self, key) for key in (lower, upper, band))
             if not (width < low and low + width < high - width):
-                limits = f"{lower} = {low:g} must be above {band} = {width:g} and below {upper}"
-                raise MisfitError(f"{limits} = {high:g} by more than twice that", lower)
+                limits = f"must be above {band} = {width:g} and below {high - 2 * width:g}"
+                raise MisfitError(f"{limits}, {upper} minus twice {band}", lower)
         return self
 
     def limits(self, rated_speed_rpm: float, rated_power_mw: float) -> OperatingLimits:
@@ -206,7 +208,7 @@ class FilmAlarmSettings(Settings):
         shortest_s = 3600.0 * BaselineSettings().time_scales_h[0] / self.time_lapse
         if self.reading_period_s >= shortest_s:
             raise MisfitError(
-                f"must be below {shortest_s:g}, the shortest mean", "reading_period_s"
+                f"must be below {shortest_s:g} s, the shortest averaging time", "reading_period_s"
             )
         return self
 

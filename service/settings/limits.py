@@ -53,7 +53,9 @@ class RegionSettings(Settings):
         for key, (low, high) in RANGES.items():
             bounds: Bounds | None = getattr(self, key)
             if bounds is not None and not low <= bounds[0] < bounds[1] <= high:
-                raise MisfitError(f"must increase, within {low:g} to {high:g}", key)
+                raise MisfitError(
+                    f"must be [low, high] with low < high, within {low:g} to {high:g}", key
+                )
         return self
 
     def region(self, states: StateNames) -> Region:
@@ -74,7 +76,7 @@ def refuse_overlap(tables: Sequence[RegionSettings], states: StateNames) -> None
     regions = [table.region(states) for table in tables]
     for n, m in combinations(range(len(tables)), 2):
         if regions[n].overlaps(regions[m]):
-            raise MisfitError(f"overlaps the conditions of table {n + 1}", "table", m)
+            raise MisfitError(f"overlaps the conditions of table[{n + 1}]", "table", m)
 
 
 class WatchSettings(Settings):
@@ -159,9 +161,9 @@ class LimitSettings(WatchSettings):
         alert, danger = self.alert, self.danger
         given = [limit for limit in (alert, danger) if limit is not None]
         if not given:
-            raise MisfitError("gives no limit: give alert, danger or both", "alert")
+            raise MisfitError("at least one of alert and danger must be given", "alert")
         if alert is not None and danger is not None and alert >= danger:
-            raise MisfitError(f"must be above alert, {alert:g}", "danger")
+            raise MisfitError(f"must be above alert = {alert:g}", "danger")
         if self.deadband >= given[0]:
             raise MisfitError(f"must be below the lowest limit, {given[0]:g}", "deadband")
 
@@ -279,18 +281,20 @@ class GapLimitSettings(LimitSettings):
         named = ("danger_below", "alert_below", "alert", "danger")
         given = [(key, limit) for key in named if (limit := getattr(self, key)) is not None]
         if not given:
-            keys = "alert, danger, alert_below or danger_below"
-            raise MisfitError(f"gives no limit: give {keys}", "alert")
+            keys = "alert, danger, alert_below and danger_below"
+            raise MisfitError(f"at least one of {keys} must be given", "alert")
         for (lower, low), (upper, high) in pairwise(given):
             if low >= high:
-                raise MisfitError(f"must be above {lower}, {low:g}", upper)
+                raise MisfitError(f"must be above {lower} = {low:g}", upper)
         low_side = [limit for key, limit in given if key.endswith("below")]
         high_side = [limit for key, limit in given if not key.endswith("below")]
         half_range = (high_side[0] - low_side[-1]) / 2.0 if low_side and high_side else math.inf
         if self.deadband >= half_range:
-            raise MisfitError(f"must be below half the range, {half_range:g}", "deadband")
+            raise MisfitError(
+                f"must be below half the allowed range, {half_range:g} µm", "deadband"
+            )
         if high_side and self.deadband >= high_side[0]:
-            raise MisfitError(f"must be below the lowest limit, {high_side[0]:g}", "deadband")
+            raise MisfitError(f"must be below the lowest limit, {high_side[0]:g} µm", "deadband")
 
 
 Boundary = Annotated[float, Field(gt=0.0, le=10_000.0)]
@@ -320,11 +324,11 @@ class ZoneTableSettings(RegionSettings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.b_c <= self.a_b:
-            raise MisfitError(f"must be above a_b, {self.a_b:g}", "b_c")
+            raise MisfitError(f"must be above a_b = {self.a_b:g}", "b_c")
         if self.c_d <= self.b_c:
-            raise MisfitError(f"must be above b_c, {self.b_c:g}", "c_d")
+            raise MisfitError(f"must be above b_c = {self.b_c:g}", "c_d")
         if self.deadband is not None and self.deadband >= self.b_c:
-            raise MisfitError(f"must be below b_c, {self.b_c:g}", "deadband")
+            raise MisfitError(f"must be below b_c = {self.b_c:g}", "deadband")
         return self
 
 
@@ -390,7 +394,7 @@ class VectorReferenceSettings(Settings):
     def _check(self) -> Self:
         refuse_twice(("states", n, name) for n, name in enumerate(self.states))
         if all(getattr(self, place) is None for place in PLACES):
-            raise MisfitError(f"gives no vector: give one of {', '.join(PLACES)}", "shaft_x")
+            raise MisfitError(f"at least one of {', '.join(PLACES)} must be given", "shaft_x")
         for place, vector in self.vectors().items():
             if not 0.0 <= vector[0] <= MAX_UM_PK:
                 raise MisfitError(f"amplitude must be 0 to {MAX_UM_PK:g} µm", place, 0)

@@ -56,7 +56,7 @@ class SecretSettings(Settings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if (self.file is None) == (self.env is None):
-            raise MisfitError("give either file or env", "file")
+            raise MisfitError("exactly one of file and env must be given", "file")
         return self
 
 
@@ -79,7 +79,7 @@ class QuietSettings(Settings):
         try:
             ZoneInfo(self.time_zone)
         except (ZoneInfoNotFoundError, ValueError, OSError) as error:
-            raise MisfitError('is not a known time zone such as "UTC"', "time_zone") from error
+            raise MisfitError('is not a known IANA time zone such as "UTC"', "time_zone") from error
         return self
 
     def include(self, time_ns: int) -> bool:
@@ -197,7 +197,8 @@ class SmtpSettings(ReceiverSettings):
         if (self.username is None) != (self.password is None):
             raise MisfitError("username and password must be given together", "username")
         if self.username is not None and self.tls == "none":
-            raise MisfitError("would send the password unencrypted", "tls")
+            words = 'would send the password unencrypted; use "starttls" or "implicit"'
+            raise MisfitError(words, "tls")
         refuse_twice(("recipients", n, each) for n, each in enumerate(self.recipients))
         return self
 
@@ -244,11 +245,11 @@ def url_fault(url: str) -> str | None:
         parts = urlsplit(url)
         port = parts.port
     except ValueError:
-        return "is not a URL"
+        return "is not a valid URL"
     if PRINTABLE_URL.match(url) is None or port == 0 or not parts.hostname:
-        return "is not a URL of printable ASCII with a host"
+        return "must be a URL with a host, in printable ASCII characters"
     if parts.scheme.lower() not in ("http", "https"):
         return "must begin with https:// or http://"
     if "@" in parts.netloc:
-        return "must not contain a name or password; use authorization"
+        return "must not contain a user name or password; use authorization"
     return None

@@ -57,7 +57,7 @@ class SpectraSettings(Settings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.sparse_every_s < self.dense_every_s:
-            limit = f"must not be below dense_every_s, {self.dense_every_s:g}"
+            limit = f"must not be below dense_every_s = {self.dense_every_s:g}"
             raise MisfitError(limit, "sparse_every_s")
         return self
 
@@ -111,12 +111,12 @@ class ServiceSettings(Settings):
         if self.socket is not None:
             if self.tls is not None:
                 raise MisfitError(
-                    "applies to a host and port; on a socket the proxy has TLS", "tls"
+                    "does not apply to a Unix socket; set up TLS in the reverse proxy", "tls"
                 )
         elif not is_loopback(self.host) and self.tls is None:
             raise MisfitError(
                 "is reachable from other hosts, which requires a certificate and its key in"
-                " [service.tls]; else use 127.0.0.1, or a unix socket behind a proxy",
+                " [service.tls]; else use 127.0.0.1, or a Unix socket behind a reverse proxy",
                 "host",
             )
         return self
@@ -150,7 +150,7 @@ class DynamicModel(Settings):
         for name in ("band_hz", "quiet_band_hz"):
             low, high = getattr(self, name)
             if not 0.0 < low < high:
-                raise MisfitError(f"must increase from above 0, got [{low:g}, {high:g}]", name)
+                raise MisfitError("must be [low, high] with 0 < low < high", name)
         return self
 
 
@@ -219,13 +219,13 @@ class AnalysisModel(Settings):
     def _check(self) -> Self:
         low, high = self.vortex_band
         if not 0.05 <= low < high <= 0.95:
-            raise MisfitError("must be [low, high] within 0.05 to 0.95", "vortex_band")
+            raise MisfitError("must be [low, high] with 0.05 <= low < high <= 0.95", "vortex_band")
         if not low < self.vortex_order < high:
-            limits = f"must lie within vortex_band [{low:g}, {high:g}]"
+            limits = f"must lie within vortex_band = [{low:g}, {high:g}]"
             raise MisfitError(limits, "vortex_order")
         if self.min_segments > self.n_segments:
             raise MisfitError(
-                f"must not be above n_segments {self.n_segments}, or all results are uncertain",
+                f"must not be above n_segments = {self.n_segments}, or all results are uncertain",
                 "min_segments",
             )
         return self
@@ -313,8 +313,8 @@ class PlantFile(Settings):
         n_needed = math.ceil(MIN_SEGMENT_TURNS * unit.sampling_hz / turn_hz)
         if self.analysis.segment_samples < n_needed:
             raise MisfitError(
-                f"for unit {unit.id} must hold {MIN_SEGMENT_TURNS} turns at rated speed,"
-                f" {n_needed} samples, to separate the vortex from 1×",
+                f"for unit {unit.id} must be at least {n_needed} samples ({MIN_SEGMENT_TURNS} turns"
+                " at rated speed) to separate the vortex from 1×",
                 *("analysis", "segment_samples"),
             )
 
@@ -323,6 +323,6 @@ class PlantFile(Settings):
         high_hz = min(self.analysis.velocity_high_hz, unit.sampling_hz / 2)
         if low_hz >= high_hz:
             raise MisfitError(
-                f"for unit {unit.id} begins at {low_hz:g} Hz and must begin below {high_hz:g} Hz",
+                f"for unit {unit.id} is {low_hz:g} Hz at rated speed; must be below {high_hz:g} Hz",
                 *("analysis", "velocity_low_order"),
             )

@@ -179,5 +179,6 @@ def why_closed(
         return None
     return (
         f'service.host "{host}" is reachable from other hosts, which requires'
-        f" {' and '.join(missing)}; else listen on 127.0.0.1, or on a unix socket behind a proxy"
+        f" {' and '.join(missing)}; else listen on 127.0.0.1, or on a Unix socket"
+        " behind a reverse proxy"
     )

@@ -28,7 +28,7 @@ class StoreSettings(Settings):
     def _check(self) -> Self:
         if self.postgresql is None:
             if self.password_file is not None:
-                raise MisfitError("requires postgresql, which is not given", "password_file")
+                raise MisfitError("requires postgresql", "password_file")
             return self
         keywords = _keywords(self.postgresql)
         if "password" in keywords or "sslpassword" in keywords:
@@ -37,7 +37,7 @@ class StoreSettings(Settings):
                 "postgresql",
             )
         if "passfile" in keywords and self.password_file is not None:
-            raise MisfitError("is given as well as passfile in postgresql", "password_file")
+            raise MisfitError("must not be given with passfile in postgresql", "password_file")
         return self
 
     @property
@@ -99,7 +99,7 @@ class RetentionSettings(Settings):
         for finer, coarser in FINER:
             least, found = getattr(self, finer), getattr(self, coarser)
             if (found and not least) or 0.0 < found < least:
-                limit = "0" if not least else f"at least {finer}, {least:g}, or 0"
+                limit = f"0, like {finer}" if not least else f"0, or at least {finer} = {least:g}"
                 raise MisfitError(f"must be {limit}", coarser)
         return self
 
@@ -162,7 +162,7 @@ class EvidenceSettings(Settings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.hard_max_gb < self.max_gb:
-            raise MisfitError(f"must not be below max_gb, {self.max_gb:g}", "hard_max_gb")
+            raise MisfitError(f"must not be below max_gb = {self.max_gb:g}", "hard_max_gb")
         return self
 
 
@@ -195,7 +195,7 @@ class SpaceSettings(Settings):
         for unit in ("share", "gb"):
             alert, danger = (getattr(self, f"{level}_free_{unit}") for level in ("alert", "danger"))
             if not danger < alert:
-                limit = f"must be below alert_free_{unit}, {alert:g}"
+                limit = f"must be below alert_free_{unit} = {alert:g}"
                 raise MisfitError(limit, f"danger_free_{unit}")
         return self
 

@@ -142,7 +142,7 @@ def sentence(
     shown = key if holds_tables else f"{key} = {_shown(value)}"
     meaning = description(schema, location)
     if error["type"] == "extra_forbidden":
-        return f"{shown}: unknown key; known here: {', '.join(known_keys(schema, location[:-1]))}"
+        return f"{shown}: unknown key; known keys: {', '.join(known_keys(schema, location[:-1]))}"
     is_missing = isinstance(error.get("ctx", {}).get("error"), MissingError)
     if error["type"] == "value_error" and not is_missing:
         if isinstance(error["ctx"]["error"], SecretMisfitError):
@@ -197,7 +197,7 @@ MAX_FILE_BYTES = 4_000_000
 FOLDER = "folder"
 """Key of the validation context of pydantic for the file's folder, the base of relative paths."""
 
-TOO_DEEP = "nested too deeply"
+TOO_DEEP = "tables or arrays are nested too deeply"
 
 SYNTAX_PLACE = re.compile(r"^(.*) \(at line (\d+), (column \d+)\)$", re.DOTALL)
 
@@ -241,7 +241,7 @@ def _read(path: Path) -> str:
         raise TomlFileError(f"{path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise TomlFileError(f"{path}:{line}: not UTF-8 text at byte {error.start}") from error
+        raise TomlFileError(f"{path}:{line}: byte {error.start} is not valid UTF-8") from error
 
 
 def _parsed(path: Path, text: str) -> dict[str, Any]:
@@ -251,8 +251,8 @@ def _parsed(path: Path, text: str) -> dict[str, Any]:
         place = SYNTAX_PLACE.match(str(error))
         last = text.count("\n") + 1
         line, words = (place[2], f"{place[1]} ({place[3]})") if place else (last, error)
-        raise TomlFileError(f"{path}:{line}: not TOML: {words}") from error
+        raise TomlFileError(f"{path}:{line}: invalid TOML: {words}") from error
     except ValueError as error:
-        raise TomlFileError(f"{path}: an integer of thousands of digits") from error
+        raise TomlFileError(f"{path}: an integer has too many digits") from error
     except RecursionError as error:
         raise TomlFileError(f"{path}: {TOO_DEEP}") from error

@@ -45,13 +45,13 @@ def read_calibration_sheet(path: Path) -> ResponseTable:
     for number, cells in rows:
         place = f"{path}:{number}"
         if len(cells) != len(header):
-            raise SheetError(f"{place}: needs {len(header)} values, got {len(cells)}")
+            raise SheetError(f"{place}: expected {len(header)} values, got {len(cells)}")
         row = dict(zip(header, cells, strict=True))
         point = tuple(_number(f"{place}: {name}", row[name]) for name in COLUMNS)
         _check(place, point, points)
         points.append(point)
     if len(points) < 2:
-        raise SheetError(f"{path}:{number}: needs two points or more, got {len(points)}")
+        raise SheetError(f"{path}:{number}: expected at least two points, got {len(points)}")
     frequency_hz, magnitude, phase_deg = zip(*points, strict=True)
     return ResponseTable(frequency_hz, magnitude, phase_deg)
 
@@ -64,7 +64,7 @@ def _read(path: Path) -> str:
         raise SheetError(f"{path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise SheetError(f"{path}:{line}: not UTF-8 text at byte {error.start}") from error
+        raise SheetError(f"{path}:{line}: byte {error.start} is not valid UTF-8") from error
 
 
 def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
@@ -82,7 +82,7 @@ def _number(place: str, cell: str) -> float:
     try:
         value = float(cell)
     except ValueError as error:
-        fault = f"must be a number, got {cell!r}" if cell else "is missing; complete the point"
+        fault = f"must be a number, got {cell!r}" if cell else "is missing"
         raise SheetError(f"{place} {fault}") from error
     if not math.isfinite(value):
         raise SheetError(f"{place} must be finite, got {cell}")
@@ -92,7 +92,7 @@ def _number(place: str, cell: str) -> float:
 def _check(place: str, point: tuple[float, ...], before: list[tuple[float, ...]]) -> None:
     frequency_hz, magnitude, _ = point
     if frequency_hz <= (before[-1][0] if before else 0.0):
-        lowest = f"the one before, {before[-1][0]:g}" if before else "0"
+        lowest = f"the previous one, {before[-1][0]:g}" if before else "0"
         raise SheetError(f"{place}: frequency_hz must be above {lowest}, got {frequency_hz:g}")
     if magnitude <= 0.0:
         raise SheetError(f"{place}: magnitude must be above 0, got {magnitude:g}")
@@ -156,7 +156,7 @@ class SheetSettings(Settings):
         try:
             self._table = read_calibration_sheet(folder / self.file)
         except SheetError as error:
-            raise MisfitError(f"names a sheet that cannot be used: {error}", "file") from error
+            raise MisfitError(f"calibration sheet cannot be used: {error}", "file") from error
         return self
 
     def response(self) -> Response:

@@ -59,8 +59,8 @@ def require_lines_apart(readers: Iterable[tuple[tuple[int | str, ...], object]])
         if line in taken:
             _, number, key = taken[line]
             raise MisfitError(
-                f"is read by {key} of unit[{int(number) + 1}] already; a line has one source,"
-                " so use another line, or a gateway with host",
+                f"is already used by {key} of unit[{int(number) + 1}]; a serial line has one"
+                " master, so use another line, or a gateway with host",
                 *at,
                 "device",
             )
@@ -85,7 +85,7 @@ def require_alarm_fit(
     The id `plant` is also refused, since it is reserved for alarms of the whole plant.
     """
     if unit == PLANT:
-        raise MisfitError("is reserved for alarms of the whole plant; choose another", "id")
+        raise MisfitError("is reserved for alarms of the whole plant; choose another id", "id")
     is_rack = isinstance(source, ModbusVectorSettings)
     probes = {c.id for c in channels if c.transducer is Transducer.PROXIMITY_PROBE}
     for number, bearing in enumerate(bearings):
@@ -98,7 +98,7 @@ def require_alarm_fit(
 
 
 def _require_no_waveforms(bearing: BearingSettings, at: tuple[str | int, ...]) -> None:
-    words = 'needs waveforms, which a source of kind "modbus_vector" does not give'
+    words = 'requires waveforms, which a source of kind "modbus_vector" does not provide'
     for key in FROM_WAVEFORMS:
         if getattr(bearing.alarms, key) is not None:
             raise MisfitError(words, *at, key)
@@ -111,9 +111,10 @@ def _require_gaps(bearing: BearingSettings, probes: set[str], at: tuple[str | in
     in_x = bearing.gap_x is not None or bearing.shaft_x in probes
     in_y = bearing.gap_y is not None or bearing.shaft_y in probes
     if bearing.alarms.gap_um is not None and not (in_x or in_y):
-        raise MisfitError("needs a proximity probe or a slow channel gap_x or gap_y", *at, "gap_um")
+        words = "requires a proximity probe or a slow channel gap_x or gap_y"
+        raise MisfitError(words, *at, "gap_um")
     if bearing.alarms.eccentricity_ratio is not None and not (in_x and in_y):
-        words = "needs the gaps in x and in y: proximity probes, or slow channels gap_x and gap_y"
+        words = "requires gaps in x and y, from proximity probes or slow channels gap_x and gap_y"
         raise MisfitError(words, *at, "eccentricity_ratio")
 
 
@@ -123,7 +124,7 @@ def _require_phase(
     for number, reference in enumerate(bearing.alarms.order1_reference):
         for place, vector in reference.vectors().items():
             if len(vector) == 2 and key_phase is None:
-                words = "phase needs the unit's key_phase; without it give the amplitude alone"
+                words = "phase requires key_phase of the unit; without it give the amplitude only"
                 raise MisfitError(words, *at, "order1_reference", number, place)
 
 
@@ -231,7 +232,7 @@ class UnitSettings(Settings):
                 raise MisfitError(_not_among(known), "bearing", number, key)
             if id_ in self._key_phases():
                 raise MisfitError(
-                    "is a key_phase channel, not a vibration channel", "bearing", number, key
+                    "must be a vibration channel, not a key_phase channel", "bearing", number, key
                 )
         refuse_twice(("bearing", number, key, id_) for key, id_ in used)
 
@@ -241,28 +242,26 @@ class UnitSettings(Settings):
     def _check_key_phase(self) -> None:
         if self.key_phase is not None and self.key_phase not in self._key_phases():
             words = ", ".join(self._key_phases()) or "none"
-            raise MisfitError(
-                f'must have transducer "key_phase"; such channels: {words}', "key_phase"
-            )
+            raise MisfitError(f'must have transducer "key_phase"; known: {words}', "key_phase")
 
     def _check_slow(self, id_: str | None, unit: str, *at: int | str) -> None:
         units = {channel.id: channel.unit for channel in self.slow_channel}
         if id_ is not None and id_ not in units:
             raise MisfitError(_not_among(units), *at)
         if id_ is not None and units[id_] != unit:
-            raise MisfitError(f"is a slow channel in {units[id_]}, must be one in {unit}", *at)
+            raise MisfitError(f"must be a slow channel in {unit}, not {units[id_]}", *at)
 
     def _check_simulation(self) -> None:
         simulation = self.simulation
         if simulation is None:
             if isinstance(self.source, SimulatedSettings):
-                raise MisfitError("needs a [unit.simulation] table", "source", "kind")
+                raise MisfitError("requires a [unit.simulation] table", "source", "kind")
             return
         names = [bearing.bearing for bearing in simulation.bearing] or ["UJB", "LJB", "TJB"]
         for number, bearing in enumerate(self.bearing):
             if bearing.id not in names:
                 allowed = " or ".join(names)
-                raise MisfitError(f"a simulated bearing is {allowed}", "bearing", number, "id")
+                raise MisfitError(f"must be {allowed} in a simulation", "bearing", number, "id")
         cutoff_hz = simulation.hydraulic_cutoff_hz
         if cutoff_hz is not None and cutoff_hz >= self.rate_hz / 2:
             limit = f"must be below half the sampling rate, {self.rate_hz / 2:g} Hz"
@@ -270,4 +269,4 @@ class UnitSettings(Settings):
 
 
 def _not_among(known: Iterable[str]) -> str:
-    return f"no such channel; there are {', '.join(known) or 'none'}"
+    return f"unknown channel; known channels: {', '.join(known) or 'none'}"

@@ -214,7 +214,7 @@ def _event(row: tuple[Any, ...]) -> AlarmEvent:
 
 def _identity(found: dict[str, Any]) -> AlarmIdentity:
     if found["kind"] not in ALARM_KINDS:
-        raise ValueError(f"unknown kind of alarm {found['kind']!r}")
+        raise ValueError(f"unknown alarm kind {found['kind']!r}")
     return AlarmIdentity(found["unit"], found["subject"], found["kind"])
 
 

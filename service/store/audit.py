@@ -110,8 +110,8 @@ class AuditChain:
         if hash_ == head.hash:
             return None
         if head.number > newest.number:
-            return f"the head names entry {head.number}, the trail ended at {newest.number}"
-        return f"entry {head.number} is not the one that the head names"
+            return f"the head names entry {head.number}, but the trail ends at {newest.number}"
+        return f"entry {head.number} does not match the head's hash"
 
     def _update_head(self) -> None:
         """Write the head file in a transaction, so that no process can write an older head later.

@@ -67,7 +67,7 @@ def checked(path: Path) -> Content:
         If the backup is damaged, is not the database of a live plant, or has a newer schema.
     """
     if not path.is_file():
-        raise BackupError(f"{path}: there is no such file")
+        raise BackupError(f"{path}: the file does not exist")
     try:
         # immutable: no journal is read or created
         uri = f"{path.absolute().as_uri()}?mode=ro&immutable=1"
@@ -161,7 +161,7 @@ def back_up(database: Path, folder: Path, now_ns: int, n_kept: int) -> Backup:
         If no verified backup was made; the folder is then unchanged.
     """
     if not database.is_file():
-        raise BackupError(f"{database}: there is no such database")
+        raise BackupError(f"{database}: the database does not exist")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with alone_in(folder):
@@ -180,7 +180,7 @@ def _back_up(database: Path, folder: Path, now_ns: int, n_kept: int) -> Backup:
         expected = _copy(database, aside)
         found = checked(aside)
         if found != expected:
-            raise BackupError(f"{aside} does not hold what {database} held: {found}, {expected}")
+            raise BackupError(f"{aside} differs from {database}: {found}, expected {expected}")
         put_in_place(aside, path)
     except BaseException:
         aside.unlink(missing_ok=True)
@@ -247,7 +247,7 @@ def restore(copy: Path, database: Path, now_ns: int) -> Restored:
     """
     content = checked(copy)
     if database.exists() and copy.samefile(database):
-        raise BackupError(f"{copy} is the database itself")
+        raise BackupError(f"{copy} is the database itself; name a copy")
     try:
         database.parent.mkdir(parents=True, exist_ok=True)
         return Restored(database, _replace(copy, database, now_ns), content)

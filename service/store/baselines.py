@@ -201,7 +201,7 @@ class BaselineTables(AuditedTables):
         try:
             return {unit: response_from_json(document) for unit, document in rows}
         except ValueError as error:
-            raise StoreError(f"the response of a shaft: {error}") from error
+            raise StoreError(f"shaft response: {error}") from error
 
     def _add_steps(self, writer: Connection, steps: Sequence[StoredStep]) -> None:
         self._audit.add(writer, _actions(writer, steps))

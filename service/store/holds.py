@@ -37,8 +37,7 @@ FORGETFUL = {
     "aufs": _CONTAINER,
     "vfat": _NO_JOURNAL,
     "exfat": _NO_JOURNAL,
-    "virtiofs": "is on another machine: it depends on that machine's settings whether acknowledged"
-    " writes are kept",
+    "virtiofs": "is on another machine, whose settings decide whether acknowledged writes are kept",
 }
 FUSE = "is served by a program that may not keep acknowledged writes"
 

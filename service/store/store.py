@@ -185,7 +185,7 @@ class Store:
         with self._reader() as reader:
             found = [_gap(row) for row in reader.execute(f"{SELECT_GAPS} {in_range}", bounds)]
         if len(found) > MAX_GAPS:
-            raise QueryTooLargeError(f"more than {MAX_GAPS} gaps: ask for a shorter time")
+            raise QueryTooLargeError(f"more than {MAX_GAPS} gaps; request a shorter time range")
         return found
 
     def reach(self, unit: str) -> Reach | None:

@@ -119,8 +119,8 @@ def _chunks(reader: Connection, query: TrendQuery, spans: Iterable[Span]) -> Ite
 def too_large() -> QueryTooLargeError:
     """Return the error for a query that would read too many single readings."""
     return QueryTooLargeError(
-        f"more than {MAX_ROWS} single readings would have to be read: ask for a shorter time, for"
-        " fewer points, or for bounds of eccentricity and oil temperature at whole cells"
+        f"more than {MAX_ROWS} single readings would have to be read; request a shorter time range,"
+        " fewer points, or bounds of eccentricity and oil temperature at whole cells"
     )
 
 

@@ -56,7 +56,7 @@ class Program:
         assert self.process.stdout is not None
         async with asyncio.timeout(PATIENCE_S):
             line = (await self.process.stdout.readline()).decode()
-        assert line.startswith("padwatch: to make the first account"), line
+        assert line.startswith("padwatch: token to create the first account"), line
         return line.rpartition(" ")[2].strip()
 
     async def get(self, path: str, **parameters: Any) -> Any:

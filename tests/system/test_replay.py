@@ -155,7 +155,7 @@ def test_a_replay_that_only_shall_be_stored_ends_by_itself_and_is_mixed_with_not
 
     again = padwatch(*command, "--out", results)
     assert again.exit_code == 1
-    assert "holds results already; a replay needs a folder of its own" in again.stderr
+    assert "contains results already; use a new folder for each replay" in again.stderr
 
     text = plant.read_text().replace("port = 0", "port = 502")
     live = tmp_path / "live.toml"
@@ -179,4 +179,4 @@ async def test_a_replay_whose_daq_is_killed_ends_and_says_that_results_are_incom
     async with asyncio.timeout(PATIENCE_S):
         assert await program.process.wait() == 1
     await program.end()
-    assert "ended before its recordings did: results are incomplete" in program.errors
+    assert "ended before its recordings; results are incomplete" in program.errors

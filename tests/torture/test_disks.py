@@ -88,7 +88,7 @@ def _filled_and_freed(bench: Bench, disk: Path) -> float:
             alarm = until(lambda: bench.active(NOT_STORED))[0]["id"]
             bench.wait_for_newer()
             comment = {"actor": "Anna", "text": "is somebody there?"}
-            with pytest.raises(RefusedError, match="Nothing was done") as refused:
+            with pytest.raises(RefusedError, match="Action not applied") as refused:
                 api.post(f"/api/v1/alarms/{alarm}/comment", comment)
             assert refused.value.status == 503
         freed_s = time.monotonic()
@@ -111,7 +111,7 @@ def test_a_slow_disk_holds_up_nothing_but_itself(
         bench.watch.wait_for_result()
         found = bench.end()
     torture.figure(f"every sync takes {SLOW_US / 1e6:g} s\n  {found.counts}")
-    assert alarm["condition_reason"] == "the store does not answer"
+    assert alarm["condition_reason"] == "the store does not respond"
     assert len(set(pace)) == len(pace)
     assert found.wrong == {}
     assert found.n_results > 0

@@ -63,7 +63,7 @@ def _candump_lines(stream: BinaryIO) -> Iterator[str]:
             raise ConfigError(f"line {number}: {CUT_OFF}")
         match = _CANDUMP_LINE.fullmatch(line)
         if match is None and line.strip():
-            raise ConfigError(f"line {number}: {line[:60]!r} is not a frame")
+            raise ConfigError(f"line {number}: {line[:60]!r} is not a candump frame")
         if match is not None and match["error"] is None:
             yield line
 
@@ -79,13 +79,13 @@ def _blf_frames(stream: BinaryIO) -> Iterator[can.Message]:
     reader = _CountingBlfReader(stream)
     if reader.file_size != size:
         raise ConfigError(
-            f"the file has {size} bytes, its header says {reader.file_size}: cut off, or its writer"
-            " has not finished it"
+            f"the file has {size} bytes, but {reader.file_size} according to its header; it is"
+            " truncated or unfinished"
         )
     try:
         yield from reader
     except BLFParseError as error:
-        raise ConfigError(f"damaged: {error or 'not an object'}") from error
+        raise ConfigError(f"the file is damaged: {error or 'invalid object'}") from error
     reader.require_all()
 
 
@@ -103,15 +103,15 @@ class _CountingBlfReader(can.BLFReader):
 
     def require_all(self) -> None:
         if self._tail.strip(b"\0"):
-            raise ConfigError("cut off: it ends within an object")
+            raise ConfigError("the file is truncated: it ends within an object")
         if self.n_objects < self.object_count:
-            raise ConfigError(f"{self.n_objects} objects, the header says {self.object_count}")
+            raise ConfigError(f"file has {self.n_objects} objects, expected {self.object_count}")
 
     def _parse_container(self, data: bytes) -> Iterator[can.Message]:
         known, at = self._tail + data, -1
         for frame in super()._parse_container(data):
             if self._pos == at:  # python-can would loop endlessly
-                raise ConfigError("damaged: an object of length 0")
+                raise ConfigError("the file is damaged: an object has length 0")
             at = self._pos
             yield frame
         self.n_objects += known.count(b"LOBJ", 0, len(known) - len(self._tail))
@@ -130,12 +130,12 @@ def _of_one_bus(frames: Iterator[can.Message], job: ImportJob) -> Iterator[can.M
             yield frame
         elif not job.bus:
             raise ConfigError(
-                f'has frames of bus "{bus}" and of bus "{found}": say by bus = "{bus}" which is'
-                " meant"
+                f'the log has frames of bus "{bus}" and of bus "{found}"; select one, such as'
+                f' bus = "{bus}"'
             )
         other = found
     if other and not n_taken:
-        raise ConfigError(f'has no frame of bus "{bus}", but of bus "{other}"')
+        raise ConfigError(f'the log has no frame of bus "{bus}"; its bus is "{other}"')
 
 
 def _require_possible(frame: can.Message, number: int) -> None:
@@ -145,8 +145,8 @@ def _require_possible(frame: can.Message, number: int) -> None:
     is_sound = n_bytes <= limit and n_bytes in CAN_FD_DLC and 0 <= frame.arbitration_id < id_limit
     if not is_sound or (not frame.is_remote_frame and frame.dlc != n_bytes):
         raise ConfigError(
-            f"frame {number}: id {frame.arbitration_id:#x}, length {frame.dlc}, {n_bytes} bytes of"
-            " data are impossible on a bus"
+            f"frame {number}: id {frame.arbitration_id:#x}, length {frame.dlc} and {n_bytes} bytes"
+            " of data are not a valid CAN frame"
         )
     if not abs(frame.timestamp) < 2**33:  # NaN, too
         raise ConfigError(f"frame {number}: {frame.timestamp} s is not a valid time")

@@ -18,7 +18,9 @@ from acquisition.recordings.imports.series import counts_are_kept, engineering_u
 from acquisition.recordings.imports.times import TimeArray, from_start, numbers_to_ns, text_to_ns
 from core.arrays import FloatArray, RawArray
 
-CUT_OFF = "the file ends within it; if it is whole, put an end to its last line"
+CUT_OFF = "the line has no line end; add it if the file is complete"
+
+OR_BEFORE = " or a line shortly before it"
 
 MAX_LINE_BYTES = 1_000_000
 MAX_COLUMNS = 4096
@@ -54,7 +56,7 @@ class _CsvFile:
         self._cells = self._parsed()
         self._headings = [heading.strip() for heading in next(self._cells, [])]
         if len(self._headings) > MAX_COLUMNS:
-            raise self._wrong(f"{len(self._headings)} columns; at most {MAX_COLUMNS} are read")
+            raise self._wrong(f"expected at most {MAX_COLUMNS} columns, got {len(self._headings)}")
         mapped = [(c.place, c.unit) for c in job.channels] + [(c.place, c.unit) for c in job.slow]
         for place, unit in mapped:
             require_unit(place, unit_in(place.name), unit)
@@ -82,15 +84,15 @@ class _CsvFile:
         while line := self._stream.readline(MAX_LINE_BYTES + 1):
             self._n_lines += 1
             if len(line) > MAX_LINE_BYTES:
-                raise self._wrong(f"longer than {MAX_LINE_BYTES} bytes")
+                raise self._wrong(f"the line is longer than {MAX_LINE_BYTES} bytes")
             if not line.endswith(b"\n"):
                 raise self._wrong(CUT_OFF)
             if b"\0" in line:
-                raise self._wrong("has a NUL byte")
+                raise self._wrong("the line contains a NUL byte")
             try:
                 yield line.decode("utf-8-sig" if self._n_lines == 1 else "utf-8")
             except UnicodeDecodeError as error:
-                raise self._wrong("not UTF-8 text") from error
+                raise self._wrong("the line is not valid UTF-8") from error
 
     def _parsed(self) -> Iterator[list[str]]:
         try:
@@ -101,7 +103,7 @@ class _CsvFile:
     def _complete(self) -> Iterator[list[str]]:
         for row in filter(None, self._cells):  # skips empty lines
             if len(row) != len(self._headings):
-                raise self._wrong(f"{len(row)} columns where the header has {len(self._headings)}")
+                raise self._wrong(f"expected {len(self._headings)} columns, got {len(row)}")
             yield row
 
     def _column(self, place: ColumnName) -> int:
@@ -125,7 +127,7 @@ class _CsvFile:
             return np.stack([engineering_units(v, channel, None) for channel, v in pairs])
         counts = np.stack(values)
         if not np.all((counts == np.rint(counts)) & (np.abs(counts + 0.5) < 32768)):
-            raise self._wrong("or one of those before it: no count of a 16-bit converter")
+            raise self._wrong("a value is not a count of a 16-bit converter", OR_BEFORE)
         return counts.astype(np.int16)
 
     def _slow_values(self, number: int, columns: _Columns) -> FloatArray:
@@ -144,13 +146,13 @@ class _CsvFile:
         for mark in {"_", "."} - {decimal}:
             if mark in "".join(texts):
                 text = next(text for text in texts if mark in text)
-                raise self._wrong(f"or one of those before it: {mark!r} in number {text[:40]!r}")
+                raise self._wrong(f"number {text[:40]!r} contains {mark!r}", OR_BEFORE)
         try:
             for text in texts:
                 found.append(of(text.replace(decimal, ".")))
         except (ValueError, OverflowError) as error:
-            raise self._wrong(f"or one of those before it: no {noun} {text[:40]!r}") from error
+            raise self._wrong(f"{text[:40]!r} is not a valid {noun}", OR_BEFORE) from error
         return np.array(found)
 
-    def _wrong(self, what: str) -> ConfigError:
-        return ConfigError(f"line {self._n_lines}: {what}")
+    def _wrong(self, what: str, or_before: str = "") -> ConfigError:
+        return ConfigError(f"line {self._n_lines}{or_before}: {what}")

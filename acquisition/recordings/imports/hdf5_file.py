@@ -28,13 +28,13 @@ def hdf5_file(path: Path) -> SeriesFile:
         for n, part in enumerate(parts):
             link = at.get(part, getlink=True) if isinstance(at, h5py.Group) else None
             if link is None:
-                raise ConfigError(f"dataset {str(place)[:200]!r} is not there")
+                raise ConfigError(f"dataset {str(place)[:200]!r} does not exist")
             if not isinstance(link, h5py.HardLink):
-                words = "is a link to elsewhere; it is not followed"
+                words = "is a soft or external link; only hard links are followed"
                 raise ConfigError(f"{'/'.join(parts[: n + 1])[:200]!r} {words}")
             at = at[part]
         if not isinstance(at, h5py.Dataset):
-            raise ConfigError(f"{str(place)[:200]!r} is no dataset")
+            raise ConfigError(f"{str(place)[:200]!r} is not a dataset")
         _require_plain(at, place)
         return _series(at)
 
@@ -45,14 +45,14 @@ def _require_plain(dataset: Any, place: ColumnName) -> None:
     n_bytes = math.prod(dataset.chunks or ()) * dataset.dtype.itemsize
     words = ""
     if dataset.is_virtual or dataset.external:
-        words = "has its values in another file"
+        words = "has its values in another file, which is not read"
     elif n_bytes > _MAX_CHUNK_BYTES:
-        words = f"has chunks of {n_bytes} bytes; up to {_MAX_CHUNK_BYTES} can be read"
+        words = f"has chunks of {n_bytes} bytes; the maximum is {_MAX_CHUNK_BYTES}"
     elif len(dataset.shape or ()) != 1 or dataset.dtype.kind not in "iuf":
         shape = f"shape {dataset.shape} of {dataset.dtype}"
-        words = f"has {shape}; needed is one dimension of numbers"
+        words = f"has {shape}; expected one dimension of numbers"
     elif not _is_written(dataset):
-        words = "is longer than what was written of it: whatever wrote it has not finished"
+        words = "is incomplete: some of its chunks have not been written"
     if words:
         raise ConfigError(f"dataset {str(place)[:200]!r} {words}")
 

@@ -23,7 +23,7 @@ def mdf_file(path: Path, job: ImportJob) -> SeriesFile:
     """Open an MDF file; columns are named by channel and, if ambiguous, by group name or number."""
     with path.open("rb") as stream:
         if stream.read(len(_MAGIC)) != _MAGIC:  # asammdf extracts archives to the disk
-            raise ConfigError("not an MDF file of version 4, or not finished")
+            raise ConfigError("not an MDF file of version 4, or an unfinished one")
     mdf = library("asammdf", "MDF4").MDF(path)
     is_local = bool(mdf.header.time_flags & _LOCAL_TIME)
     offset_s = job.time.utc_offset_s if is_local else 0
@@ -47,8 +47,8 @@ def _series(mdf: Any, group: int, index: int, place: ColumnName, start_ns: int) 
     kind = _NO_CONVERSION if conversion is None else conversion.conversion_type
     if kind not in (_NO_CONVERSION, _LINEAR):
         raise ConfigError(
-            f"channel {str(place)[:200]!r} has a conversion of kind {kind}; only linear ones"
-            " are read"
+            f"channel {str(place)[:200]!r} has a conversion of type {kind}; only linear"
+            " conversions are supported"
         )
     is_linear = kind == _LINEAR
     gain, offset = (float(conversion.a), float(conversion.b)) if is_linear else (1.0, 0.0)
@@ -73,7 +73,7 @@ def _series(mdf: Any, group: int, index: int, place: ColumnName, start_ns: int) 
         found = mdf.get_master(group, record_offset=start, record_count=stop - start)
         us = np.rint(found.astype(np.float64) * 1e6)
         if len(us) != stop - start or not np.all(np.abs(us) < 2**53):
-            raise ConfigError("a group without a usable time channel")
+            raise ConfigError("a channel group has no valid time channel")
         return utc_ns(us.astype(np.int64), start_ns)
 
     is_int16 = channel.bit_count == 16 and raw(0, 1).dtype == np.int16

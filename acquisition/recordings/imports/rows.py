@@ -135,13 +135,15 @@ class Indexer:
         """Update index or epoch for a gap or a device restart before the row at this time."""
         step = (time_ns - self._last_ns) / self._period_ns
         if step <= 0:
-            raise ConfigError(f"row {self._row + 1}: time goes back by {-step:.3f} samples")
+            raise ConfigError(
+                f"row {self._row + 1}: time goes back by {-step:.3f} sampling periods"
+            )
         off = float(self._deviations(np.array([time_ns], dtype=np.int64))[0])
         n_missing = round(off)
         is_whole = abs(off - n_missing) <= self._tolerance
         in_one_step = abs(step - 1 - n_missing) <= 2 * self._tolerance
         if step < _GAP_STEP or not in_one_step or n_missing < 1:
-            raise self._irregular(piece, f"a stamp {off:+.3f} samples off its place")
+            raise self._irregular(piece, f"the time stamp deviates by {off:+.3f} sampling periods")
         if is_whole:
             self._next_index += n_missing
             self._expected_ns = (self._expected_ns or 0.0) + n_missing * self._period_ns
@@ -155,15 +157,17 @@ class Indexer:
         if len(steps) >= _MIN_STEPS or (self._row == 0 and len(steps) > 1):
             low, high = _MEDIAN_STEP
             if not low <= float(np.median(steps)) <= high:
-                raise self._irregular(piece, f"a step of {np.median(steps):.4g} samples")
+                raise self._irregular(
+                    piece, f"the median step is {np.median(steps):.4g} sampling periods"
+                )
 
     def _irregular(self, piece: TimeArray, what: str) -> ConfigError:
         steps = np.diff(piece)
         plain = steps[(steps > 0) & (steps <= 2 * np.median(steps))] if len(steps) else steps
-        found = f"; there they come at {NS_PER_S / plain.mean():.6g} Hz" if len(plain) else ""
+        found = f", found about {NS_PER_S / plain.mean():.6g} Hz" if len(plain) else ""
         return ConfigError(
-            f"row {self._row + 1}: {what} where samples at {self._rate_hz:.9g} Hz are needed"
-            f"{found}; padwatch does not resample"
+            f"row {self._row + 1}: {what}; expected samples at {self._rate_hz:.9g} Hz{found};"
+            " padwatch does not resample"
         )
 
 

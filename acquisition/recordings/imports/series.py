@@ -119,11 +119,11 @@ def _common_length(channels: Sequence[tuple[ChannelColumn, Series]]) -> int:
     for column, series in channels:
         if series.n_samples != n_samples:
             raise ConfigError(
-                f"column {str(column.place)!r} has {series.n_samples} samples, column"
-                f" {str(first.place)!r} has {n_samples}; waveform channels are sampled together"
+                f"column {str(column.place)!r} has {series.n_samples} samples, but column"
+                f" {str(first.place)!r} has {n_samples}; waveform channels must be sampled together"
             )
     if not 1 <= n_samples <= MAX_SAMPLES:
-        raise ConfigError(f"{n_samples} samples per channel; 1 to {MAX_SAMPLES} can be read")
+        raise ConfigError(f"expected 1 to {MAX_SAMPLES} samples per channel, got {n_samples}")
     return n_samples
 
 
@@ -135,8 +135,8 @@ def _common_times_ns(
     for other, read_other in others:
         if np.any(np.abs(read_other(start, stop) - times_ns) > 1000):
             raise ConfigError(
-                f"column {str(other.place)!r} was not sampled at the times of column"
-                f" {str(first.place)!r}"
+                f"columns {str(other.place)!r} and {str(first.place)!r} differ in their times by"
+                " more than 1 µs; waveform channels must be sampled together"
             )
     return times_ns
 
@@ -153,8 +153,8 @@ class _SlowFeed:
         own_time = column.time is not None or job.time.kind == "file"
         if not own_time and self._series.n_samples != n_rows:
             raise ConfigError(
-                f"slow channel {column.id} has {self._series.n_samples} values, the waveforms"
-                f" {n_rows}: it needs a time column of its own"
+                f"slow channel {column.id} has {self._series.n_samples} values, but the waveforms"
+                f" have {n_rows}; name a time column of the slow channel"
             )
 
     def at(self, times_ns: TimeArray) -> FloatArray:
@@ -170,7 +170,7 @@ class _SlowFeed:
     def _read(self, start: int, stop: int) -> None:
         self._times_ns = np.append(self._times_ns, self._read_times_ns(start, stop))
         if np.any(np.diff(self._times_ns) < 0):
-            raise ConfigError(f"the time of slow channel {self._slow.id} goes back")
+            raise ConfigError(f"the times of slow channel {self._slow.id} go back")
         found = _numbers(self._series.values, start, stop, self._slow.place)
         scale = (self._series.per_count or 1.0) * self._slow.factor
         values = found.astype(np.float64) * scale + self._slow.offset
@@ -188,8 +188,8 @@ def _times_of(
     if place is None:
         if series.times_ns is None:
             raise ConfigError(
-                f"column {str(column.place)[:200]!r} has no time of its own: name a time column or"
-                " a start"
+                f"column {str(column.place)[:200]!r} has no times in the file; name a time column"
+                " or a start"
             )
         return series.times_ns
     times = file.find(place)
@@ -207,8 +207,8 @@ def _numbers(read: Read, start: int, stop: int, place: ColumnName) -> npt.NDArra
     values = read(start, stop)
     if values.shape != (stop - start,) or values.dtype.kind not in "iuf":
         raise ConfigError(
-            f"column {str(place)[:200]!r}: {values.dtype} of shape {values.shape} where"
-            f" {stop - start} numbers are needed"
+            f"column {str(place)[:200]!r}: expected {stop - start} numbers, got {values.dtype} of"
+            f" shape {values.shape}"
         )
     return values
 
@@ -227,9 +227,9 @@ def require_one(found: Sequence[Any], place: ColumnName, known: Sequence[str]) -
         If no column or more than one column matches.
     """
     if len(found) != 1:
-        words = f"there {len(found)} times: name its group" if found else "not there"
+        words = f"occurs {len(found)} times; name its group" if found else "does not exist"
         names = ", ".join(known[:12])[:300]
-        raise ConfigError(f"column {str(place)[:200]!r} is {words}; the file has {names}")
+        raise ConfigError(f"column {str(place)[:200]!r} {words}; the file has {names}")
     return found[0]
 
 

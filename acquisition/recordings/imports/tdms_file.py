@@ -88,24 +88,24 @@ def _require_whole(stream: BinaryIO) -> None:
         stream.seek(at)
         lead = stream.read(_LEAD.size)
         if len(lead) < _LEAD.size:
-            raise ConfigError(f"cut off within the segment at {at}")
+            raise ConfigError(f"the file is truncated: the segment at byte {at} is incomplete")
         magic, contents, n_bytes = _LEAD.unpack(lead)
         if contents & _BIG_ENDIAN:  # applies to all fields except the table of contents
             n_bytes = int.from_bytes(n_bytes.to_bytes(8, "little"), "big")
         if magic != b"TDSm":
-            raise ConfigError(f"no TDMS file, or damaged: there is no segment at {at}")
+            raise ConfigError(f"not a TDMS file, or a damaged one: byte {at} begins no segment")
         if n_bytes == _UNFINISHED:
-            raise ConfigError("whatever wrote it has not finished its last segment")
+            raise ConfigError(f"the file is unfinished: the segment at byte {at} has no length")
         at += _LEAD.size + n_bytes
     if at > size:
-        raise ConfigError(f"cut off: its last segment ends at {at}, the file at {size}")
+        raise ConfigError(f"the file is truncated: it has {size} bytes, expected {at}")
     stream.seek(0)
 
 
 def _stamps_ns(stamps: Any) -> npt.NDArray[np.int64]:
     seconds: npt.NDArray[np.int64] = np.asarray(stamps["seconds"]).astype(np.int64) + _EPOCH_1904_S
     if np.any(np.abs(seconds) > 2**33):
-        raise ConfigError("a time stamp beyond the year 2242")
+        raise ConfigError("a time stamp is after the year 2242")
     # the upper 53 of 64 bits are exact in a double, a resolution far below the microsecond needed
     us = np.rint((np.asarray(stamps["second_fractions"]) >> np.uint64(11)) * 2.0**-53 * 1e6)
     found: npt.NDArray[np.int64] = seconds * NS_PER_S + us.astype(np.int64) * 1000

@@ -37,13 +37,13 @@ def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None
     """
     origin, _, unit = axis.form.partition("_")
     if unit not in _US_PER:
-        raise ConfigError(f"a time column of numbers cannot be of form {axis.form!r}")
+        raise ConfigError(f"a time column of numbers cannot have the form {axis.form!r}")
     if values.dtype.kind not in "iuf":
-        raise ConfigError(f"a time column of type {values.dtype}; it must be numbers")
+        raise ConfigError(f"the time column must be numbers, got {values.dtype}")
     if origin == "epoch":
         start_ns = -axis.utc_offset_s * 1_000_000_000
     if start_ns is None:
-        raise ConfigError("time counts from a start that neither file nor mapping gives")
+        raise ConfigError("the start of elapsed times is neither in the file nor in the mapping")
     return utc_ns(_whole_us(values, _US_PER[unit]), start_ns)
 
 
@@ -58,7 +58,7 @@ def utc_ns(us: TimeArray, start_ns: int) -> TimeArray:
     found = us + np.int64(start_ns // 1000)
     wrong = np.abs(found) >= _MAX_US
     if wrong.any():
-        raise ConfigError(f"a time of {found[wrong][0] / 1e6:.6g} s since 1970 is out of range")
+        raise ConfigError(f"time {found[wrong][0] / 1e6:.6g} s since 1970 is out of range")
     return found * 1000
 
 
@@ -68,7 +68,7 @@ def _whole_us(values: npt.NDArray[Any], us_per_unit: float) -> TimeArray:
     exact = np.rint(values.astype(np.float64) * us_per_unit)
     wrong = ~(np.abs(exact) < _MAX_US)  # NaN is wrong, too
     if wrong.any():
-        raise ConfigError(f"{values[wrong][0]} in the time column is not a valid time")
+        raise ConfigError(f"value {values[wrong][0]} of the time column is not a valid time")
     return exact.astype(np.int64)
 
 
@@ -88,7 +88,7 @@ def _text_to_us(text: str, zone: timezone) -> int:
     try:
         time = datetime.fromisoformat(text.strip())
     except ValueError as error:
-        raise ConfigError(f"{text[:40]!r} in the time column is not an ISO 8601 time") from error
+        raise ConfigError(f"{text[:40]!r} of the time column is not an ISO 8601 time") from error
     if time.tzinfo is None:
         time = time.replace(tzinfo=zone)
     return (time - _EPOCH) // _MICROSECOND
@@ -114,4 +114,6 @@ def library(name: str, what: str) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        raise ConfigError(f"{what} needs {name}: pip install 'padwatch[imports]'") from error
+        raise ConfigError(
+            f"importing {what} requires {name}; run pip install 'padwatch[imports]'"
+        ) from error

@@ -228,14 +228,14 @@ def _require_fit(first: RawBlock, shape: CanShape) -> None:
     expected = (len(shape.channels), len(shape.slow))
     if found != expected:
         raise ConfigError(
-            f"simulated CAN DAQ: channels and slow channels are {found} in the feed, {expected} in"
-            " its messages"
+            f"simulated CAN DAQ: numbers of channels and slow channels of the feed are {found},"
+            f" expected {expected}"
         )
     floats = first.counts.dtype.kind == "f"
     if floats != shape.floats:
-        kinds = {False: "a converter's counts", True: "engineering units"}
+        kinds = {False: "counts", True: "engineering units"}
         names = {False: "padwatch_int16", True: "padwatch_float32"}
         raise ConfigError(
-            f"simulated CAN DAQ: the samples are {kinds[floats]}, which need the profile"
+            f"simulated CAN DAQ: samples in {kinds[floats]} require profile"
             f' "{names[floats]}", not "{names[shape.floats]}"'
         )

@@ -126,14 +126,14 @@ class CanShape:
     def __post_init__(self) -> None:
         if not 1 <= len(self.channels) <= _MAX_CHANNELS or len(self.slow) > _MAX_SLOW:
             raise ConfigError(
-                f"simulated CAN DAQ: {len(self.channels)} channels and {len(self.slow)} slow ones;"
-                f" allowed are 1 to {_MAX_CHANNELS} and up to {_MAX_SLOW}"
+                f"simulated CAN DAQ: expected 1 to {_MAX_CHANNELS} channels and up to {_MAX_SLOW}"
+                f" slow channels, got {len(self.channels)} and {len(self.slow)}"
             )
         highest = (1 << 29) - 1 if self.extended else (1 << 11) - 1
         if not 0 <= self.base_id <= highest - len(self.messages) + 1:
             raise ConfigError(
-                f"simulated CAN DAQ: base_id is {self.base_id}, its {len(self.messages)} messages"
-                f" end at {highest}"
+                f"simulated CAN DAQ: {len(self.messages)} messages from base_id {self.base_id}"
+                f" exceed the highest CAN id, {highest}"
             )
 
     @property

@@ -69,7 +69,7 @@ class FifoDevice(ModbusDevice):
         self._n_dropped = 0
         first = self._feed.peek()
         if first is None or first.counts.dtype != np.int16:
-            raise ConfigError("a queue takes counts of a converter; the feed has none")
+            raise ConfigError("simulated FIFO queue: the feed must have 16-bit counts")
         self._rate_hz, self._feed_epoch = first.rate_hz, first.epoch
         self._position = self._feed.number(first) - 1
         self._offset = first_counter - first.first_index

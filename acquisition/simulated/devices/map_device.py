@@ -67,7 +67,7 @@ class MapDevice(ModbusDevice):
         self._spoilt: Counter[str] = Counter()
         self._beat = 0
         if self._feed.peek() is None:
-            raise ConfigError("the feed has nothing to show")
+            raise ConfigError("simulated Modbus device: the feed has no samples")
         self._take()
 
     @property

@@ -202,7 +202,7 @@ class RegisterMemory:
         offset = 2 * (address - self._start)
         if offset < 0 or offset + len(data) > len(self._data):
             raise ValueError(
-                f"registers {address} to {address + len(data) // 2} are not in"
+                f"registers {address} to {address + len(data) // 2} are not within"
                 f" {self._start} to {self._start + len(self._data) // 2}"
             )
         self._data[offset : offset + len(data)] = data

@@ -44,7 +44,7 @@ class RecordedFeed:
             If `n_samples` is less than 1.
         """
         if n_samples < 1:
-            raise ValueError(f"{n_samples} samples asked for; at least one is needed")
+            raise ValueError(f"n_samples must be at least 1, got {n_samples}")
         if n_samples != self._length:
             self._cut_to(n_samples)
         while not self._ready:

@@ -93,7 +93,7 @@ class RingDevice(ModbusDevice):
         self._n_restarts = self._newest = 0
         first = self._feed.take()
         if first is None:
-            raise ConfigError(f"the feed has not one slot of {settings.samples_per_slot}")
+            raise ConfigError(f"feed has fewer samples than a slot, {settings.samples_per_slot}")
         self.layout = _layout(first, settings)
         self._watch = ReadingWatch(self.layout)
         base = settings.base_address
@@ -256,9 +256,7 @@ def _layout(first: RawBlock, settings: RingDeviceSettings) -> RingLayout:
     Raises `ConfigError` if the slot has no int16 counts or the ring does not fit.
     """
     if first.counts.dtype != np.int16:
-        raise ConfigError(
-            f"a block ring carries 16-bit counts, and the feed gives {first.counts.dtype}"
-        )
+        raise ConfigError(f"block ring: samples must be 16-bit counts, got {first.counts.dtype}")
     n_slow = len(first.slow)
     layout = RingLayout(
         n_channels=len(first.counts),

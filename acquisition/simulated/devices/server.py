@@ -49,7 +49,7 @@ class DaqServer(ABC):
         """
         known = self._faults_by_name()
         if fault not in known:
-            raise LookupError(f"no fault is called {fault}; known are {', '.join(sorted(known))}")
+            raise LookupError(f"unknown fault {fault}; known faults: {', '.join(sorted(known))}")
         known[fault](count)
 
     async def __aenter__(self) -> Self:
@@ -123,7 +123,7 @@ class PseudoTerminal:
         try:
             self._ends = ours, theirs = os.openpty()
         except OSError as exc:
-            raise LinkError(f"cannot make a pseudo-terminal: {exc.strerror}") from exc
+            raise LinkError(f"cannot create a pseudo-terminal: {exc.strerror}") from exc
         self._path = os.ttyname(theirs)
         tty.setraw(theirs)
         os.set_blocking(ours, False)
@@ -179,13 +179,13 @@ def _set_link(link: Path, terminal: str) -> None:
     try:
         if os.path.lexists(link) and not _leads_to_terminal(link):
             raise ConfigError(
-                f"{link}: something else is there; a simulated DAQ makes a link of its own, which"
-                ' needs a free name such as "/tmp/line7", or "pty" for none'
+                f"{link}: the path is in use; the link of a simulated DAQ requires a free path such"
+                ' as "/tmp/line7", or "pty" for none'
             )
         _remove_link(link)
         link.symlink_to(terminal)
     except OSError as exc:
-        raise LinkError(f"{link}: cannot be made: {exc.strerror}") from exc
+        raise LinkError(f"{link}: the link cannot be created: {exc.strerror}") from exc
 
 
 def _remove_link(link: Path) -> None:

@@ -121,7 +121,7 @@ class LifeCourse:
         row = int(np.searchsorted(grid_ns, time_ns, side="right")) - 1
         if not 0 <= row < self._n_rows - 1:
             seed = self._inputs.unit_seed
-            raise ValueError(f"{time_ns} ns is no time in the life of unit {seed}")
+            raise ValueError(f"time {time_ns} ns is outside the life of unit {seed}")
         return row, float(time_ns - grid_ns[row]) / float(grid_ns[row + 1] - grid_ns[row])
 
     def _moment(
@@ -202,7 +202,7 @@ def history_until(plan: LifePlan, now_ns: int, years: float = 1.0) -> UnitLife:
     inputs = _inputs(plan, now_ns)
     time_ns, from_ns = inputs.operation.time_ns, now_ns - ns_from_s(years * YEAR_S)
     if from_ns < time_ns[0] - DAY_NS:
-        raise ValueError(f"years = {years:g} reach back beyond the life of unit {plan.seed}")
+        raise ValueError(f"years = {years:g} is longer than the life of unit {plan.seed}")
     selected = inputs.operation.is_turning & (time_ns >= from_ns) & (time_ns < now_ns)
     return life_of(inputs, plan.damage, np.asarray(selected))
 

@@ -57,13 +57,11 @@ class Damage:
     def __post_init__(self) -> None:
         minimum = -1.0 if self.kind in GAINS else 0.0
         if not (minimum < self.size < 1.0 and self.size != 0.0):
-            raise ValueError(
-                f"size = {self.size:g} of {self.kind} must lie between {minimum:g} and 1"
-            )
+            raise ValueError(f"size = {self.size:g} of {self.kind} must be {minimum:g} to 1")
         if not self.ramp_days >= 0.0:
             raise ValueError(f"ramp_days = {self.ramp_days:g} must be 0 or more")
         if not self.directions or not set(self.directions) <= set(DIRECTIONS):
-            raise ValueError(f"directions = {self.directions} must be of {DIRECTIONS}")
+            raise ValueError(f"directions = {self.directions} must be among {DIRECTIONS}")
 
     def extent(self, time_ns: TimeArray) -> FloatArray:
         """Return the fraction of `size` that the damage has reached, (n,)."""

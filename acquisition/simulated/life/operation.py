@@ -72,7 +72,7 @@ def time_grid_ns(start_ns: int, years: float, step_s: float = STEP_S) -> TimeArr
     """
     n = int(years * YEAR_S / step_s)
     if not n * step_s >= DAY_S:
-        raise ValueError(f"a life needs at least a day, got {years} years")
+        raise ValueError(f"years must be at least one day, got {years}")
     return start_ns + np.arange(n, dtype=np.int64) * np.int64(step_s * NS_PER_S)
 
 
@@ -98,7 +98,7 @@ class HeldLoad:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.load <= 1.0:
-            raise ValueError(f"load = {self.load:g} must lie above 0 and up to 1")
+            raise ValueError(f"load = {self.load:g} must be above 0 and at most 1")
 
 
 def wander(

@@ -123,7 +123,7 @@ class PadRing:
 
     def __post_init__(self) -> None:
         if self.n_pads < 3:
-            raise ValueError(f"a ring needs at least 3 pads, got {self.n_pads}")
+            raise ValueError(f"n_pads must be at least 3, got {self.n_pads}")
 
     @property
     def pad_angles_rad(self) -> FloatArray:
@@ -199,7 +199,7 @@ def _thickness_um(
     thickness_um = clearance_um - (cos * centre_um[0] + sin * centre_um[1])
     thinnest_um = float(np.min(thickness_um))
     if not thinnest_um > 0.0:
-        raise ValueError(f"the shaft touches a pad: film of {thinnest_um:.1f} µm")
+        raise ValueError(f"the shaft touches a pad: the thinnest film is {thinnest_um:.1f} µm")
     return np.asarray(thickness_um)
 
 

@@ -155,7 +155,7 @@ def output_map(machine: Unit, parameters: RotorParameters, matrices: RotorMatric
         part, row = places[channel.id]
         if (part, channel.measurand) not in maps:
             raise ConfigError(
-                f"channel {channel.id!r} of a {part} cannot measure {channel.measurand.value}"
+                f"channel {channel.id!r} of the {part} cannot measure {channel.measurand.value}"
             )
         rows.append(channel.direction * maps[part, channel.measurand][row])
     return np.stack(rows)
@@ -185,7 +185,9 @@ def _places(machine: Unit, parameters: RotorParameters) -> dict[str, tuple[str, 
     places = {}
     for bearing in machine.bearings:
         if bearing.id not in names:
-            raise ConfigError(f"a simulated unit has bearings {', '.join(names)}: {bearing.id!r}")
+            raise ConfigError(
+                f"the bearings of a simulated unit are {', '.join(names)}, got {bearing.id!r}"
+            )
         row = 2 * names.index(bearing.id)
         places[bearing.bearing_x] = (BEARING, row)
         places[bearing.bearing_y] = (BEARING, row + 1)

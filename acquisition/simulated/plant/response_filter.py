@@ -42,8 +42,8 @@ class ResponseFilter:
         off = np.abs(self.response_at(band_hz, rate_hz) - wanted) / np.abs(wanted).clip(1e-3)
         if not off.max() <= TOLERANCE:
             raise ConfigError(
-                f"a simulated transducer comes within {off.max():.2g} of {response} only,"
-                f" not within {TOLERANCE:g}, at {band_hz[off.argmax()]:.3g} Hz"
+                f"a simulated transducer deviates from {response} by {off.max():.2g} at"
+                f" {band_hz[off.argmax()]:.3g} Hz, allowed are {TOLERANCE:g}"
             )
 
     def advance(self, samples: FloatArray) -> FloatArray:
@@ -97,7 +97,7 @@ def _section(
             poles = _pole_pair(natural_hz, damping) if natural_hz < rate_hz / 4.0 else []
             return _fitted(response, poles, order=0, rate_hz=rate_hz)
         case ResponseTable():
-            raise ConfigError("a simulated transducer needs a model of its response, got a table")
+            raise ConfigError("simulated transducer requires a model of its response, got a table")
 
 
 def _pole_pair(natural_hz: float, damping: float) -> list[complex]:

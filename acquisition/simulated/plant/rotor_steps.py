@@ -126,7 +126,7 @@ def lift(rotor: DiscreteRotor, n_steps: int) -> LiftedRotor:
         If `n_steps` is less than 1.
     """
     if n_steps < 1:
-        raise ValueError(f"a block needs at least 1 step, got {n_steps}")
+        raise ValueError(f"n_steps must be at least 1, got {n_steps}")
     powers = [np.eye(rotor.transition.shape[0])]
     for _ in range(n_steps):
         powers.append(rotor.transition @ powers[-1])

@@ -141,7 +141,7 @@ class SimulatedUnit:
             If `n_samples` is less than 1.
         """
         if n_samples < 1:
-            raise ValueError(f"a block needs at least 1 sample, got {n_samples}")
+            raise ValueError(f"n_samples must be at least 1, got {n_samples}")
         first_index, slow = self._index, self._slow()
         parts = []
         while n_samples:
@@ -196,12 +196,12 @@ def _check(machine: Unit, calibration: UnitCalibration) -> None:
     if len(calibration.channels) != len(machine.channels):
         raise ConfigError(
             f"unit {machine.id!r} has {len(machine.channels)} channels,"
-            f" its calibration {len(calibration.channels)}"
+            f" but its calibration has {len(calibration.channels)}"
         )
     if calibration.rate_hz != machine.rate_hz:
         raise ConfigError(
             f"unit {machine.id!r} samples at {machine.rate_hz} Hz,"
-            f" its calibration says {calibration.rate_hz} Hz"
+            f" but its calibration has {calibration.rate_hz} Hz"
         )
 
 
@@ -219,9 +219,11 @@ def _exchanged(machine: Unit, calibration: UnitCalibration, scenario: Scenario) 
     pairs = []
     for pair in scenario.exchanged:
         if not rows.keys() >= set(pair):
-            raise ConfigError(f"unit {machine.id!r} has no channels {pair} to be exchanged")
+            raise ConfigError(f"unit {machine.id!r} has no channels {pair} to exchange")
         first, second = (calibration.channels[rows[id_]].full_scale_v for id_ in pair)
         if first != second:
-            raise ConfigError(f"channels {pair} cannot be exchanged: {first} V and {second} V")
+            raise ConfigError(
+                f"channels {pair} cannot be exchanged: their scales are {first} V and {second} V"
+            )
         pairs.append([rows[id_] for id_ in pair])
     return pairs

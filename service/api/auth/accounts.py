@@ -157,7 +157,7 @@ def refusals_as_problems(password: str = "password") -> Iterator[None]:  # noqa:
     except PasswordRefusedError as error:
         raise ProblemError(422, "Wrong parameter", str(error), password) from error
     except AccessRefusedError as error:
-        raise ProblemError(409, "Does not fit", str(error)) from error
+        raise ProblemError(409, "Conflict", str(error)) from error
     except TooManyLoginsError as error:
         detail = "too many concurrent logins; try again"
         raise ProblemError(503, "Busy", detail, headers={"Retry-After": "1"}) from error
@@ -219,8 +219,8 @@ def account_router(authenticator: Authenticator) -> APIRouter:
         The person must change this password at the next login.
         """
         if _is_own(request, name):
-            detail = "change your own password with POST /session/password"
-            raise ProblemError(409, "Does not fit", detail)
+            detail = "use POST /session/password to change your own password"
+            raise ProblemError(409, "Conflict", detail)
         await _one(authenticator, name)
         new = name, asked.password
         with refusals_as_problems():
@@ -233,7 +233,7 @@ def account_router(authenticator: Authenticator) -> APIRouter:
     async def remove(request: Request, name: AccountName) -> None:
         """Remove the account of another person, and end the sessions of the account."""
         if _is_own(request, name):
-            raise ProblemError(409, "Does not fit", "you cannot remove your own account")
+            raise ProblemError(409, "Conflict", "you cannot remove your own account")
         await _one(authenticator, name)
         with refusals_as_problems():
             await work.run(lambda: stored.remove(name, now_ns()))
@@ -276,7 +276,7 @@ def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
         """Create an API key for a machine; only this answer contains the secret of the key."""
         for unit in asked.units:
             if unit not in context.units:
-                detail = "there is no such unit in this plant"
+                detail = "unknown unit"
                 raise ProblemError(422, "Wrong parameter", detail, "units")
         new, now_ns = (asked.name, Role(asked.role), asked.units, asked.days), clock.now_ns()
         with refusals_as_problems():

@@ -108,7 +108,7 @@ def declared(app: FastAPI) -> Mapping[str, Declared]:
     found: dict[str, Declared] = {}
     for one in _all(app):
         if one.operation in found:
-            raise UndeclaredRouteError(f"{one.operation}: there are two such operations")
+            raise UndeclaredRouteError(f"{one.operation}: operation is declared twice")
         found[one.operation] = one
     return found
 
@@ -137,7 +137,7 @@ def _needs_of(app: FastAPI, method: str, path: str, context: Any, route: BaseRou
         return Needs(None, Reach.NO_UNIT)
     found = _needs_in(context.dependencies) if isinstance(route, APIRoute) else []
     if not found:
-        raise UndeclaredRouteError(f"{method} {path}: declares no permission; add needs() or OPEN")
+        raise UndeclaredRouteError(f"{method} {path}: route needs a permission or OPEN")
     return found[-1]
 
 

@@ -62,13 +62,13 @@ BEARER_ONLY = {"WWW-Authenticate": 'Bearer realm="padwatch"'}
 
 def not_logged_in() -> ProblemError:
     """Return the error with status 401 for an unauthenticated request."""
-    detail = "log in, or send a key that is valid"
+    detail = "log in, or send a valid API key"
     return ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
 
 
 def not_this_unit() -> ProblemError:
     """Return the error with status 403 for an API key that is not valid for the requested unit."""
-    detail = "this key is valid for some units only; request one of them"
+    detail = "this key is limited to some units; request one of them"
     return ProblemError(403, "Not allowed", detail)
 
 
@@ -111,7 +111,7 @@ class Gate:
         try:
             caller = await self._desk.caller(scope)
         except StoreError as error:
-            detail = "the store cannot be read just now"
+            detail = "the store cannot be read now"
             raise ProblemError(503, "Store not available", detail) from error
         scope.setdefault("state", {})[CALLER] = caller
         if caller.identity is None and not self._is_open(scope):
@@ -133,8 +133,8 @@ def _require_own_page(scope: Scope, caller: Caller) -> None:
         return
     requires_origin = caller.shown.kind is not Kind.NOTHING
     if is_foreign(scope["scheme"], scope["headers"], requires_origin):
-        detail = "requests from pages of another site are refused"
-        raise ProblemError(403, "Not from this site", detail)
+        detail = "requests from pages of other sites are rejected"
+        raise ProblemError(403, "Cross-site request", detail)
 
 
 def caller_of(request: Request) -> Caller:
@@ -160,11 +160,11 @@ async def require_declared(request: Request) -> None:
     if identity is None:
         raise not_logged_in()
     if identity.must_change_password and operation != CHANGE_PASSWORD:
-        detail = "an administrator set your password; change it first"
-        raise ProblemError(403, "Change your password", detail)
+        detail = "an administrator set your password; change it before other requests"
+        raise ProblemError(403, "Password change required", detail)
     if not identity.role.may(needed.permission):
         if identity.is_proven:
-            raise ProblemError(403, "Not allowed", "your role does not allow this")
+            raise ProblemError(403, "Not allowed", "your role does not permit this request")
         raise not_logged_in()
     unit = _unit_of(request.path_params)
     if needed.reach is Reach.ASKED:

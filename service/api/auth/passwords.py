@@ -53,12 +53,12 @@ def new_password(written: str, name: str) -> str:
     password = _normal(written)
     if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
         raise PasswordRefusedError(
-            f"a password has {MIN_LENGTH} to {MAX_LENGTH} characters, this one has {len(password)}"
+            f"a password must have {MIN_LENGTH} to {MAX_LENGTH} characters, got {len(password)}"
         )
     if len(set(password.casefold())) < MIN_DIFFERENT:
-        raise PasswordRefusedError(f"a password has at least {MIN_DIFFERENT} different characters")
+        raise PasswordRefusedError(f"a password must have {MIN_DIFFERENT} different characters")
     if len(name) > 2 and name in password.casefold():
-        raise PasswordRefusedError("a password must not contain the name of its account")
+        raise PasswordRefusedError("a password must not contain the name of the account")
     return password
 
 
@@ -191,4 +191,4 @@ def _tried(write: Callable[[], None]) -> None:
     try:
         write()
     except StoreError as error:
-        log.warning("the time of use of a login or key was not stored", reason=str(error))
+        log.warning("the time of use of a session or key was not stored", reason=str(error))

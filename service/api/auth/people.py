@@ -120,9 +120,9 @@ def create_key(
         If the validity period is out of range, or an admin key is limited to units.
     """
     if not 1 <= days <= MAX_DAYS:
-        raise AccessRefusedError(f"a key is valid for 1 to {MAX_DAYS} days, not for {days}")
+        raise AccessRefusedError(f"validity of a key must be 1 to {MAX_DAYS} days, got {days}")
     if role is Role.ADMIN and units:
-        raise AccessRefusedError("a key for some units cannot have the role admin")
+        raise AccessRefusedError("a key limited to units must not have the role admin")
     id_, shown = new_key()
     open_units = tuple(dict.fromkeys(units))
     expires_ns = now_ns + days * DAY_NS

@@ -56,7 +56,7 @@ class Refusals:
             await asyncio.to_thread(self._audit.record, [entry])
         except StoreError as error:
             self.n_more += n_before + 1
-            log.error("a refused request is not in the audit trail", reason=str(error))
+            log.error("a rejected request is missing in the audit trail", reason=str(error))
 
 
 REFUSED = (401, 403, 409, 413, 422, 429)

@@ -137,7 +137,7 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
     """Return the router for sessions and for the creation of the first account."""
     router = APIRouter(prefix="/api/v1", tags=["access"])
 
-    @router.get("/session", summary="The caller", dependencies=[OPEN])
+    @router.get("/session", summary="Current identity", dependencies=[OPEN])
     async def session(request: Request) -> SessionModel:
         """Return identity and permissions of the caller, and whether a login is required."""
         return await session_model(caller_of(request), authenticator)
@@ -168,7 +168,7 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
 
     @router.post(
         "/session/password",
-        summary="Change one's own password",
+        summary="Change your password",
         status_code=201,
         responses=PASSWORD_PROBLEMS,
         dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
@@ -190,7 +190,7 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
 
     @router.post(
         "/set-up",
-        summary="Make the first account",
+        summary="Create the first account",
         status_code=201,
         responses=SET_UP_PROBLEMS,
         dependencies=[OPEN],
@@ -200,8 +200,8 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
         with refusals_as_problems():
             is_made = await authenticator.set_up(asked.token, asked.name, asked.password)
         if not is_made:
-            detail = "the token is wrong or used up, or there is an account already"
-            raise ProblemError(403, "Not set up", detail)
+            detail = "the token is wrong or was used, or an account exists already"
+            raise ProblemError(403, "Setup rejected", detail)
         return await session_model(caller_of(request), authenticator)
 
     return router

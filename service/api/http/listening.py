@@ -76,7 +76,7 @@ def _remove_stale(path: Path) -> None:
     except OSError:
         return  # bind reports the error
     if not stat.S_ISSOCK(mode):
-        raise PortInUseError(f"cannot listen on {path}: it is not a socket")
+        raise PortInUseError(f"cannot listen on {path}: the file is not a socket")
     with closing(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)) as caller:
         try:
             caller.connect(str(path))
@@ -85,7 +85,7 @@ def _remove_stale(path: Path) -> None:
         except OSError as error:
             raise PortInUseError(f"cannot listen on {path}: {error.strerror}") from error
         else:
-            raise PortInUseError(f"cannot listen on {path}: it is used by another program")
+            raise PortInUseError(f"cannot listen on {path}: another program listens on it")
 
 
 class CertificateError(Exception):
@@ -111,7 +111,7 @@ def server_tls(certificate: Path, key: Path) -> ssl.SSLContext:
     except (ssl.SSLError, ValueError) as error:
         why = getattr(error, "reason", None) or str(error)
         raise CertificateError(
-            f"service.tls: {certificate} and {key} are not a certificate and its key: {why}"
+            f"service.tls: {certificate} and {key} must be a certificate and its key: {why}"
         ) from error
     return context
 

@@ -163,9 +163,7 @@ def alarm_rate_router(context: Context) -> APIRouter:
     router = subject_router("/alarms", "alarms", reach=Reach.ASKED)
     engine, films = context.alarms, context.films
 
-    @router.get(
-        "/rates", summary="How often alarms come", responses=problem_responses(404, 422, 503)
-    )
+    @router.get("/rates", summary="Alarm rates", responses=problem_responses(404, 422, 503))
     async def rates(
         unit: OnlyUnit = None,
         start: Annotated[Moment | None, time_query(*START)] = None,
@@ -196,5 +194,5 @@ def _check_span(start_ns: int, end_ns: int) -> None:
     require_order(start_ns, end_ns)
     if end_ns - start_ns > MAX_DAYS * DAY_NS:
         days = (end_ns - start_ns) / DAY_NS
-        detail = f"the range has {days:g} days; the maximum is {MAX_DAYS} days"
+        detail = f"the range is {days:g} days long; the maximum is {MAX_DAYS} days"
         raise ProblemError(422, "Wrong parameter", detail, "start")

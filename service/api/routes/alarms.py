@@ -140,7 +140,7 @@ OUTAGE = [needs(Permission.CHANGE_MEASURING)]
 UNKNOWN = {404: "Unknown alarm"}
 ACTION_PROBLEMS = problem_responses(403, 409, 422, 503, own=UNKNOWN)
 COMMENT_PROBLEMS = ACTION_PROBLEMS | problem_responses(
-    own={429: "Too many comments; Retry-After gives the wait"}
+    own={429: "Too many comments; Retry-After gives the time to wait"}
 )
 
 
@@ -220,7 +220,7 @@ def operation_router(context: Context) -> APIRouter:
     async def shelve(alarm: AlarmId, asked: ShelveModel) -> AlarmModel:
         """Hide an alarm for a limited time; an alarm still active afterwards is announced again."""
         if asked.duration_s > context.max_shelf_s:
-            detail = f"duration_s {asked.duration_s:g} is above {context.max_shelf_s:g}"
+            detail = f"duration_s must be at most {context.max_shelf_s:g}, got {asked.duration_s:g}"
             raise ProblemError(422, "Wrong parameter", detail, "duration_s")
         until_ns = context.clock.now_ns() + ns_from_s(asked.duration_s)
         return await _done(context, alarm, Shelve(actor_or(asked.actor), asked.reason, until_ns))
@@ -277,9 +277,9 @@ async def event_query(
     unit: OnlyUnit = None,
     alarm: Annotated[str | None, only("alarm", "U1:ujb_shaft_x:channel_not_ok", 128)] = None,
     kind: Annotated[AlarmKindName | None, only("kind", "channel_not_ok")] = None,
-    before: Annotated[int | None, before_number("Only events older than this id.")] = None,
+    before: Annotated[int | None, before_number("Return only events older than this id.")] = None,
     limit: Annotated[
-        int, Query(ge=1, le=MAX_EVENTS, description="Most events in the answer.")
+        int, Query(ge=1, le=MAX_EVENTS, description="Maximum number of events in the answer.")
     ] = 100,
     state: States = None,
 ) -> AlarmQuery:
@@ -307,9 +307,9 @@ async def _done(context: Context, id_: str, action: Action) -> AlarmModel:
     except LookupError as error:
         raise _unknown(id_) from error
     except ActionRefusedError as error:
-        raise ProblemError(409, "Does not fit", f"alarm {id_}: {error}") from error
+        raise ProblemError(409, "Conflict", f"alarm {id_}: {error}") from error
     return alarm_model(context.alarms, context.films, alarm)
 
 
 def _unknown(alarm: str) -> ProblemError:
-    return ProblemError(404, "Unknown alarm", f"there is no alarm {alarm!r}")
+    return ProblemError(404, "Unknown alarm", f"unknown alarm {alarm!r}")

@@ -133,9 +133,9 @@ async def audit_query(
     object: Annotated[  # noqa: A002  the name that callers know
         str | None, only("object", "U1:ujb_shaft_x:channel_not_ok", MAX_NAME)
     ] = None,
-    before: Annotated[int | None, before_number("Only entries older than this number.")] = None,
+    before: Annotated[int | None, before_number("Only entries below this number.")] = None,
     limit: Annotated[
-        int, Query(ge=1, le=MAX_ENTRIES, description="Most entries in the answer.")
+        int, Query(ge=1, le=MAX_ENTRIES, description="Maximum number of entries in the answer.")
     ] = 100,
 ) -> AuditQuery:
     """Return the query for audit entries from the checked query parameters."""

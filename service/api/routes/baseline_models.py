@@ -260,7 +260,7 @@ class BaselineActionModel(ActorModel):
 def _only_text(value: object) -> object:
     """Return the text of a time; raise ValueError for a number, whose unit is unknown."""
     if not isinstance(value, str):
-        raise ValueError("a time is written like 2026-11-21T08:00:00Z")
+        raise ValueError("a time must be RFC 3339, such as 2026-11-21T08:00:00Z")
     return written_as_date(value)
 
 

@@ -152,7 +152,7 @@ ACTION_PROBLEMS = problem_responses(
     503,
     own={
         404: "Unknown unit, bearing or version",
-        409: "Does not fit the baselines as they are now, or the film is not watched",
+        409: "Conflict with the present baselines, or the film is not monitored",
     },
 )
 
@@ -234,19 +234,19 @@ def baseline_action_router(context: Context) -> APIRouter:
         await asyncio.to_thread(_require_version, context, unit, bearing, version)
         return await _done(context, unit, bearing, Reject(version), asked)
 
-    @router.post("/freeze", summary="Learn no further", responses=ACTION_PROBLEMS)
+    @router.post("/freeze", summary="Freeze a baseline", responses=ACTION_PROBLEMS)
     async def freeze(
         unit: UnitId, bearing: BearingId, asked: BaselineActionModel
     ) -> BaselinesModel:
         """Suspend the learning of baselines; the version in force does not change."""
         return await _done(context, unit, bearing, Freeze(), asked)
 
-    @router.post("/thaw", summary="Learn again", responses=ACTION_PROBLEMS)
+    @router.post("/thaw", summary="Thaw a baseline", responses=ACTION_PROBLEMS)
     async def thaw(unit: UnitId, bearing: BearingId, asked: BaselineActionModel) -> BaselinesModel:
         """Resume learning after a freeze, until the end of the learning period."""
         return await _done(context, unit, bearing, Thaw(), asked)
 
-    @router.post("/renew", summary="Begin again", responses=ACTION_PROBLEMS)
+    @router.post("/renew", summary="Renew a baseline", responses=ACTION_PROBLEMS)
     async def renew(unit: UnitId, bearing: BearingId, asked: RenewModel) -> BaselinesModel:
         """Start a new baseline after a machine event, such as an overhaul.
 
@@ -254,7 +254,7 @@ def baseline_action_router(context: Context) -> APIRouter:
         """
         from_ns = ns_from_datetime(asked.event_time, "event_time")
         if from_ns < 0:
-            detail = f"event_time {rfc3339(from_ns)} lies before 1970"
+            detail = f"event_time must not be before 1970, got {rfc3339(from_ns)}"
             raise ProblemError(422, "Wrong parameter", detail, "event_time")
         return await _done(context, unit, bearing, Renew(from_ns), asked)
 
@@ -269,7 +269,7 @@ async def _done(
     try:
         await context.operators.act(place, action, actor_or(asked.actor), asked.reason)
     except BaselineRefusedError as error:
-        raise ProblemError(409, "Does not fit", f"{unit} {bearing}: {error}") from error
+        raise ProblemError(409, "Conflict", f"{unit} {bearing}: {error}") from error
     return await asyncio.to_thread(_baselines, context, unit, bearing)
 
 

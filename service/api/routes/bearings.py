@@ -33,8 +33,8 @@ from service.store.references import GapReference
 MicrometrePair = Annotated[
     list[float], Field(min_length=2, max_length=2, examples=[[1998.5, 2003.1]])
 ]
-SetTime = Annotated[Time, Field(description="Time when it was set.")]
-Author = Annotated[str, Field(description="Person who set it.", examples=["A. Name"])]
+SetTime = Annotated[Time, Field(description="Time at which the reference was set.")]
+Author = Annotated[str, Field(description="Person who set the reference.", examples=["A. Name"])]
 Note = Annotated[str, Field(description="Note of the author.", examples=["after the overhaul"])]
 
 
@@ -240,10 +240,10 @@ def bearing_router(context: Context) -> APIRouter:
         context.bearing(unit, bearing)
         if quantity not in BY_NAME or not BY_NAME[quantity].has_uncertainty:
             detail = f"quantity {quantity!r} has no uncertainty budget; see /api/v1/quantities"
-            raise ProblemError(404, "No such budget", detail)
+            raise ProblemError(404, "No uncertainty budget", detail)
         found = _budget(context.live.current(unit, bearing), quantity)
         if found is None:
-            detail = f"{quantity} has no budget now: no value, or too few segments yet"
+            detail = f"{quantity} has no uncertainty budget; it has no value or too few segments"
             raise ProblemError(409, "No result", detail)
         return found
 

@@ -299,7 +299,7 @@ def waveform_model(
     )
 
 
-NO_SAMPLES = {409: "There are no samples"}
+NO_SAMPLES = {409: "The unit has no samples"}
 NEWEST = "Duration of the newest samples; limited to those in memory."
 
 MAX_NUMBERS = 200_000
@@ -359,7 +359,7 @@ def channel_router(context: Context) -> APIRouter:
 def require_samples(settings: UnitSettings) -> None:
     """Raise a problem of status 409 if the source of a unit delivers no samples."""
     if isinstance(settings.source, ModbusVectorSettings):
-        detail = f"unit {settings.id!r} is read from a rack that gives amplitudes, not samples"
+        detail = f"unit {settings.id!r} has no samples; its rack reports amplitudes"
         raise ProblemError(409, "No samples", detail)
 
 
@@ -385,6 +385,6 @@ def _n_samples(seconds: float, rate_hz: float, n_channels: int) -> int:
     n_samples = max(1, round(seconds * rate_hz))
     if n_samples * n_channels > MAX_NUMBERS:
         longest_s = MAX_NUMBERS / n_channels / rate_hz
-        detail = f"{seconds:g} s of {n_channels} channels are too long; at most {longest_s:g} s"
+        detail = f"seconds must be at most {longest_s:g} for {n_channels} channels, got {seconds:g}"
         raise ProblemError(422, "Wrong parameter", detail, "seconds")
     return n_samples

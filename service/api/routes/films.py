@@ -250,7 +250,7 @@ def why_unwatched(context: Context, unit: str, bearing: str) -> str | None:
     if unit in context.films.unwatched:
         return context.films.unwatched[unit]
     is_watched = context.films.place(unit, bearing) is not None
-    return None if is_watched else "conditions need the oil_temperature of the bearing"
+    return None if is_watched else "operating conditions require oil_temperature of the bearing"
 
 
 def film_model(context: Context, unit: str, bearing: str) -> FilmModel:

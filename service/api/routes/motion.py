@@ -220,7 +220,7 @@ RECORDING_PROBLEMS = problem_responses(
     422,
     own={
         404: "Unknown recording or bearing",
-        409: "It has no samples of that bearing, or none at that time",
+        409: "The recording has no samples of the bearing, or none at that time",
     },
 )
 
@@ -354,5 +354,5 @@ def _unit_of(context: Context, kept: RecordingEntry) -> str:
 
 def _require_few(seconds: float, rate_hz: float) -> None:
     if seconds * rate_hz > MAX_SAMPLES:
-        detail = f"{seconds:g} s are too long; at most {MAX_SAMPLES / rate_hz:g} s"
+        detail = f"seconds must be at most {MAX_SAMPLES / rate_hz:g}, got {seconds:g}"
         raise ProblemError(422, "Wrong parameter", detail, "seconds")

@@ -296,7 +296,7 @@ def overview_router(context: Context) -> APIRouter:
     router = subject_router("", "plant")
     shown = Overview(context)
 
-    @router.get("/overview", summary="Everything at a glance", response_model=OverviewModel)
+    @router.get("/overview", summary="Overview", response_model=OverviewModel)
     async def overview() -> Response:
         """Return all units with bearings and films; values that are not current are null."""
         return await shown.answer()

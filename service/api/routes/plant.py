@@ -274,7 +274,7 @@ def plant_router(context: Context) -> APIRouter:
         Evidence reports of alarms state the version of the configuration.
         """
         if context.configuration is None:
-            raise ProblemError(404, "No configuration", "no configuration is kept here")
+            raise ProblemError(404, "No configuration", "this service has no configuration")
         found = context.configuration
         document = json.loads(found.text)
         return ConfigurationModel(

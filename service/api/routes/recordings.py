@@ -194,7 +194,7 @@ def recording_info(shelf: RecordingLibrary, kept: RecordingEntry) -> RecordingIn
     """
     manifest = kept.manifest
     if manifest is None or kept.fault is not None:
-        raise ConfigError(kept.fault or "its manifest cannot be read")
+        raise ConfigError(kept.fault or "the manifest cannot be read")
     summary = shelf.summary(kept.name)
     return RecordingInfoModel.of(
         summary,
@@ -219,7 +219,7 @@ RecordingId = Annotated[
     ),
 ]
 
-LIST_PROBLEMS = problem_responses(422, own={404: "No recordings are kept here"})
+LIST_PROBLEMS = problem_responses(422, own={404: "This process has no recordings"})
 
 PROBLEMS = problem_responses(
     410, 422, own={404: "Unknown recording", 503: "Too many concurrent downloads"}
@@ -322,7 +322,7 @@ async def _download(
 def library_of(context: Context) -> RecordingLibrary:
     """Return the library of recordings; raise a problem of status 404 if none are kept here."""
     if context.recordings is None:
-        words = "no recordings are kept here; see the process that analyses the unit"
+        words = "this process has no recordings; request them where the unit is analysed"
         raise ProblemError(404, "No recordings", words)
     return RecordingLibrary(context.recordings, context.faults())
 
@@ -332,7 +332,7 @@ async def entry_of(context: Context, recording: str) -> RecordingEntry:
     library = library_of(context)
     found = await in_thread(lambda: library.one(recording))
     if found is None:
-        raise ProblemError(404, "Unknown recording", f"there is no recording {recording!r}")
+        raise ProblemError(404, "Unknown recording", f"unknown recording {recording!r}")
     return found
 
 

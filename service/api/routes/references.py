@@ -91,7 +91,7 @@ def set_reference_model(reference: GapReference) -> SetReferenceModel:
 
 
 TAKE_PROBLEMS = problem_responses(
-    403, 404, 422, 503, own={409: "The machine does not run in a condition for a reference"}
+    403, 404, 422, 503, own={409: "The present condition does not permit a reference"}
 )
 
 

@@ -221,11 +221,15 @@ def spectra_router(context: Context) -> APIRouter:
         ] = None,
         max_spectra: Annotated[
             int,
-            Query(ge=2, le=MAX_SPECTRA, description="Maximum number; more are thinned evenly."),
+            Query(
+                ge=2,
+                le=MAX_SPECTRA,
+                description="Maximum number of spectra; more are thinned evenly.",
+            ),
         ] = 200,
         max_frequency_hz: Annotated[
             float | None,
-            Query(gt=0.0, allow_inf_nan=False, description="Highest frequency.", examples=[6.0]),
+            Query(gt=0.0, allow_inf_nan=False, description="Maximum frequency.", examples=[6.0]),
         ] = None,
     ) -> Response:
         """List stored averaged amplitude spectra, all as displacement.

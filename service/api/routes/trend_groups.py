@@ -122,5 +122,5 @@ def _bins(store: Store, query: TrendQuery, axis: _Axis) -> list[int]:
             last = math.floor(high / axis.width + BIN_TOLERANCE)
             bins |= set(range(first, min(last, first + MAX_GROUPS) + 1))
     if len(bins) > MAX_GROUPS:
-        raise TooManyGroupsError(f"more than {MAX_GROUPS} groups: request a narrower range")
+        raise TooManyGroupsError(f"more than {MAX_GROUPS} groups; request a narrower range")
     return sorted(bins)

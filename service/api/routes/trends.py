@@ -224,7 +224,12 @@ def _series_model(name: str, columns: Mapping[str, TrendSeries]) -> TrendSeriesM
 
 
 MaxPoints = Annotated[
-    int, Query(ge=2, le=5000, description="More readings are combined in buckets.")
+    int,
+    Query(
+        ge=2,
+        le=5000,
+        description="Maximum number of points; more readings are combined in buckets.",
+    ),
 ]
 MAX_QUANTITIES = 40
 HOLE_HOPS = 2.5
@@ -335,7 +340,7 @@ def _page_start_ns(cursor: str | None, group_by: GroupName | None, start_ns: int
         If both cursor and group are given.
     """
     if cursor is not None and group_by is not None:
-        detail = "pages cannot be grouped: omit cursor or group_by"
+        detail = "cursor and group_by cannot be combined; omit one"
         raise ProblemError(422, "Wrong parameter", detail, "cursor")
     return start_ns if cursor in (None, "first") else max(start_ns, int(cursor or 0))
 

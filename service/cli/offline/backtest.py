@@ -94,7 +94,7 @@ def run_back_test(
     for event in rules.events:
         if not any(event.is_about(*place) for place in histories):
             name = event.unit + (f"/{event.bearing}" if event.bearing else "")
-            raise ReadingsError(f"event of {name}: there are no readings of it")
+            raise ReadingsError(f"event of {name}: the file has no readings of {name}")
     for unit, places in groupby(sorted(histories), key=lambda place: place[0]):
         runs = []
         for place in places:
@@ -127,7 +127,7 @@ def _doubts_of(run: BearingRun) -> Iterator[str]:
     place = " ".join(run.place)
     for p in run.periods:
         if p.doubt:
-            drift = f"{p.doubt}; the service would leave it to an engineer"
+            drift = f"{p.doubt}; the service would require acceptance by an engineer"
             yield f"{place} baseline {p.period.version}: {drift}"
     for p in run.periods:
         if p.far:
@@ -135,7 +135,7 @@ def _doubts_of(run: BearingRun) -> Iterator[str]:
     n = int(np.isin(run.operation.state, [int(state) for state in STEADY]).sum())
     if n and not run.operation.is_settled.any():
         yield (
-            f"{place}: none of {n} readings at speed was settled, so that nothing was learned or"
+            f"{place}: none of {n} readings at speed was settled, so nothing was learned or"
             " judged: each run ends before the oil temperature has settled"
         )
 
@@ -293,9 +293,9 @@ def time_ns_of(text: str) -> int:
     try:
         moment = datetime.fromisoformat(text)
     except ValueError as error:
-        raise ValueError(f"{text!r:.60} is not a time like 2026-03-01T08:00:00Z") from error
+        raise ValueError(f"{text!r:.60} is not a time such as 2026-03-01T08:00:00Z") from error
     if moment.tzinfo is None:
-        raise ValueError(f"{text!r:.60} needs an offset from UTC, such as a trailing Z")
+        raise ValueError(f"{text!r:.60} requires an offset from UTC, such as a trailing Z")
     return (moment - EPOCH) // timedelta(microseconds=1) * 1000
 
 
@@ -311,6 +311,6 @@ def event_of(text: str) -> MachineEvent:
     names = [found["unit"], found["bearing"]] if found else []
     if not found or not all(name is None or IDENTIFIER.fullmatch(name) for name in names):
         example = "'U1 2026-03-01T08:00:00Z overhaul' or 'U1/UJB 2026-03-01T08:00:00Z new pads'"
-        raise ValueError(f"{text!r:.60} is not an event like {example}")
+        raise ValueError(f"{text!r:.60} is not an event such as {example}")
     text = (found["text"] or "machine event")[:MAX_TEXT]
     return MachineEvent(found["unit"], found["bearing"], time_ns_of(found["time"]), text)

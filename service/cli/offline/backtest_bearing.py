@@ -198,7 +198,7 @@ def _operation(place: Place, rows: BearingRows, rules: BackTestRules) -> Operati
         return operation_history(*columns, rules.operating, oil_c, rows.state)
     if place[0] not in rules.rated:
         raise ReadingsError(
-            f"unit {place[0]}: operating states are not known: give a column state, or columns"
+            f"unit {place[0]}: operating states are unknown; give a column state, or columns"
             " speed_rpm and power_mw and a plant file with the unit's rated speed and power"
         )
     speed_rpm, power_mw = rules.rated[place[0]]

@@ -11,7 +11,7 @@ from core.change.cause import Attribution, Cause, UnitReadings, attribute
 from core.change.shaft_response import MEAN_READINGS, ShaftResponse, film_columns, learn_response
 from service.cli.offline.backtest_bearing import BackTestRules, BearingRun, Period, periods_of
 
-NO_AMPLITUDES = Attribution(Cause.UNKNOWN, "the readings have no shaft_um_pk in every bearing")
+NO_AMPLITUDES = Attribution(Cause.UNKNOWN, "readings of at least one bearing have no shaft_um_pk")
 NOT_LEARNED = Attribution(Cause.UNKNOWN, "the response of the shaft has not been learned")
 
 

@@ -109,7 +109,7 @@ def check_headings(headings: Sequence[str]) -> None:
         If there are any; the message names them.
     """
     if len(headings) > MAX_COLUMNS:
-        raise ReadingsError(f"{len(headings)} columns; at most {MAX_COLUMNS} are read")
+        raise ReadingsError(f"expected at most {MAX_COLUMNS} columns, got {len(headings)}")
     missing = [key for key in REQUIRED if key not in headings]
     if TIME not in headings and TIME_NS not in headings:
         missing.insert(0, f"{TIME} or {TIME_NS}")
@@ -120,11 +120,11 @@ def check_headings(headings: Sequence[str]) -> None:
         problems.append(f"missing columns: {', '.join(missing)}")
     if unknown:
         known = ", ".join((TIME_NS, *HEADINGS))
-        problems.append(f"unknown columns: {_listed(unknown)}; known are {known}")
+        problems.append(f"unknown columns: {_listed(unknown)}; known columns: {known}")
     if twice:
         problems.append(f"repeated columns: {_listed(twice)}")
     if TIME in headings and TIME_NS in headings:
-        problems.append(f"both {TIME} and {TIME_NS}; give one of them")
+        problems.append(f"columns {TIME} and {TIME_NS} are both given; remove one")
     if problems:
         raise ReadingsError("; ".join(problems))
 
@@ -134,7 +134,7 @@ def _listed(names: list[str]) -> str:
 
 
 _UTC = pa.timestamp("ns", tz="UTC")
-_NO_TIME = "not a time of ISO 8601 with an offset from UTC, like 2026-03-01T08:00:00Z:"
+_NO_TIME = "time is not ISO 8601 with an offset from UTC, such as 2026-03-01T08:00:00Z:"
 REASON, NO_REASON = "reason", "ok"
 """Name of the column, and its value for a good reading."""
 
@@ -178,7 +178,7 @@ def _time_ns(table: Any, problems: RowProblems) -> Any:
         column = _flat(table.column(TIME_NS))
         if not (_is_text(column.type) or pa.types.is_integer(column.type)):
             raise ReadingsError(f"column {TIME_NS} of type {column.type}: must be integers")
-        return _cast(column, pa.int64(), f"{TIME_NS} is no integer:", problems)
+        return _cast(column, pa.int64(), f"{TIME_NS} is not an integer:", problems)
     column = _flat(table.column(TIME))
     is_stamp = pa.types.is_timestamp(column.type) and column.type.tz is not None
     if not (_is_text(column.type) or is_stamp):
@@ -192,7 +192,7 @@ def _number(column: Any, key: str, problems: RowProblems) -> Any:
     is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)
     if not (is_number or _is_text(kind)):
         raise ReadingsError(f"column {key} of type {kind}: must be numbers")
-    return _cast(column, pa.float64(), f"{key} is no number:", problems, may_be_empty=True)
+    return _cast(column, pa.float64(), f"{key} is not a number:", problems, may_be_empty=True)
 
 
 def _text(column: Any, key: str, problems: RowProblems) -> Any:

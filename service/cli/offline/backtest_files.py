@@ -128,7 +128,7 @@ def _check_names(key: str, column: Any, names: set[str], line: Any, word: str) -
 
 def _why(process: ConfinedProcess) -> str:
     words = process.last_words()
-    return words if process.exit_code() == WRONG_FILE else f"not readable: {words}"
+    return words if process.exit_code() == WRONG_FILE else f"the file cannot be read: {words}"
 
 
 AT_ONCE_NS = 90 * DAY_NS

@@ -124,7 +124,7 @@ def _check_names(
         problems.add(wrong, f"unit {unit} has no bearing", name("bearing"))
     if "reason" in columns:
         wrong = _is_in(columns["quality"], ["good"]) & ~_is_in(columns["reason"], ["ok"])
-        problems.add(wrong, "quality good for the reason", name("reason"))
+        problems.add(wrong, "quality must not be good for the reason", name("reason"))
 
 
 def _check_numbers(columns: Mapping[str, Any], problems: RowProblems) -> None:
@@ -133,10 +133,10 @@ def _check_numbers(columns: Mapping[str, Any], problems: RowProblems) -> None:
         column = columns[key]
         if key in STIFFNESS:
             wrong = (is_good & ~(column > 0.0)) | (column <= 0.0)
-            problems.add(wrong, f"{key} must be above 0, not", column.item)
+            problems.add(wrong, f"{key} must be above 0, got", column.item)
         if key in _UNSIGNED:
-            problems.add(column < 0.0, f"{key} must not be below 0:", column.item)
-        problems.add(np.isinf(column), f"{key} must be finite, not", column.item)
+            problems.add(column < 0.0, f"{key} must not be below 0, got", column.item)
+        problems.add(np.isinf(column), f"{key} must be finite, got", column.item)
 
 
 def _by_place(columns: Mapping[str, Any]) -> list[tuple[Place, _Rows]]:
@@ -171,8 +171,8 @@ def _merged(columns: Mapping[str, Any], rows: _Rows, problems: RowProblems) -> B
     slots = [np.searchsorted(time_ns, row_ns[side]) for side in sides]
     for side in sides:
         step_ns, later = np.diff(row_ns[side]), rows[side[1:]]
-        problems.add(later[step_ns == 0], "the same time twice")
-        problems.add(later[step_ns < 0], "earlier than the row before")
+        problems.add(later[step_ns == 0], "two rows have the same time")
+        problems.add(later[step_ns < 0], "time is earlier than in the previous row")
 
     def both(column: npt.NDArray[Any] | None) -> FloatArray:
         """Return (2, n) values by direction; NaN for a missing row or column."""

@@ -47,7 +47,7 @@ def checked_lines(stream: BinaryIO) -> Iterator[Lines]:
             yield _checked(text + found, first)
             first += text.count(b"\n") + 1
         if len(rest) > MAX_LINE_BYTES:
-            raise ReadingsError(f"line {first}: longer than {MAX_LINE_BYTES} bytes")
+            raise ReadingsError(f"line {first}: the line is longer than {MAX_LINE_BYTES} bytes")
     if rest:
         yield _checked(rest + b"\n", first)
 
@@ -61,17 +61,17 @@ def _checked(text: bytes, first: int) -> Lines:
         text.decode()
     except UnicodeDecodeError as error:
         number = first + text.count(b"\n", 0, error.start)
-        raise ReadingsError(f"line {number}: not UTF-8 text") from error
+        raise ReadingsError(f"line {number}: the line is not valid UTF-8") from error
     return (text, np.array([n for n, line in enumerate(lines, first) if line.rstrip(b"\r")]))
 
 
 def _fault(line: bytes) -> str | None:
     if len(line) > MAX_LINE_BYTES:
-        return f"longer than {MAX_LINE_BYTES} bytes"
+        return f"the line is longer than {MAX_LINE_BYTES} bytes"
     if b"\0" in line:
-        return "has a NUL byte"
+        return "the line contains a NUL byte"
     if b"\r" in line.removesuffix(b"\r"):
-        return "a carriage return within the line"
+        return "the line contains a carriage return"
     return "a quote is not closed" if line.count(b'"') % 2 else None
 
 
@@ -95,7 +95,7 @@ def csv_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
         if numbers.size:
             yield converted(_table(text, numbers, headings), numbers, "line"), stream.tell()
     if not headings:
-        raise ReadingsError("is empty: there is no heading")
+        raise ReadingsError("the file is empty; expected a heading")
 
 
 def _heading(text: bytes, number: int) -> tuple[list[str], bytes]:
@@ -132,7 +132,7 @@ def _table(text: bytes, numbers: TimeArray, headings: list[str]) -> Any:
     except pa.ArrowInvalid as error:
         raise ReadingsError(_misfit(misfits, numbers, headings, error)) from error
     if len(table) != numbers.size:
-        raise ReadingsError(f"line {numbers[0]} or a later one: not a row")
+        raise ReadingsError(f"line {numbers[0]} or a later line: invalid row")
     return _trimmed(table) if b" " in text else table
 
 
@@ -140,9 +140,9 @@ def _misfit(
     misfits: list[tuple[int, int]], numbers: TimeArray, headings: list[str], error: Exception
 ) -> str:
     if not misfits:
-        return f"line {numbers[0]} or a later one: {str(error).splitlines()[0]}"
+        return f"line {numbers[0]} or a later line: {str(error).splitlines()[0]}"
     row, n_columns = misfits[0]
-    return f"line {numbers[row - 1]}: {n_columns} columns where the heading has {len(headings)}"
+    return f"line {numbers[row - 1]}: expected {len(headings)} columns, got {n_columns}"
 
 
 def _trimmed(table: Any) -> Any:
@@ -185,7 +185,7 @@ def _batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
         check_headings(headings)
         n_rows = file.metadata.num_rows
         if n_rows > MAX_ROWS:
-            raise ReadingsError(f"{n_rows} rows; at most {MAX_ROWS} are read")
+            raise ReadingsError(f"expected at most {MAX_ROWS} rows, got {n_rows}")
         n_read = 0
         for batch in file.iter_batches(_ROWS, use_threads=False):
             row = np.arange(n_read + 1, n_read + len(batch) + 1)
@@ -193,7 +193,7 @@ def _batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
             if len(batch):
                 yield converted(pa.Table.from_batches([batch]), row, "row"), size * n_read // n_rows
         if n_read != n_rows:
-            raise ReadingsError(f"has {n_read} rows, but its footer names {n_rows}")
+            raise ReadingsError(f"the file has {n_read} rows, but {n_rows} according to its footer")
 
 
 MEMORY_BYTES = 3 * 2**30
@@ -214,7 +214,7 @@ def main() -> None:
         words = error.strerror if isinstance(error, OSError) else str(error)
         _end(words or str(error))
     except MemoryError:  # pyarrow's error is a subclass
-        _end(f"needs more than {MEMORY_BYTES >> 30} GiB to read")
+        _end(f"reading requires more than {MEMORY_BYTES >> 30} GiB of memory")
 
 
 def _send(batches: Iterator[tuple[Any, int]], out: BinaryIO) -> None:
@@ -222,11 +222,11 @@ def _send(batches: Iterator[tuple[Any, int]], out: BinaryIO) -> None:
     for batch, n_bytes in batches:
         n_rows += len(batch)
         if n_rows > MAX_ROWS:
-            raise ReadingsError(f"more than {MAX_ROWS} rows")
+            raise ReadingsError(f"the file has more than {MAX_ROWS} rows")
         writer = writer or pa.ipc.new_stream(out, batch.schema)
         writer.write_batch(batch, custom_metadata={"n_bytes": str(n_bytes)})
     if writer is None:
-        raise ReadingsError("has no rows")
+        raise ReadingsError("the file has no rows")
     writer.close()
 
 

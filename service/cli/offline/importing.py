@@ -159,14 +159,14 @@ def import_recording(
     job = import_job(mapping, unit)
     decoder = None if job.channels else log_decoder_of(unit)
     if not job.channels and decoder is None:
-        raise ConfigError(f'unit {unit.id} has no source of kind "can", whose DBC file is needed')
+        raise ConfigError(f'unit {unit.id} has no source of kind "can", whose DBC file is required')
     read = _decoded(path, job, decoder) if decoder else imported_blocks(path, job)
     recorded = recorded_unit(unit)
     joiner = BlockJoiner(job.block_samples)
     with closing(read) as raws:
         first = next(raws, None)
         if first is None:
-            raise ConfigError(f"{path}: has no samples of unit {unit.id}")
+            raise ConfigError(f"{path}: the file has no samples of unit {unit.id}")
         with RecordingWriter(folder, recorded, made_by, first_decides=True) as writer:
             for raw, done in chain([first], raws):
                 whole = raw if decoder else _with_all_slow(raw, job, unit)

@@ -14,14 +14,14 @@ const adviceOn = (kind) => ALARM_KINDS[kind]?.advice ?? "";
 /** What to do about a link that does not come about, by what the error says; the first that fits. */
 const LINK_ADVICE = [
   [/refused/i, "The computer answers, but nothing listens at that port: start the DAQ’s server, or mend the port in the plant file."],
-  [/another device|expected is|expected are/i, "Another device is at this address: look for a swapped cable or address, or mend the identity in the plant file."],
+  [/wrong device/i, "Another device is at this address: look for a swapped cable or address, or mend the identity in the plant file."],
   [/exception \d/i, "The device refuses what is asked: compare the register map in the plant file with its manual (padwatch probe)."],
-  [/wrong reply|length is|CRC|expected/i, "Something answers that is not the device expected: look at address, register map and cabling (padwatch probe)."],
+  [/malformed reply|length is|CRC|expected/i, "Something answers that is not the device expected: look at address, register map and cabling (padwatch probe)."],
   [/bus-off|error-passive/i, "Look at bit rate, wiring and termination of the CAN bus."],
   [/unreachable|no route/i, "The network has no way there: look at switch, cable and IP address."],
-  [/no connection within|no answer|timed? ?out|did not answer/i, "Nothing answers: is the DAQ switched on, its cable in, its address right?"],
+  [/no connection within|no reply|timed? ?out|did not answer/i, "Nothing answers: is the DAQ switched on, its cable in, its address right?"],
   [/closed the connection|reset by/i, "The device ended the connection: it may be restarting, or serve another client."],
-  [/name or service|name server|name resolution|hostname|resolve|getaddrinfo/i, "The name of the device is not known: mend host in the plant file, or the name server."],
+  [/name or service|name server|name resolution|host ?name|resolve|getaddrinfo/i, "The name of the device is not known: mend host in the plant file, or the name server."],
   [/no such file|permission|could not open/i, "The serial port is not there or not allowed: look at the adapter and at its rights."],
 ];
 

@@ -129,11 +129,11 @@ class CanSettings(Settings):
         self._folder = (info.context or {}).get(FOLDER, Path())
         if (self.dbc is None) == (self.profile is None):
             found = "neither" if self.dbc is None else "both"
-            raise MisfitError(f"dbc or profile must be given, found {found}", "dbc")
+            raise MisfitError(f"exactly one of dbc and profile must be given, found {found}", "dbc")
         self._check_signals()
         self._check_speed()
         if self.stamps == "interface" and self.interface in WITHOUT_STAMPS:
-            raise MisfitError(f'must be "host": {self.interface} has no time stamps', "stamps")
+            raise MisfitError(f'must be "host": {self.interface} sends no time stamps', "stamps")
         return self
 
     @property
@@ -155,30 +155,31 @@ class CanSettings(Settings):
             for id_ in named:
                 if id_ not in known:
                     words = ", ".join(known) or "none"
-                    raise MisfitError(f"no such channel; there are {words}", key, id_)
+                    raise MisfitError(f"unknown channel; known channels: {words}", key, id_)
             missing = [id_ for id_ in known if id_ not in named]
             if missing:
-                raise MisfitError(f"has no signal for {', '.join(missing)}", key)
+                raise MisfitError(f"names no signal for {', '.join(missing)}", key)
 
     def _check_signals(self) -> None:
         if self.profile is not None:
             for key in OF_A_DBC:
                 if getattr(self, key):
-                    raise MisfitError("requires dbc; a profile has its own", key)
+                    raise MisfitError("applies only with dbc, not with profile; remove it", key)
         elif not self.signals:
             raise MisfitError("must name a signal for each waveform channel", "signals")
         if (self.seconds is None) != (self.microseconds is None):
             key = "microseconds" if self.microseconds is None else "seconds"
             raise MisfitError("seconds and microseconds must be given together", key)
         if self.frame_samples and self.counter_counts == "frames":
-            raise MisfitError('frame_samples needs "samples"', "counter_counts")
+            raise MisfitError('must be "samples" with frame_samples', "counter_counts")
 
     def _check_speed(self) -> None:
         if self.data_bitrate is not None and not self.fd:
-            raise MisfitError("requires CAN FD; set fd = true, or remove it", "data_bitrate")
+            raise MisfitError("requires CAN FD; set fd = true", "data_bitrate")
         if self.interface in LISTENING_IS_SET:
             for key in ("bitrate", "data_bitrate"):
                 if getattr(self, key) is not None:
                     raise MisfitError(
-                        "is set in the operating system: ip link set can0 type can bitrate …", key
+                        "must be set in the operating system: ip link set can0 type can bitrate …",
+                        key,
                     )

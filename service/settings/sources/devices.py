@@ -55,23 +55,23 @@ class MappedDeviceSettings(ModbusLinkSettings):
             raise MisfitError('must be 1 with connection = "per_reply"', "requests_in_flight")
         if self.stale_after_s < MIN_STALE_POLLS * self.poll_period_s:
             least = MIN_STALE_POLLS * self.poll_period_s
-            raise MisfitError(f"must be two poll periods or more, {least:g}", "stale_after_s")
+            raise MisfitError(f"must be at least two poll periods, {least:g} s", "stale_after_s")
         return self
 
     def _found_map(self, folder: Path) -> RegisterMapSettings:
         if self.map is not None and self.map_file is None:
             return self.map
         if self.map_file is None or self.map is not None:
-            raise MisfitError('give either a [map] table or "map_file"', "map_file")
+            raise MisfitError("exactly one of map and map_file must be given", "map_file")
         try:
             return load_map_file(folder / self.map_file)
         except TomlFileError as error:
             mistakes = str(error).replace("\n", "; ")
-            raise MisfitError(f"names a map that cannot be used: {mistakes}", "map_file") from error
+            raise MisfitError(f"register map cannot be used: {mistakes}", "map_file") from error
 
     def _require_least(self, key: str, least: float) -> None:
         if getattr(self, key) < least:
-            raise MisfitError(f"must be {least:g} or more, as the register map asks", key)
+            raise MisfitError(f"must be at least {least:g} s, the minimum in the register map", key)
 
     @property
     def rate_hz(self) -> float:
@@ -103,9 +103,7 @@ class MappedDeviceSettings(ModbusLinkSettings):
             if value.channel not in known:
                 place = (*at, "map", "value", n, "channel") if self.map else (*at, "map_file")
                 words = ", ".join(known) or "none"
-                raise MisfitError(
-                    f"no such channel as {value.channel!r}; there are {words}", *place
-                )
+                raise MisfitError(f"unknown channel {value.channel!r}; known: {words}", *place)
 
 
 class ModbusPolledSettings(MappedDeviceSettings):
@@ -122,7 +120,7 @@ class ModbusPolledSettings(MappedDeviceSettings):
         self.require_known([*channels, *slow], "source")
         for row in self.rows:
             raise MisfitError(
-                f'gives {row.part} of {row.channel!r}: that is for kind "modbus_vector"',
+                f'quantity "{row.part}" of {row.channel!r} requires kind "modbus_vector"',
                 *("source", "map_file" if self.map_file else "map"),
             )
         _require_all(self, channels, self.mapped_channels)
@@ -168,7 +166,7 @@ class ModbusVectorSettings(MappedDeviceSettings):
         for channel in self.mapped_channels:
             if channel in channels:
                 raise MisfitError(
-                    f'gives a plain value of {channel!r}; a rack\'s values need a "quantity"',
+                    f'value of {channel!r} requires a vector quantity such as "order1_amplitude"',
                     *("source", "map_file" if self.map_file else "map"),
                 )
 
@@ -223,18 +221,17 @@ class ModbusFifoSettings(ModbusLinkSettings):
     def _check_queues(self) -> Self:
         if not self.has_counter and self.layout is FifoKind.PER_CHANNEL:
             raise MisfitError(
-                "must be true with a queue for each channel: only a counter shows which samples"
+                'must be true with layout = "per_channel": only a counter shows which samples'
                 " belong together",
                 "has_counter",
             )
         if not self.has_counter and self.reading == "keeps":
             raise MisfitError(
-                "must be true if reading does not remove: only a counter shows which samples are"
-                " new",
+                'must be true with reading = "keeps": only a counter shows which samples are new',
                 "has_counter",
             )
         if len(set(self.addresses)) < len(self.addresses):
-            raise MisfitError("names a queue twice", "addresses")
+            raise MisfitError("must not contain an address twice", "addresses")
         return self
 
     def fifo_layout(self, n_channels: int) -> FifoLayout:
@@ -245,7 +242,7 @@ class ModbusFifoSettings(ModbusLinkSettings):
         """
         n_queues = 1 if self.layout is FifoKind.INTERLEAVED else n_channels
         if len(self.addresses) != n_queues:
-            words = f"must be {n_queues}, got {len(self.addresses)}"
+            words = f"number of addresses must be {n_queues}, got {len(self.addresses)}"
             raise MisfitError(words, "source", "addresses")
         layout = FifoLayout(
             addresses=self.addresses,
@@ -256,8 +253,8 @@ class ModbusFifoSettings(ModbusLinkSettings):
         )
         if layout.record_registers > MAX_FIFO_REGISTERS:
             raise MisfitError(
-                f"makes records of {layout.record_registers} registers; a FIFO read has at most"
-                f" {MAX_FIFO_REGISTERS}: use a queue for each channel, or fewer channels",
+                f"a record has {layout.record_registers} registers, but a FIFO read at most"
+                f' {MAX_FIFO_REGISTERS}; use layout = "per_channel" or fewer channels',
                 *("source", "addresses"),
             )
         return layout
@@ -269,7 +266,7 @@ def _require_all(
     for channel in wanted:
         if channel not in given:
             raise MisfitError(
-                f"has no value for channel {channel!r}; add a [[value]] for it{what}",
+                f"has no value for channel {channel!r}; add a [[value]] table{what}",
                 *("source", "map_file" if device.map_file else "map"),
             )
 

@@ -139,45 +139,46 @@ class ImportMapping(Settings):
         self._check_time()
         self._check_channels()
         if self.csv is not None and self.format != "csv":
-            raise MisfitError(f"is for CSV files, this one is {self.format}", "csv")
+            raise MisfitError(f"applies only to CSV files, not to {self.format}", "csv")
         if self.bus and self.format not in CAN_LOGS:
-            raise MisfitError(f"is for CAN logs, this one is {self.format}", "bus")
+            raise MisfitError(f"applies only to CAN logs, not to {self.format}", "bus")
         return self
 
     def _check_time(self) -> None:
         time = self.time
         if time.source == "file" and self.format not in WITH_OWN_TIME:
             raise MisfitError(
-                f'{self.format} has no time of its own; write "column" or "start"', "time", "source"
+                f'must be "column" or "start" for {self.format}, which has no time of its own',
+                *("time", "source"),
             )
         if time.source != "file" and self.format in CAN_LOGS:
-            raise MisfitError(f'a {self.format} log has its own; write "file"', "time", "source")
+            raise MisfitError(f'must be "file" for {self.format} logs', "time", "source")
         if time.source == "file" and self.format in IN_UTC and time.zone != "UTC":
-            raise MisfitError(f'{self.format} is in UTC; write "UTC"', "time", "zone")
+            raise MisfitError(f'must be "UTC" for {self.format}, which stores UTC', "time", "zone")
         for key in ("column", "form"):
             if (getattr(time, key) is None) == (time.source == "column"):
-                words = "is needed for" if time.source == "column" else "is only for"
+                words = "is required with" if time.source == "column" else "applies only with"
                 raise MisfitError(f'{words} source "column"', "time", key)
         self._check_form()
         if not time.zone and time.start is None:
-            raise MisfitError('is needed: "UTC", or an offset such as "-03:00"', "time", "zone")
+            raise MisfitError('is required: "UTC", or an offset such as "-03:00"', "time", "zone")
 
     def _check_form(self) -> None:
         form, start = self.time.form or "", self.time.start
         for wanted, only in (("iso8601", "csv"), ("timestamp", "tdms")):
             if form == wanted and self.format != only:
-                raise MisfitError(f"is only for {only}, this is {self.format}", "time", "form")
+                raise MisfitError(f"applies only to {only}, not to {self.format}", "time", "form")
         has_start = self.format == "mdf4"
         needs = self.time.source == "start" or (form.startswith("elapsed") and not has_start)
         if needs and start is None:
-            raise MisfitError("is needed as the origin of the times", "time", "start")
+            raise MisfitError("is required as the origin of the times", "time", "start")
         allowed = needs or form.startswith("elapsed")
         if start is not None and not allowed:
-            raise MisfitError("has no effect here; leave it out", "time", "start")
+            raise MisfitError("does not apply to absolute times; remove it", "time", "start")
 
     def _check_channels(self) -> None:
         if (self.format in CAN_LOGS) == bool(self.channel):
-            words = "are those of the DBC file" if self.channel else "needs at least one"
+            words = "comes from the DBC file" if self.channel else "is required"
             raise MisfitError(f"{words} for {self.format}", "channel")
         refuse_twice(("channel", n, "id", c.id) for n, c in enumerate(self.channel))
         refuse_twice(("slow_channel", n, "id", c.id) for n, c in enumerate(self.slow_channel))
@@ -185,7 +186,7 @@ class ImportMapping(Settings):
             self._refuse_groups()
 
     def _refuse_groups(self) -> None:
-        words = f"{self.format} has no groups"
+        words = f"{self.format} has no groups; remove the group"
         for n, channel in enumerate(self.channel):
             if channel.group:
                 raise MisfitError(words, "channel", n, "group")

@@ -28,7 +28,7 @@ class SignatureIdentity(Settings):
     @model_validator(mode="after")
     def _check_end(self) -> Self:
         if self.address + len(self.words) > 0x10000:
-            raise MisfitError("goes beyond register 65535", "words")
+            raise MisfitError("must not extend beyond register 65535", "words")
         return self
 
 
@@ -50,7 +50,7 @@ class IdentificationIdentity(Settings):
     @model_validator(mode="after")
     def _check_any(self) -> Self:
         if self.vendor is None and self.product_code is None and self.revision is None:
-            raise MisfitError("needs vendor, product_code or revision", "kind")
+            raise MisfitError("vendor, product_code or revision must be given", "kind")
         return self
 
 
@@ -104,10 +104,12 @@ class ModbusLinkSettings(Settings):
         if (self.host is None) == (self.device is None):
             found = "neither" if self.host is None else "both"
             raise MisfitError(
-                f"host (Modbus TCP) or device (serial line) must be given, found {found}", "host"
+                "exactly one of host (Modbus TCP) and device (serial line) must be given, found"
+                f" {found}",
+                "host",
             )
         if self.device is not None and self.device_id > 247:
-            raise MisfitError("on a serial line must be 1 to 247", "device_id")
+            raise MisfitError("must be 1 to 247 on a serial line", "device_id")
         if self.device is not None and (self.requests_in_flight or 1) > 1:
             raise MisfitError("must be 1 on a serial line", "requests_in_flight")
         return self

@@ -77,7 +77,7 @@ class CalendarTimeSettings(Settings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if sorted(self.fields) != sorted(CALENDAR_FIELDS):
-            raise MisfitError(f"must name each of {', '.join(CALENDAR_FIELDS)} once", "fields")
+            raise MisfitError(f"must contain each of {', '.join(CALENDAR_FIELDS)} once", "fields")
         return self
 
     def plain(self, default: MapDefaults) -> CalendarTime:
@@ -154,7 +154,7 @@ class RegisterMapSettings(Settings):
         for n, block in enumerate(self.together):
             default.require_in_space(block.address, block.count, "together", n)
             if block.count > self.max_registers:
-                limit = f"must not be above max_registers, {self.max_registers}"
+                limit = f"must not be above max_registers = {self.max_registers}"
                 raise MisfitError(limit, "together", n, "count")
         values = tuple(default.value(value, "value", n) for n, value in enumerate(self.value))
         require_apart(values, self.base)

@@ -89,9 +89,9 @@ class FullScaleSettings(Settings):
     def _check(self) -> Self:
         for key in ("minimum", "maximum"):
             if (getattr(self, key) is None) == (getattr(self, f"{key}_register") is None):
-                raise MisfitError(f"give either this or {key}_register", key)
+                raise MisfitError(f"exactly one of {key} and {key}_register must be given", key)
         if not self.raw_minimum < self.raw_maximum:
-            raise MisfitError(f"must be below raw_maximum {self.raw_maximum:g}", "raw_minimum")
+            raise MisfitError(f"must be below raw_maximum = {self.raw_maximum:g}", "raw_minimum")
         return self
 
 
@@ -114,21 +114,19 @@ class FlagSettings(CellSettings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.type in FLOATS:
-            raise MisfitError(
-                'must be "uint16" or other whole numbers: a float has no flags', "type"
-            )
+            raise MisfitError('must be an integer type such as "uint16" for flags', "type")
         if self.type is NumberType.BIT and self.mask not in (1, ALL_BITS):
-            raise MisfitError("must be left out: this is one bit already", "mask")
+            raise MisfitError('does not apply to type "bit"; remove it', "mask")
         if (self.set_means is None) == (not self.ok_values):
-            words = "must be given unless ok_values are, and not with them"
+            words = "exactly one of set_means and ok_values must be given"
             raise MisfitError(words, "set_means")
         if self.clipped_values and not self.ok_values:
-            raise MisfitError("can only be given with ok_values", "clipped_values")
+            raise MisfitError("requires ok_values", "clipped_values")
         highest = self.counted_bits // (self.counted_bits & -self.counted_bits)
         for name in ("ok_values", "clipped_values"):
             for number in getattr(self, name):
                 if not 0 <= number <= highest:
-                    words = f"must be numbers of the mask, 0 to {highest}, got {number}"
+                    words = f"must be within the mask, 0 to {highest}, got {number}"
                     raise MisfitError(words, name)
         return self
 
@@ -184,20 +182,20 @@ class ValueSettings(CellSettings):
     def _check(self) -> Self:
         has_detector = self.quantity in AMPLITUDE_PARTS
         if (self.detector is not None) != has_detector:
-            raise MisfitError(
-                'must be "pk", "pp" or "rms" for amplitudes, and only for amplitudes', "detector"
-            )
+            words = 'must be "pk", "pp" or "rms" for an amplitude, and not given otherwise'
+            raise MisfitError(words, "detector")
         if (self.phase is not None) != (self.quantity == VectorPart.ORDER1_PHASE):
-            raise MisfitError('must be "lag" or "lead" for phases, and only for phases', "phase")
+            words = 'must be "lag" or "lead" for a phase, and not given otherwise'
+            raise MisfitError(words, "phase")
         if self.scale_register is not None and self.full_scale is not None:
             raise MisfitError("cannot be combined with full_scale", "scale_register")
         low, high = self.invalid_below, self.invalid_above
         if low is not None and high is not None and not low < high:
-            raise MisfitError(f"must be below invalid_above {high:g}", "invalid_below")
+            raise MisfitError(f"must be below invalid_above = {high:g}", "invalid_below")
         n_bits = 8 * N_BYTES[self.type]
         for number in self.invalid_values if self.type in INTEGERS else ():
             if number % 1 or not -(1 << n_bits - 1) <= number < 1 << n_bits:
-                words = f"must each be a whole number of {n_bits} bits, got {number:.12g}"
+                words = f"must be integers of {n_bits} bits, got {number:.12g}"
                 raise MisfitError(words, "invalid_values")
         return self
 
@@ -230,7 +228,7 @@ class MapDefaults:
         """Raise `MisfitError` if ``count`` registers from ``address`` exceed the address space."""
         last = self.base + ADDRESS_SPACE - count
         if not self.base <= address <= last:
-            words = f"must be {self.base} to {last}, since the map counts from {self.base}"
+            words = f"must be {self.base} to {last}, since addresses begin at {self.base}"
             raise MisfitError(words, *at, "address")
 
     def cell(self, settings: CellSettings, *at: int | str) -> Cell:
@@ -244,12 +242,11 @@ class MapDefaults:
         )
         is_bit, in_register = cell.type is NumberType.BIT, cell.function in REGISTER_FUNCTIONS
         if not in_register and not is_bit:
-            words = 'must be "bit": functions 1 and 2 read single bits'
+            words = 'must be "bit" for functions 1 and 2, which read single bits'
             raise MisfitError(words, *at, "type")
         if (cell.bit is not None) != (is_bit and in_register):
             raise MisfitError(
-                'is the number of a bit in a register: give it with type "bit" and function 3 or 4,'
-                " and only then",
+                'must be given for type "bit" with function 3 or 4, and not given otherwise',
                 *(*at, "bit"),
             )
         self.require_in_space(cell.address, cell.n_places, *at)
@@ -315,12 +312,12 @@ def require_apart(values: Sequence[MapValue], base: int) -> None:
             other = taken.setdefault((cell.function, place), value)
             if other is not value and not _are_different_bits(cell, other.cell):
                 raise MisfitError(
-                    f"lies on a register of value {other.id!r} (address {other.cell.address},"
-                    f" {other.cell.type}); each register has one value",
+                    f"overlaps the registers of value {other.id!r} (address {other.cell.address},"
+                    f" {other.cell.type})",
                     *("value", n, "address"),
                 )
         if value.id in [other.id for other in values[:n]]:
-            raise MisfitError(f"has {value.id!r} twice; each value must be unique", "value")
+            raise MisfitError(f"contains {value.id!r} twice; each value must be unique", "value")
 
 
 def _are_different_bits(one: Cell, other: Cell) -> bool:

@@ -44,9 +44,9 @@ class SimulatedDamageSettings(Settings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if (self.after_s is None) == (self.at is None):
-            raise MisfitError("needs either after_s or at")
+            raise MisfitError("exactly one of after_s and at must be given")
         if self.size == 0.0 or (self.size < 0.0 and not self.kind.endswith("_gain")):
-            raise MisfitError("must be above 0; only gains may fall below", "size")
+            raise MisfitError("must be above 0, except for a gain", "size")
         return self
 
 
@@ -167,10 +167,12 @@ class SimulationSettings(SimulatedLifeSettings):
     def _check(self) -> Self:
         for key in FIXED if self.life_seed is not None else OF_A_LIFE:
             if key in self.model_fields_set:
-                why = "follows from life_seed" if self.life_seed is not None else "needs life_seed"
-                raise MisfitError(why, key)
+                has_life = self.life_seed is not None
+                raise MisfitError(
+                    f"applies only {'without' if has_life else 'with'} life_seed", key
+                )
         for key in NEEDED if self.life_seed is None else ():
             if key not in self.model_fields_set:
-                raise MisfitError("is needed, or life_seed instead", key)
+                raise MisfitError("is required without life_seed", key)
         refuse_twice(("bearing", n, "bearing", b.bearing) for n, b in enumerate(self.bearing))
         return self

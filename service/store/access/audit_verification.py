@@ -42,13 +42,13 @@ def read_head(path: Path) -> AuditHead:
         with path.open("rb") as file:
             text = file.read(MAX_BYTES)
     except FileNotFoundError:
-        raise HeadError("is not there") from None
+        raise HeadError("does not exist") from None
     except OSError as error:
         raise HeadError(f"cannot be read: {error.strerror}") from error
     try:
         return _head(json.loads(text))
     except (ValueError, RecursionError):
-        raise HeadError("does not hold the head of an audit trail") from None
+        raise HeadError("is not the head of an audit trail") from None
 
 
 def write_head(path: Path, head: AuditHead) -> None:
@@ -175,7 +175,7 @@ def _wrong(
 ) -> Finding | None:
     due = before + 1
     if type(entry.number) is not int or entry.number < due:
-        return Finding(due, f"entry {entry.number!r} is in the place of entry {due}")
+        return Finding(due, f"expected entry {due}, found entry {entry.number!r}")
     if entry.number > due:
         last = entry.number - 1
         missing = f"entry {due} is" if last == due else f"entries {due} to {last} are"
@@ -183,7 +183,7 @@ def _wrong(
     if recomputed(entry) != entry.hash:
         return Finding(due, rename(entry))
     if entry.previous_hash != hash_:
-        return Finding(due, f"entry {due} does not follow entry {before}: out of order or replaced")
+        return Finding(due, f"entry {due} does not match the hash of entry {before}")
     return None
 
 
@@ -191,16 +191,16 @@ def _wrong_head(
     number: int, at_head: str, head: AuditHead | str, is_shared: bool
 ) -> Finding | None:
     if isinstance(head, str):
-        return Finding(None, f"the head {head}: the end of the trail cannot be verified")
+        return Finding(None, f"the head {head}; the end of the trail cannot be verified")
     if head.number > number:
         count = f"entries {number + 1} to {head.number} are"
         if head.number == number + 1:
             count = f"entry {head.number} is"
         return Finding(number + 1, f"{count} missing at the end: the head names {head.number}")
     if number - head.number > MAX_BEHIND and not is_shared:
-        return Finding(None, f"the head names entry {head.number}, the trail goes to {number}")
+        return Finding(None, f"the head names entry {head.number}, but the trail ends at {number}")
     if (at_head if head.number else FIRST) != head.hash:
-        return Finding(head.number or None, f"entry {head.number} is not the one the head names")
+        return Finding(head.number or None, f"entry {head.number} does not match the head's hash")
     return None
 
 
@@ -208,5 +208,5 @@ def place_of(entry: AuditEntry, last: int) -> str:
     """Return the error message on an entry with a wrong hash: altered, or out of order."""
     for number in range(1, last + 1):
         if recomputed(replace(entry, number=number)) == entry.hash:
-            return f"entry {entry.number} is out of order: it holds entry {number}"
+            return f"entry {entry.number} is out of order; its content is that of entry {number}"
     return f"entry {entry.number} was altered"

@@ -250,7 +250,7 @@ def account_name(written: str) -> str:
     name = written.strip().lower()
     if NAME.fullmatch(name) is None:
         raise NameRefusedError(
-            f"a name has 1 to {MAX_NAME} of a-z 0-9 . _ @ - and begins and ends with a letter"
+            f"a name must have 1 to {MAX_NAME} of a-z 0-9 . _ @ - and begin and end with a letter"
             " or a digit"
         )
     return name

@@ -245,7 +245,7 @@ def _role(writer: Connection, name: str) -> Role:
     """Return the role of an account; raise `AccessRefusedError` if it is unknown."""
     row = writer.execute("SELECT role FROM account WHERE name = ?", (name,)).fetchone()
     if row is None:
-        raise AccessRefusedError(f"there is no account {name}")
+        raise AccessRefusedError(f"account {name} does not exist")
     return Role(row[0])
 
 

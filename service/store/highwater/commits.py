@@ -121,8 +121,8 @@ def _parted(mark: Mark, database: Mark) -> str:
 
 def _replaced(mark: Mark, database: Mark) -> str:
     return (
-        f"the database was replaced by another one: {mark.n_commits} transactions up to"
-        f" {_when(mark.time_ns)} were in the one before, {database.n_commits} are in this one"
+        f"the database was replaced: the former had {mark.n_commits} transactions up to"
+        f" {_when(mark.time_ns)}, this one has {database.n_commits}"
     )
 
 
@@ -135,7 +135,7 @@ def _behind(mark: Mark, database: Mark) -> str:
 
 def _lost(why: str, database: Mark) -> str:
     return (
-        f"the high-water mark {why}: it is unknown whether the database, whose last transaction is"
+        f"the high-water mark {why}; it is unknown whether the database, whose last transaction is"
         f" of {_when(database.time_ns)}, is the newest"
     )
 
@@ -211,7 +211,7 @@ class CommitMarks:
             if in_file is None:
                 self._file.replace(mark)
                 return
-        self.found = compared("is not there" if in_file is None else in_file, mark, self._host)
+        self.found = compared("does not exist" if in_file is None else in_file, mark, self._host)
 
     def count(self, writer: Connection) -> None:
         """Increment the commit counter within the current transaction."""
@@ -219,7 +219,7 @@ class CommitMarks:
             return  # keep the differences until they are accepted
         last = select_mark(writer)
         if last is None:
-            raise StoreError("the database has lost its high-water mark")
+            raise StoreError("the database has no high-water mark")
         self._put(writer, last, last.n_commits + 1)
 
     def settle(self) -> None:
@@ -240,7 +240,7 @@ class CommitMarks:
         """Accept the database as the newest copy, within a transaction."""
         last, in_file = select_mark(writer), self.in_file()
         if last is None:
-            raise StoreError("the database has lost its high-water mark")
+            raise StoreError("the database has no high-water mark")
         n_before = in_file.n_commits if isinstance(in_file, Mark) else 0
         # above both counts, so that no earlier mark matches again
         self._put(writer, last, max(last.n_commits, n_before) + 1)

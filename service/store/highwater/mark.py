@@ -100,7 +100,7 @@ class MarkFile:
             with _opened(self.path, os.O_RDONLY) as descriptor:
                 return _newest(_slots(descriptor))
         except FileNotFoundError:
-            raise NoMarkError("is not there") from None
+            raise NoMarkError("does not exist") from None
         except OSError as error:
             raise MarkError(f"cannot be read: {error.strerror}") from error
 
@@ -125,7 +125,7 @@ class MarkFile:
                     os.pwrite(descriptor, encoded(mark), SLOTS[slots.index(newest) - 1])
                     os.fdatasync(descriptor)
         except FileNotFoundError:
-            raise NoMarkError("is not there") from None
+            raise NoMarkError("does not exist") from None
 
     def replace(self, mark: Mark) -> None:
         """Replace the file by a new file with this mark.

@@ -100,7 +100,7 @@ def truncation_of(path: Path) -> str | None:
     page_bytes = _LARGEST_PAGE if written == 1 else written
     if page_bytes == 0 or size % page_bytes == 0:
         return None
-    return f"{size} bytes are no multiple of the page size {page_bytes}: the file is cut off"
+    return f"the file is truncated: {size} bytes are not a multiple of the page size, {page_bytes}"
 
 
 IOERR = 10

@@ -74,24 +74,32 @@ def test_any_other_signal_makes_all_channels_engineering_units(dbc):
 
 MISFITS = [
     ((channel("x", "WAVE.none"),), {}, r"signals.x = \"WAVE.none\": .* no signal none; .* count"),
-    ((channel("x", "NONE.x"),), {}, r"no message NONE in the DBC; there are WAVE, OTHER, SLOW"),
+    ((channel("x", "NONE.x"),), {}, r"unknown message NONE; the DBC file has WAVE, OTHER, SLOW"),
     ((channel("x", "WAVE"),), {}, r"no signal \(none given\)"),
     (
         (X, channel("y", "WAVE.x")),
         {},
         r"signals.y = \"WAVE.x\": is already the signal of signals.x",
     ),
-    ((channel("x", ""),), {}, r"signals.x: names no signal"),
-    ((X, channel("y", "WAVE.y WAVE.z")), {}, r"signals.y: has 2 samples in a frame, x has 1"),
-    ((channel("x", "WAVE.x OTHER.u"),), {}, r"signals.x: its signals must all be in one message"),
-    ((channel("w", "OTHER.w"),), {}, r'OTHER.w has unit "mils" in the DBC; needed is "um", "µm"'),
-    ((channel("u", "OTHER.u", "mm/s"),), {}, r'OTHER.u has unit "um" .* needed is "mm/s", .*or V'),
+    ((channel("x", ""),), {}, r"signals.x: must name one signal"),
+    ((X, channel("y", "WAVE.y WAVE.z")), {}, r"signals.y: names 2 signals, but x has 1"),
+    ((channel("x", "WAVE.x OTHER.u"),), {}, r"signals.x: all signals must be in one message"),
+    (
+        (channel("w", "OTHER.w"),),
+        {},
+        r'OTHER.w has unit "mils" in the DBC file, expected "um", "µm"',
+    ),
+    ((channel("u", "OTHER.u", "mm/s"),), {}, r'OTHER.u has unit "um" .* expected "mm/s", .*or mV'),
     ((X,), {"counters": ("WAVE.nix",)}, r"counters = \"WAVE.nix\": .*no signal nix"),
     ((X,), {"counters": ("WAVE.x",)}, r"counters = \"WAVE.x\": must be an unsigned integer"),
-    ((X,), {"counters": ("WAVE.count", "WAVE.count")}, r"second counter of message WAVE"),
-    ((X,), {"counters": ("SLOW.count",)}, r"counters: message WAVE carries waveforms but none"),
-    ((X, channel("u", "OTHER.u")), {"counters": ("WAVE.count",)}, r"counters: message OTHER"),
-    ((X,), {"frame_samples": ("WAVE.count",)}, r"frame_samples needs counters"),
+    ((X,), {"counters": ("WAVE.count", "WAVE.count")}, r"message WAVE has a second counter"),
+    ((X,), {"counters": ("SLOW.count",)}, r"counters: no signal of message WAVE is named"),
+    (
+        (X, channel("u", "OTHER.u")),
+        {"counters": ("WAVE.count",)},
+        r"counters: no signal of message OTHER",
+    ),
+    ((X,), {"frame_samples": ("WAVE.count",)}, r"frame_samples requires counters"),
     ((X,), {"ok_bits": "SLOW.signed"}, r"ok_bits = \"SLOW.signed\": must be an unsigned integer"),
     ((X,), {"epoch": "SLOW.nix"}, r"epoch = \"SLOW.nix\""),
     ((X,), {"epoch": "SLOW.bits", "counters": ("WAVE.count",)}, r"its message has no counter"),
@@ -99,7 +107,7 @@ MISFITS = [
     (
         (X,),
         {"slow": (CanSlowChannel("oil", "MW", "SLOW.oil"),)},
-        r'slow.oil: SLOW.oil has unit "°C" in the DBC; needed is "MW"',
+        r'slow.oil: SLOW.oil has unit "°C" in the DBC file, expected "MW"',
     ),
     (
         (X,),
@@ -113,7 +121,7 @@ MISFITS = [
             "frame_samples": ("WAVE.count",),
             "counter_counts": "frames",
         },
-        r"frame_samples needs counters",
+        r"frame_samples requires counters",
     ),
 ]
 
@@ -127,7 +135,7 @@ def test_a_misfit_is_refused_with_file_key_and_fix(channels, others, words, dbc)
 
 def test_samples_of_one_channel_with_different_factors_are_refused(dbc):
     dbc.write_text(DBC.replace("(0.30517578125,0)", "(0.31,0)"), encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"signals\.x: its signals have different factors"):
+    with pytest.raises(ConfigError, match=r"signals\.x: all signals must have the same factor"):
         compiled(dbc, channel("x", "WAVE.x WAVE.y"))
 
 
@@ -135,18 +143,20 @@ def test_samples_of_one_channel_with_different_factors_are_refused(dbc):
 @pytest.mark.parametrize("signal", ["WAVE.x", "WAVE.y"])
 def test_a_full_scale_that_differs_is_refused_with_both(full_scale_v, signal, dbc):
     calibration = dataclasses.replace(VOLT, full_scale_v=full_scale_v)
-    with pytest.raises(ConfigError, match=rf"full_scale_v = 10, .* says {full_scale_v:g}"):
+    with pytest.raises(
+        ConfigError, match=rf"full_scale_v is {full_scale_v:g} .* corresponds to 10$"
+    ):
         compiled(dbc, channel("x", signal), calibration=calibration)
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "not a DBC file"),
-        ('VERSION ""\nBU_: N\n', "no message in it; a DBC has lines that begin with BO_"),
-        ("garbage {", "not a DBC file"),
+        ("", "invalid DBC file"),
+        ('VERSION ""\nBU_: N\n', "defines no message \\(lines that begin with BO_"),
+        ("garbage {", "invalid DBC file"),
         (DBC.replace(" 257 ", " 256 "), r"WAVE and OTHER share the standard id 256 \(0x100\)"),
-        (DBC.replace(" OTHER", " WAVE"), "two messages are called WAVE"),
+        (DBC.replace(" OTHER", " WAVE"), "two messages have the name WAVE"),
         (DBC.replace("SG_ y : 32", "SG_ y : 24"), "overlapping"),
         (DBC.replace("BO_ 256 WAVE: 8", "BO_ 256 WAVE: 4"), "does not fit"),
         (DBC.replace("BO_ 256", "BO_ 5000"), "more than 11 bits"),
@@ -155,7 +165,7 @@ def test_a_full_scale_that_differs_is_refused_with_both(full_scale_v, signal, db
             .replace("SG_ x ", "SG_ x m0M ")
             .replace("SG_ y ", "SG_ y m1 ")
             + "SG_MUL_VAL_ 256 y x 1-1;\nSG_MUL_VAL_ 256 x count 0-0;\n",
-            "multiplexed twice over",
+            "has nested multiplexing",
         ),
     ],
 )
@@ -180,13 +190,13 @@ def test_an_unused_message_may_be_multiplexed_twice_over_but_not_by_billions_of_
     compiled(dbc, X)
     ranges = NESTED_RANGES.replace("1-1", "1-1, 3-4000000000")
     dbc.write_text(DBC + NESTED + ranges, encoding="utf-8")
-    with pytest.raises(ConfigError, match="have 3999999997 values, at most 100000"):
+    with pytest.raises(ConfigError, match=r"have 3999999997 values, .* at most 100000"):
         compiled(dbc, X)
 
 
 def test_a_file_that_is_missing_a_folder_or_huge_is_refused_without_reading_it_all(tmp_path):
     for path in (tmp_path / "none.dbc", tmp_path):
-        with pytest.raises(ConfigError, match="dbc must name a DBC file"):
+        with pytest.raises(ConfigError, match="dbc must be the path of a DBC file"):
             compiled(path, X)
     path = tmp_path / "huge.dbc"
     with path.open("wb") as file:

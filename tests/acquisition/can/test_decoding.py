@@ -150,8 +150,8 @@ def test_a_lost_part_drops_the_instant(assembler_with):
 @pytest.mark.parametrize(
     ("signals", "words"),
     [
-        ("M.a M.c", "must all be in one message"),
-        ("M.count", "in every frame of a multiplexed message"),
+        ("M.a M.c", "all signals must be in one message"),
+        ("M.count", "must be multiplexed like the other signals"),
     ],
 )
 def test_a_channel_has_samples_of_one_part(signals, words, settings_of, assembler_by):

@@ -59,7 +59,9 @@ async def test_a_name_that_was_never_known_is_a_lost_link_in_time_and_costs_one_
     names.answers.clear()
     link = ModbusClient(LinkSettings(transport=TcpTransport(host="daq.plant"), timeout_s=0.02))
     for _ in range(5):
-        with pytest.raises(LinkError, match=r"daq.plant:502: no name server answers within 0.02 s"):
+        with pytest.raises(
+            LinkError, match=r"daq.plant:502: no name server answered within 0.02 s"
+        ):
             await link.open()
 
     assert names.asked == ["daq.plant"]

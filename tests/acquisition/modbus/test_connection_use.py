@@ -85,7 +85,7 @@ async def test_another_device_is_noticed_at_the_next_poll(plant, other: str):
             device.identification = {0: b"Other"}
         else:
             device.image.put(Cell(address=1), 43)
-        with pytest.raises(ConfigError, match=r"another device"):
+        with pytest.raises(ConfigError, match=r"wrong device"):
             await anext(stream)
 
 

@@ -230,7 +230,7 @@ async def test_a_device_that_gives_nothing_new_is_not_connected(queues) -> None:
     async with queues(settings={"poll_period_s": 0.5}) as p:
         async with p.source.connect() as stream:
             await anext(stream)
-            with pytest.raises(LinkError, match="data stand still"):
+            with pytest.raises(LinkError, match="the newest sample has not changed"):
                 await anext(stream)
         p.run(2)
         async with p.source.connect() as stream:
@@ -240,7 +240,7 @@ async def test_a_device_that_gives_nothing_new_is_not_connected(queues) -> None:
 @pytest.mark.parametrize(
     ("fault", "error", "said"),
     [
-        ("exception_3", ConfigError, "illegal value"),
+        ("exception_3", ConfigError, "illegal data value"),
         ("exception_11", LinkError, "gateway target"),
     ],
 )
@@ -258,8 +258,8 @@ async def test_a_refused_reading_is_never_repeated(queues, fault, error, said) -
 @pytest.mark.parametrize(
     ("reads", "layout", "error", "said"),
     [
-        ("device", UNCOUNTED, LinkError, "14 registers holds no whole records of 3"),
-        ("source", replace(INTERLEAVED, addresses=(2000,)), ConfigError, "illegal address"),
+        ("device", UNCOUNTED, LinkError, "14 registers are not whole records of 3"),
+        ("source", replace(INTERLEAVED, addresses=(2000,)), ConfigError, "illegal data address"),
     ],
 )
 async def test_a_queue_of_other_records_or_none_is_refused(queues, reads, layout, error, said):
@@ -335,7 +335,7 @@ async def test_what_was_read_over_too_slow_a_link_is_kept_too(queues) -> None:
             return answer(address)
 
         p.device.read_fifo = slowly
-        before = await until_lost(stream, "too slow for 600 samples per second")
+        before = await until_lost(stream, "too slow for 600 samples/s")
     assert sum(block.n_samples for block in before) > STEP
     assert gaps([*first, *before]) == []
     assert_right([*first, *before])

@@ -63,7 +63,7 @@ def test_only_functions_that_read_can_be_formed(function):
         ReadRequest(bytes([function]) + b"\0\0\0\1")
         return
     for body in (b"\0\0\0\1", b"\x0d\x01\x00", b"\x0e\x00\x00", b"\x0e\x05\x00", b""):
-        with pytest.raises(ConfigError, match=f"function code {function} is never sent"):
+        with pytest.raises(ConfigError, match=f"which only read, got {function}"):
             ReadRequest(bytes([function]) + body)
 
 

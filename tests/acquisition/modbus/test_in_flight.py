@@ -109,7 +109,7 @@ async def test_a_device_that_cannot_is_asked_one_at_a_time_from_then_on_and_told
     async with device(behave) as port:
         link = client(port)
         await link.open()
-        with pytest.raises(error, match="6 requests in flight; one at a time from now on"):
+        with pytest.raises(error, match="6 requests were in flight, from now on one at a time"):
             await link.read_spans(SPANS)
         with pytest.raises(LinkError, match="closed"):
             await link.read(0, 1)
@@ -131,7 +131,7 @@ async def test_a_device_that_hangs_up_twice_running_is_asked_one_at_a_time():
         link = client(server.sockets[0].getsockname()[1])
         for complaint in (
             "closed the connection$",
-            "closed the connection, 6 requests .* one at a",
+            "closed the connection; 6 requests .* one at a",
         ):
             await link.open()
             with pytest.raises(LinkError, match=complaint):

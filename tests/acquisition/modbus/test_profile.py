@@ -123,13 +123,13 @@ def test_samples_lie_channel_by_channel_behind_slow_values_and_before_a_checksum
     ("register", "value", "complaint"),
     [
         (0, 0x5058, "magic is 0x5058, expected 0x5057"),
-        (1, 3, "version is 3, known is 2"),
-        (2, 0, "n_channels is 0"),
-        (2, 33, "n_channels is 33"),
-        (3, 0, "samples_per_slot is 0"),
-        (4, 1, "n_slots is 1"),
-        (4, 60000, "end of the ring is"),
-        (13, 22, "slot stride is 22, allowed is"),
+        (1, 3, "version is 3, expected 2"),
+        (2, 0, "n_channels must be 1 to 32, got 0"),
+        (2, 33, "n_channels must be 1 to 32, got 33"),
+        (3, 0, "samples_per_slot must be 1 to 65535, got 0"),
+        (4, 1, "n_slots must be 2 to 65535, got 1"),
+        (4, 60000, "end of the ring must be"),
+        (13, 22, "slot stride must be"),
     ],
 )
 def test_a_header_that_cannot_be_is_refused_with_what_was_found(register, value, complaint):

@@ -96,13 +96,13 @@ def test_every_cell_is_in_one_request_and_every_request_holds_cells(layout, most
     [
         (
             lambda: requests([value(9, "float32")], together=(Together(address=10, count=4),)),
-            "cuts the number at 9 in two",
+            "only a part of the value at register 9",
         ),
         (
             lambda: requests(
                 [value(10)], together=(Together(address=10, count=4), Together(address=13, count=4))
             ),
-            "share register 13",
+            "contain register 13",
         ),
         (
             lambda: MapDecoder(RegisterMap(values=(value(609, scale_register=SCALE),))),

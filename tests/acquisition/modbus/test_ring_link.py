@@ -13,7 +13,7 @@ from core.alarms.judgements import drift_reading
 
 
 @pytest.mark.parametrize(
-    ("trouble", "complaint"), [("frozen", "stand still"), ("writes nothing", "no usable slot")]
+    ("trouble", "complaint"), [("frozen", "no usable slot"), ("writes nothing", "no usable slot")]
 )
 async def test_a_device_that_stands_still_or_counts_but_writes_nothing_is_not_connected(
     trouble, complaint, device, server, source_at, stepped_clock
@@ -57,7 +57,10 @@ async def test_a_device_without_a_ring_or_at_another_address_is_a_config_error(
     device, server, source_at
 ):
     device.memory.clear()
-    for base_address, complaint in ((0, "magic is 0x0000, expected 0x5057"), (40_000, "illegal a")):
+    for base_address, complaint in (
+        (0, "magic is 0x0000, expected 0x5057"),
+        (40_000, "illegal data a"),
+    ):
         with pytest.raises(ConfigError, match=complaint):
             async with source_at(server.port, base_address=base_address).connect():
                 pass

@@ -230,7 +230,7 @@ async def test_one_header_of_an_epoch_that_has_ended_does_not_make_old_samples_n
                 device.memory.write(0, old_header if n_looks == 1 else new_header)
 
         device.memory.before_read = show_old_header_once
-        with pytest.raises(LinkError, match="epoch or layout change"):
+        with pytest.raises(LinkError, match="epoch or layout differ"):
             await anext(stream)
     device.memory.before_read = None
     device.produce(1)

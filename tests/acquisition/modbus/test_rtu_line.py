@@ -18,7 +18,7 @@ async def test_a_reply_that_comes_too_late_is_never_taken_for_the_next_one(hosti
     await link.open()
     right = await link.read(1, 1)
     hostile_line.lie = keep
-    with pytest.raises(LinkError, match=r"no answer within 0\.1 s"):
+    with pytest.raises(LinkError, match=r"no reply within 0\.1 s"):
         await link.read(0, 1)
     with pytest.raises(LinkError, match="closed"):
         await link.read(1, 1)
@@ -63,7 +63,7 @@ async def test_what_is_no_port_is_a_link_error_that_names_it(name, complaint, li
 async def test_two_programs_cannot_read_one_line(hostile_line, link_on):
     first, second = (link_on(hostile_line.path, timeout_s=0.05) for _ in range(2))
     await first.open()
-    with pytest.raises(LinkError, match="line: another program has the port"):
+    with pytest.raises(LinkError, match="line: the port is in use by another program"):
         await second.open()
     first.close()
 
@@ -71,7 +71,7 @@ async def test_two_programs_cannot_read_one_line(hostile_line, link_on):
 async def test_settings_that_a_port_refuses_are_a_config_error(hostile_line, link_on):
     link = link_on(hostile_line.path, parity="even")  # a pseudo-terminal has no parity
     for _ in range(2):  # the first try leaves the port to the second
-        with pytest.raises(ConfigError, match="line: the port refuses its settings"):
+        with pytest.raises(ConfigError, match="line: the port rejects the settings"):
             await link.open()
 
 

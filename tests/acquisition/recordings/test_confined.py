@@ -44,7 +44,8 @@ def test_limits_are_never_raised(given: int, memory: int) -> None:
 
 def test_a_library_that_is_not_installed_is_named_with_how_to_get_it() -> None:
     with pytest.raises(
-        ConfigError, match=r"^XYZ needs absent_one: pip install 'padwatch\[imports\]'$"
+        ConfigError,
+        match=r"^importing XYZ requires absent_one; run pip install 'padwatch\[imports\]'$",
     ):
         library("absent_one", "XYZ")
 
@@ -67,13 +68,17 @@ def test_a_child_that_the_system_has_ended_is_no_fault_of_the_recording(
     with monkeypatch.context() as patch:
         ended = partial(ConfinedProcess, "ended")
         patch.setattr(reading, "_idle_or_new", ended)
-        with pytest.raises(ConfigError, match=f"recording: reading it was ended by {number}") as it:
+        with pytest.raises(
+            ConfigError, match=f"recording: the reading process was ended by {number}"
+        ) as it:
             list(recording.heads())
     assert isinstance(it.value.__cause__, cause)
     with monkeypatch.context() as patch:
         patch.setattr(reading, "ConfinedProcess", lambda *_, **__: ended())
         reading.close_idle_children()
-        with pytest.raises(ConfigError, match=f"no process to read it: .*{number}") as it:
+        with pytest.raises(
+            ConfigError, match=f"reading process cannot be started: .*{number}"
+        ) as it:
             list(recording.heads())
     assert isinstance(it.value.__cause__, OSError)
     assert len(list(recording.heads())) == 1
@@ -95,7 +100,7 @@ def test_a_crash_that_leaves_the_request_unread_is_a_refusal_too(
     monkeypatch.syspath_prepend(tmp_path)
     with monkeypatch.context() as patch:
         patch.setattr(reading, "_idle_or_new", partial(ConfinedProcess, "crashes"))
-        words = "recording: not readable as recording: reading it was ended by SIGSEGV"
+        words = "recording: cannot be read as recording: the reading process was ended by SIGSEGV"
         with pytest.raises(ConfigError, match=words) as error:
             list(recording.heads())
     assert isinstance(error.value.__cause__, EOFError)  # of the file, not of the system

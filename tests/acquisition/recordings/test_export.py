@@ -131,14 +131,14 @@ def test_a_channel_of_any_name_is_exported_or_refused_by_name(
         export_recording(recording, kind, tmp_path / "run.out")
     except ConfigError as error:
         assert kind is not ExportFormat.CSV
-        assert f"channel '{id_}' has a name that the format reserves" in str(error)  # noqa: PT017
+        assert f"channel '{id_}' has a name that Parquet exports reserve" in str(error)  # noqa: PT017
     names = sorted(path.name for path in tmp_path.iterdir())
     assert names in (["recording"], ["recording", "run.out"])
 
 
 def test_nothing_is_overwritten_or_left_half_done(recording: Recording, tmp_path: Path) -> None:
     (tmp_path / "there").write_text("precious")
-    with pytest.raises(ConfigError, match="there: already exists"):
+    with pytest.raises(ConfigError, match="there: the file exists already"):
         export_recording(recording, ExportFormat.CSV, tmp_path / "there")
     assert (tmp_path / "there").read_text() == "precious"
     with pytest.raises(ConfigError, match=r"out: .*No such file"):

@@ -128,20 +128,16 @@ HOSTILE: list[tuple[str, Callable[[Path], bytes], str]] = [
         (
             "samples.parquet",
             lambda sound, n=n_unpacked: first_page_replaced(sound, 0, n, ROWS),
-            "needs more than 256 MiB of memory to read",
+            "requires more than 256 MiB of memory",
         )
         for n_unpacked in (300_000_000, 2**31 - 1)
     ),
     (
         "samples.parquet",
         lambda sound: first_page_replaced(sound, 2, 4000, 2**31 - 1),
-        "needs more than 256 MiB of memory to read",
+        "requires more than 256 MiB of memory",
     ),
-    (
-        "blocks.parquet",
-        text_repeated_from_a_dictionary,
-        "a reason of 1 to 64 letters",
-    ),
+    ("blocks.parquet", text_repeated_from_a_dictionary, "a reason of 1 to 64 characters"),
     *(
         (
             "samples.parquet",

@@ -146,14 +146,12 @@ def test_a_recording_being_written_is_none_yet_and_is_never_overwritten(
     with RecordingWriter(folder, unit, "a test") as recorder:
         recorder.write(numbered(0, 10))
         assert [path.name for path in tmp_path.iterdir()] == ["run.incomplete"]
-        with pytest.raises(
-            ConfigError, match=r"run\.incomplete: no manifest.json, so no recording"
-        ):
+        with pytest.raises(ConfigError, match=r"run\.incomplete: manifest.json is missing"):
             open_recording(tmp_path / "run.incomplete")
-        with pytest.raises(ConfigError, match=r"run\.incomplete: already exists: being"):
+        with pytest.raises(ConfigError, match=r"run\.incomplete: the folder exists already"):
             RecordingWriter(folder, unit, "another")
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
-    with pytest.raises(ConfigError, match="run: already exists"):
+    with pytest.raises(ConfigError, match="run: folder exists already"):
         RecordingWriter(folder, unit, "another")
     assert open_recording(folder).manifest.n_samples == 10
 
@@ -189,21 +187,18 @@ def test_a_recording_that_was_broken_off_or_is_empty_leaves_nothing(
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"rate_hz": 500.0}, "at 500.0 Hz in a recording at 600.0 Hz"),
-        ({"counts": np.zeros((3, 5), np.int16)}, "3 channels"),
+        ({"rate_hz": 500.0}, "expected a block at 600.0 Hz, got 500.0 Hz"),
+        ({"counts": np.zeros((3, 5), np.int16)}, r"got \(3, 2, 2"),
         ({"counts": np.zeros((2, 5), np.int32)}, "int32"),
-        (
-            {"counts": np.zeros((2, 5), np.float32)},
-            "as float32, to be recorded are 2 and 2 as int16",
-        ),
-        ({"counts": np.zeros((2, 0), np.int16)}, "0 samples"),
-        ({"counts": np.zeros((2, 131_073), np.int16)}, "131073 samples"),
-        ({"ok": (True,)}, "block of"),
-        ({"slow": (math.nan,)}, "1 slow values"),
-        ({"first_index": -1}, "first index -1"),
-        ({"epoch": 2**60}, "epoch 1152921504606846976"),
-        ({"rejected": (Rejection("torn", 11),)}, "11 samples rejected in a jump of 10"),
-        ({"rejected": (Rejection("x" * 65, 1),)}, "reason of 1 to 64 letters"),
+        ({"counts": np.zeros((2, 5), np.float32)}, "'int16'.*got .*'float32'"),
+        ({"counts": np.zeros((2, 0), np.int16)}, "1 to 131072, got 0"),
+        ({"counts": np.zeros((2, 131_073), np.int16)}, "got 131073"),
+        ({"ok": (True,)}, r"got \(2, 1, 2"),
+        ({"slow": (math.nan,)}, r"got \(2, 2, 1"),
+        ({"first_index": -1}, "first index of a block .* got -1"),
+        ({"epoch": 2**60}, "epoch of a block .* got 1152921504606846976"),
+        ({"rejected": (Rejection("torn", 11),)}, "11 rejected, but 10 missing"),
+        ({"rejected": (Rejection("x" * 65, 1),)}, "reason of 1 to 64 characters"),
     ],
     ids=str,
 )
@@ -289,7 +284,7 @@ def test_another_unit_or_calibration_is_refused(
         {"channels": gains},
     ):
         with (
-            pytest.raises(ConfigError, match="not those"),
+            pytest.raises(ConfigError, match="another calibration"),
             RecordingWriter(tmp_path / "run", unit.model_copy(update=change), "x") as recorder,
         ):
             recorder.write_block(block)

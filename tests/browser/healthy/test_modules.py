@@ -23,9 +23,9 @@ DRAWN_WITHOUT_A_SIZE = """async (files) => {
 CONNECTED = {"state": "connected", "reason": None, "data_age_s": 0.2}
 DRIFT = {"kind": "clock_drift", "level": "alert", "is_active": True, "value": 300.0}
 DRIFT |= {"limit": 200.0, "value_unit": "ppm"}
-SILENT = {"state": "not_connected", "reason": "daq:502: no answer within 0.5 s"}
-OTHER = SILENT | {"reason": "daq:502: its vendor is 'A', expected is 'B'"}
-NAMELESS = SILENT | {"reason": "daq:502: no name server answers within 1.0 s"}
+SILENT = {"state": "not_connected", "reason": "daq:502: no reply within 0.5 s"}
+OTHER = SILENT | {"reason": "daq:502: wrong device: vendor is 'A', expected 'B'"}
+NAMELESS = SILENT | {"reason": "daq:502: no name server answered within 1.0 s"}
 UNKNOWN = SILENT | {"reason": "daq:502: [Errno -3] Temporary failure in name resolution"}
 
 

@@ -4,7 +4,7 @@ import re
 
 from playwright.async_api import expect
 
-NOT_WATCHED = "This film is not watched: operating states need power_channel and rated_power_mw."
+NOT_WATCHED = "This film is not watched: operating states require power_channel and rated_power_mw."
 
 
 async def test_pages_without_contents_say_why(plant, page, complaints) -> None:

@@ -49,7 +49,9 @@ def test_an_acknowledgement_of_the_last_occurrence_does_not_swallow_the_next(lif
     for condition, now in ((ALERT, 0), (WITHIN, 1), (ALERT, 2)):
         alarm.find(condition, now)
 
-    with pytest.raises(ActionRefusedError, match="occurrence 1 was meant, the newest is 2"):
+    with pytest.raises(
+        ActionRefusedError, match="occurrence 1 is not the newest; check occurrence 2"
+    ):
         alarm.ask(Acknowledge("A. Name", 1))
 
     assert alarm.alarm.state is AlarmState.UNACKNOWLEDGED
@@ -158,7 +160,9 @@ def test_a_clock_that_was_ahead_when_an_alarm_was_shelved_does_not_hide_it_for_l
         assert (after, events) == (alarm.alarm, ())
     else:
         assert after.state is AlarmState.UNACKNOWLEDGED
-        assert [event.reason for event in events] == ["the clock was set back since it was shelved"]
+        assert [event.reason for event in events] == [
+            "the clock was set back after the alarm was shelved"
+        ]
 
 
 def test_out_of_service_hides_more_than_the_shelf_and_ends_only_by_hand(life: Make) -> None:

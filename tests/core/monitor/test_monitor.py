@@ -239,9 +239,9 @@ def test_a_gap_voids_the_segment_it_touches_and_counts_it(
 
 def test_foreign_blocks_are_refused_naming_both(monitor: UnitMonitor, blocks, signals) -> None:
     block = next(blocks(signals(1.0)))
-    with pytest.raises(ValueError, match="'U2' in the monitor of 'U1'"):
+    with pytest.raises(ValueError, match="unit 'U1', got 'U2'"):
         monitor.ingest(of_unit(block, unit="U2"))
-    with pytest.raises(ValueError, match=r"1000\.0 Hz, configured 600\.0 Hz"):
+    with pytest.raises(ValueError, match=r"at 600\.0 Hz, got 1000\.0 Hz"):
         monitor.ingest(of_unit(block, rate_hz=1000.0))
 
 

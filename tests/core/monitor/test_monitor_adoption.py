@@ -84,12 +84,12 @@ SWAPPED = Bearing("UJB", 1.18e9, "sy", "sx", "bx", "by", 200.0, (2000.0, 2000.0)
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"id": "U2"}, "id is 'U2', is 'U1' here"),
-        ({"rate_hz": 1000.0}, r"rate_hz is 1000\.0, is 600\.0 here"),
-        ({"channels": ()}, r"channels is \(\), is \(Channel"),
-        ({"rated_speed_rpm": 100.0}, r"rated_speed_rpm is 100\.0, is 92\.3 here"),
-        ({"speed_channel": None}, "speed_channel is None, is 'speed' here"),
-        ({"bearings": ()}, r"bearings is \(\), is \(\('UJB', "),
+        ({"id": "U2"}, "id is 'U2', expected 'U1'"),
+        ({"rate_hz": 1000.0}, r"rate_hz is 1000\.0, expected 600\.0"),
+        ({"channels": ()}, r"channels is \(\), expected \(Channel"),
+        ({"rated_speed_rpm": 100.0}, r"rated_speed_rpm is 100\.0, expected 92\.3"),
+        ({"speed_channel": None}, "speed_channel is None, expected 'speed'"),
+        ({"bearings": ()}, r"bearings is \(\), expected \(\('UJB', "),
         ({"bearings": (SWAPPED,)}, "'sy', 'sx', 'bx', 'by'"),
     ],
 )

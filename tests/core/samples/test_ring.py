@@ -146,5 +146,5 @@ def test_no_more_is_rejected_than_the_index_leaves_room_for(refused: tuple[int, 
 
 
 def test_a_block_with_other_channels_is_refused_naming_both() -> None:
-    with pytest.raises(ValueError, match="2 channels offered to a ring of 3"):
+    with pytest.raises(ValueError, match="3 channels, got 2"):
         Ring(3, CAPACITY).write(block(0, 10))

@@ -60,7 +60,7 @@ async def test_an_acknowledgement_of_the_newest_occurrence_is_durable_when_it_is
     probes.send(3, Reason.SENSOR_FAILURE)
 
     problem = await service.refused(ACKNOWLEDGE, 409, {**ANNA, "occurrence": 2})
-    assert "the newest is 1" in problem["detail"]
+    assert "check occurrence 1" in problem["detail"]
     [alarm] = (await service.json(ALARMS))["alarms"]
     assert alarm["state"] == "unacknowledged"
     body = {**ANNA, "occurrence": 1, "comment": "cable torn"}

@@ -193,7 +193,7 @@ async def test_a_hole_in_a_recording_is_null_and_behind_its_end_is_nothing(
     assert body["n_samples"] == 3000
     assert body["total_s"] == pytest.approx(7.0)
     for problem in (inside, behind):
-        assert "it is 7 s long" in problem["detail"]
+        assert "its length is 7 s" in problem["detail"]
 
 
 async def test_a_damaged_recording_is_not_played(

@@ -109,5 +109,5 @@ def test_known_times_are_written_as_expected(time_ns: int, written: str) -> None
 
 
 def test_a_time_without_offset_is_refused_rather_than_guessed() -> None:
-    with pytest.raises(ProblemError, match="end needs an offset from UTC"):
+    with pytest.raises(ProblemError, match="end requires an offset from UTC"):
         ns_from_datetime(datetime(2026, 1, 1), "end")

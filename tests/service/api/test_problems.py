@@ -45,14 +45,14 @@ async def test_an_unknown_unit_bearing_or_path_is_not_found(read_only: Any) -> N
         ("start", "2026-01-03T00:00:00Z", "must be before end"),
         ("start", "2026-01-02T00:00:00Z", "must be before end"),
         ("start", "2026-01-01T00:00:00", "offset from UTC"),
-        ("start", "yesterday", "written like 2026-11-21T08:00:00Z"),
-        ("start", "1767225600", "written like 2026-11-21T08:00:00Z"),
+        ("start", "yesterday", "must be RFC 3339, such as 2026-11-21T08:00:00Z"),
+        ("start", "1767225600", "must be RFC 3339, such as 2026-11-21T08:00:00Z"),
         ("start", "1e-5", ""),
         ("start", "2026-02-30T00:00:00Z", "day value is outside expected range"),
         ("start", "2026-01-01T25:00:00Z", "valid datetime"),
         ("start", "+10000-01-01T00:00:00Z", ""),
         ("end", "2025-01-01T00:00:00Z", "must be before end"),
-        ("end", "", "written like"),
+        ("end", "", "must be RFC 3339"),
         ("eccentricity_min", "nan", "finite number"),
         ("oil_temperature_max", "warm", "valid number"),
         ("quantity", "stiffness", "not in the catalogue"),
@@ -60,7 +60,7 @@ async def test_an_unknown_unit_bearing_or_path_is_not_found(read_only: Any) -> N
         ("group_by", "weekday", ""),
         ("quantity", ["speed_rpm", "speed"], "not in the catalogue"),
         ("quantity", ["speed_rpm"] * 41, "at most 40"),
-        ("max_point", 10, "there is no parameter 'max_point' here; known: quantity, state"),
+        ("max_point", 10, "unknown parameter 'max_point'; known parameters: quantity, state"),
     ],
 )
 async def test_a_wrong_query_is_answered_with_the_parameter_and_what_is_allowed(
@@ -105,7 +105,7 @@ async def test_a_parameter_that_nobody_knows_is_refused_everywhere(read_only: An
         problem = await read_only.problem(f"/{path}", 422, verbose=1)
 
         assert problem["errors"][0]["parameter"] == "verbose"
-        assert problem["detail"] == "there is no parameter 'verbose' here; known: none"
+        assert problem["detail"] == "unknown parameter 'verbose'; known parameters: none"
 
 
 async def test_a_problem_document_has_at_most_2_kb_whatever_was_asked(read_only: Any) -> None:
@@ -140,7 +140,7 @@ async def test_a_store_that_cannot_be_read_is_503_without_its_innards(running: A
 
     for path, query in ((TRENDS, GOOD), ("/api/v1/units/U1/gaps", WHOLE)):
         problem = await running.problem(path, 503, **query)
-        assert problem["detail"] == "the store cannot be read just now"
+        assert problem["detail"] == "the store cannot be read now"
 
 
 async def test_far_years_are_no_error(read_only: Any) -> None:

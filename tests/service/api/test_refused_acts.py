@@ -76,7 +76,7 @@ def refusing(service: Any, table: str) -> Iterator[None]:
 
 @pytest.mark.parametrize(
     ("table", "title"),
-    [("high_water", "Nothing was done"), ("alarm_event", "Not on the disk yet")],
+    [("high_water", "Action not applied"), ("alarm_event", "Not stored yet")],
 )
 async def test_an_acknowledgement_that_cannot_be_stored_is_refused_and_may_be_repeated(
     service: Any, probes: Probes, monkeypatch: pytest.MonkeyPatch, table: str, title: str
@@ -106,7 +106,7 @@ async def test_nothing_is_acknowledged_while_the_database_file_is_gone(
 
     problem = await service.refused(ACKNOWLEDGE, 503, body)
 
-    assert problem["title"] == "Nothing was done"
+    assert problem["title"] == "Action not applied"
     assert "the database file was removed while padwatch runs" in problem["detail"]
     aside.rename(path)
     assert (await post(service, ACKNOWLEDGE, body)).status_code == 200

@@ -134,7 +134,7 @@ def test_nothing_is_foretold_from_minutes_or_of_what_does_not_grow() -> None:
 @pytest.mark.parametrize("unit", ["share", "gb"])
 def test_a_danger_that_comes_before_its_alert_is_refused(unit: str) -> None:
     asked = {f"danger_free_{unit}": 0.5, f"alert_free_{unit}": 0.4}
-    with pytest.raises(ValidationError, match=f"must be below alert_free_{unit}, 0.4"):
+    with pytest.raises(ValidationError, match=f"must be below alert_free_{unit} = 0.4"):
         SpaceSettings.model_validate(asked)
 
 

@@ -26,13 +26,13 @@ class Standing:
     @asynccontextmanager
     async def connect(self):
         if self._refuses:
-            raise LinkError("the device answers but its data stand still")
+            raise LinkError("the device replies, but the newest sample has not changed")
         yield self._stream()
 
     async def _stream(self):
         for block in self._blocks:
             yield block
-        raise LinkError("the device answers but its data stand still")
+        raise LinkError("the device replies, but the newest sample has not changed")
 
 
 def block(number: int, clock: DeviceClock | None = None) -> SampleBlock:
@@ -72,7 +72,7 @@ async def test_before_its_end_a_lost_link_is_lost_and_a_daq_that_is_gone_is_not_
     over, refuses: bool
 ) -> None:
     daq = Standing([FIRST], refuses)
-    with pytest.raises(LinkError, match="stand still"):
+    with pytest.raises(LinkError, match="has not changed"):
         await taken(PlayedOut(daq, threading.Event()))
     gone = over
     source = PlayedOut(daq, threading.Event(), gone)

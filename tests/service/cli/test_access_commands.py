@@ -110,15 +110,15 @@ def test_roles_and_passwords_change_and_accounts_go(
     ("arguments", "password", "said"),
     [
         (("add", "anna"), PASSWORD, "account anna already exists"),
-        (("add", "=anna"), PASSWORD, "a name has 1 to 64"),
-        (("add", "berta"), "short", "a password has 12 to 256 characters"),
-        (("add", "berta"), b"\xff" * 12, "no UTF-8 text"),
+        (("add", "=anna"), PASSWORD, "a name must have 1 to 64"),
+        (("add", "berta"), "short", "a password must have 12 to 256"),
+        (("add", "berta"), b"\xff" * 12, "does not contain UTF-8 text"),
         (("add", "berta"), "x" * 5000, "more than a password"),
-        (("add", "berta"), "", "there is no terminal to ask on; use --password-fd"),
+        (("add", "berta"), "", "no terminal for the password prompt; use --password-fd"),
         (("add", "berta", "--password-fd", "999999"), "", "file descriptor 999999"),
         (("add", "berta", "--role", "root"), PASSWORD, "Invalid value"),
         (("role", "anna", "viewer"), "", "anna is the only admin"),
-        (("role", "nobody", "viewer"), "", "there is no account nobody"),
+        (("role", "nobody", "viewer"), "", "account nobody does not exist"),
     ],
 )
 def test_what_cannot_be_done_ends_with_one_sentence_and_changes_nothing(
@@ -155,7 +155,7 @@ def test_a_key_is_shown_once_and_opens_until_it_is_revoked(
     doors = CredentialChecker(access, Hashing(), Backoff())
     assert isinstance(doors.machine(key, NOW_NS), Identity)
     said = [padwatch("keys", "revoke", listed["id"]).stdout for _ in range(2)]
-    assert said == [f"{listed['id']}: revoked\n", f"{listed['id']}: was revoked already\n"]
+    assert said == [f"{listed['id']}: revoked\n", f"{listed['id']}: was already revoked\n"]
     assert doors.machine(key, NOW_NS) is None
     assert ", revoked, " in padwatch("keys", "list").stdout
 
@@ -163,11 +163,14 @@ def test_a_key_is_shown_once_and_opens_until_it_is_revoked(
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("create", "historian", "--unit", "U9"), "there is no unit U9; known are U1, U2"),
+        (("create", "historian", "--unit", "U9"), "unknown unit U9; known units: U1, U2"),
         (("create", "historian", "--days", "0"), "Invalid value"),
-        (("create", "a b"), "a name has 1 to 64"),
-        (("create", "historian", "--role", "admin", "--unit", "U1"), "cannot have the role admin"),
-        (("revoke", "000000000000"), "there is no key 000000000000"),
+        (("create", "a b"), "a name must have 1 to 64"),
+        (
+            ("create", "historian", "--role", "admin", "--unit", "U1"),
+            "must not have the role admin",
+        ),
+        (("revoke", "000000000000"), "key 000000000000 does not exist"),
     ],
 )
 def test_a_key_that_cannot_be_is_not_made(

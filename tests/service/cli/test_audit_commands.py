@@ -38,7 +38,7 @@ def test_a_whole_trail_is_whole(plant_path: Path, database: Path) -> None:
     said, document = audit("verify", plant_path), audit("verify", plant_path, "--json")
     found = json.loads(document.stdout)
     assert (said.exit_code, document.exit_code) == (0, 0)
-    assert said.stdout.startswith(f"{len(HOSTILE)} entries are whole; the last has the hash ")
+    assert said.stdout.startswith(f"{len(HOSTILE)} entries are intact; the hash of the last is ")
     assert (found["is_whole"], found["n_entries"], found["finding"]) == (True, len(HOSTILE), None)
     assert found["hash"] == json.loads(head_path(database).read_text())["hash"]
 

@@ -95,11 +95,11 @@ def test_settings_are_tried_and_wrong_ones_refused_with_their_line(
 @pytest.mark.parametrize(
     ("options", "code", "says"),
     [
-        (["--learn-until", "2025-01-02"], 2, "needs an offset from UTC"),
+        (["--learn-until", "2025-01-02"], 2, "requires an offset from UTC"),
         (["--learn-days", "0"], 2, "greater than or equal to 1"),
-        (["--event", "overhaul"], 2, "is not an event like"),
-        (["--event", "U9 2025-01-02T00:00:00Z"], 1, "event of U9: there are no readings of it"),
-        (["--export", "."], 2, ".: exists already"),
+        (["--event", "overhaul"], 2, "is not an event such as"),
+        (["--event", "U9 2025-01-02T00:00:00Z"], 1, "event of U9: the file has no readings of U9"),
+        (["--export", "."], 2, ".: the file or folder exists already"),
     ],
 )
 def test_wrong_options_are_refused(

@@ -52,7 +52,7 @@ def test_what_was_taken_back_since_the_copy_is_not_given_again(
         assert states == {"old": KeyState.REVOKED, "new": KeyState.VALID}
         assert store.access.sessions.get(b"d" * 32) is None
     for words in (
-        "all logins are ended; accounts, with the passwords of then: anna, bert",
+        "all sessions are ended; accounts, with passwords of the copy: anna, bert",
         "accounts that did not exist before: bert (padwatch users remove)",
         f"valid keys: new ({keys[1].id}) (padwatch keys revoke)",
         f"keys revoked since the copy, and revoked again: {keys[0].id}",

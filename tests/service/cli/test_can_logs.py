@@ -87,7 +87,7 @@ def test_a_log_of_two_devices_under_the_same_ids_is_refused(
     decoder = CanLogDecoder(daq_settings(shape, link, ("um", "um")), counts_calibration())
     job = ImportJob(format="candump", rate_hz=600.0, time=TimeAxis("file", 0))
     every_batch = (decoder.take(frames) for frames, _ in imported_frames(tmp_path / "log", job))
-    with pytest.raises(ConfigError, match="do two devices send the same ids"):
+    with pytest.raises(ConfigError, match="do two devices send the same CAN ids"):
         list(every_batch)
 
 

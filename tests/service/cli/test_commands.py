@@ -72,7 +72,7 @@ def test_a_command_that_looks_says_that_there_is_no_database_and_makes_none(
     places = {"PLANT": plant_path, "OUT.csv": plant_path.with_name("out.csv")}
     result = padwatch(*(places.get(word, word) for word in command.split()))
     assert result.exit_code == 1
-    assert re.search("there is no (such )?database", result.stderr)
+    assert re.search("the database does not exist", result.stderr)
     assert [path.name for path in plant_path.parent.iterdir()] == ["plant.toml"]
 
 

@@ -54,13 +54,13 @@ def test_a_fault_is_injected_where_and_as_often_as_told(devices) -> None:
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("", "'' is not UNIT FAULT [COUNT]"),
-        ("U1", "'U1' is not UNIT FAULT [COUNT]"),
-        ("U1 drop three", "'U1 drop three' is not UNIT FAULT [COUNT]"),
-        ("U1 drop -1", "'U1 drop -1' is not UNIT FAULT [COUNT]"),
-        ("U1 drop 1000001", "COUNT is 1000001, at most 1000000"),
-        ("U1 drop 1 2", "'U1 drop 1 2' is not UNIT FAULT [COUNT]"),
-        ("U3 drop", "no unit U3 here; known are U1, U2"),
+        ("", "command must be UNIT FAULT [COUNT], got ''"),
+        ("U1", "command must be UNIT FAULT [COUNT], got 'U1'"),
+        ("U1 drop three", "command must be UNIT FAULT [COUNT], got 'U1 drop three'"),
+        ("U1 drop -1", "command must be UNIT FAULT [COUNT], got 'U1 drop -1'"),
+        ("U1 drop 1000001", "COUNT must be at most 1000000, got 1000001"),
+        ("U1 drop 1 2", "command must be UNIT FAULT [COUNT], got 'U1 drop 1 2'"),
+        ("U3 drop", "unknown unit U3; known units: U1, U2"),
         ("U1 melt", "unknown fault melt; there are drop, tear"),
     ],
 )

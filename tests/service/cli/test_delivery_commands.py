@@ -76,8 +76,8 @@ async def test_a_test_message_that_is_not_taken_says_why(
 @pytest.mark.parametrize(
     ("command", "receiver", "code", "said"),
     [
-        ("test", "office", 2, "there is no receiver office; the plant file has desk"),
-        ("retry", "desk", 1, "there is no such database"),
+        ("test", "office", 2, "unknown receiver office; known receivers: desk"),
+        ("retry", "desk", 1, "the database does not exist"),
     ],
 )
 async def test_what_needs_a_receiver_or_a_database_is_refused_without(

@@ -36,5 +36,5 @@ def test_commands_work_on_the_server_and_make_no_file(plant_path: Path, tmp_path
 def test_copies_are_left_to_the_servers_own_tools(plant_path: Path, tmp_path: Path) -> None:
     for arguments in (("backup", plant_path, tmp_path), ("restore", plant_path, tmp_path / "copy")):
         said = run(*arguments, exit_code=1)
-        assert "is copied with pg_dump or pg_basebackup" in said
+        assert "must be copied with pg_dump or pg_basebackup" in said
         assert len(said.strip().splitlines()) == 1

@@ -169,8 +169,12 @@ async def test_a_device_tells_who_it_is(probe, server, gateway) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
-        (("modbus", "127.0.0.1:{port}", "--address", "5000"), 1, "illegal address"),
-        (("modbus", "127.0.0.1:{port}", "--address", "0", "--function", "1"), 1, "illegal address"),
+        (("modbus", "127.0.0.1:{port}", "--address", "5000"), 1, "illegal data address"),
+        (
+            ("modbus", "127.0.0.1:{port}", "--address", "0", "--function", "1"),
+            1,
+            "illegal data address",
+        ),
         (("modbus", "127.0.0.1:1", "--address", "0"), 1, "refused"),
         (("modbus", "/dev/there-is-none", "--address", "0"), 1, "No such file"),
         (("modbus", "127.0.0.1:port", "--address", "0"), 2, "integer"),
@@ -201,7 +205,7 @@ async def test_another_device_than_the_map_is_for_is_refused(probe, server, tmp_
     result = await probe("map", str(path), "--at", at(server))
 
     assert result.exit_code == 1
-    assert "another device than configured: register 40101" in result.stderr
+    assert "wrong device: register 40101" in result.stderr
 
 
 async def test_the_map_of_a_plants_rack_is_read_with_units(probe, tmp_path: Path) -> None:
@@ -244,5 +248,5 @@ async def test_the_map_of_a_plants_rack_is_read_with_units(probe, tmp_path: Path
     assert found["speed"]["unit"] == "r/min"
     assert len(table.stdout.splitlines()) == 13
     assert other.exit_code == none.exit_code == 2
-    assert "the source of unit U2 has no register map" in other.stderr
-    assert "the slow_source of unit U1 has no register map" in none.stderr
+    assert "source of unit U2 has no register map" in other.stderr
+    assert "slow_source of unit U1 has no register map" in none.stderr

@@ -75,7 +75,7 @@ def test_each_recording_with_something_wrong_is_named_with_it(plant: Path) -> No
         ("U1-4.incomplete", "unfinished"),
     ]
     assert document["sound"] == 1
-    assert "bytes, the manifest says" in document["recordings"][0]["reason"]
+    assert "bytes, expected" in document["recordings"][0]["reason"]
     assert sorted(path.name for path in root.iterdir()) == before
 
 

@@ -70,7 +70,7 @@ def test_a_recorded_unit_can_be_read_back(plant_path: Path, tmp_path: Path) -> N
     again = padwatch(*command)
     assert (again.exit_code, again.stdout) == (1, "")
     assert again.stderr == (
-        f"padwatch record: {out}: already exists; a recording is never overwritten\n"
+        f"padwatch record: {out}: folder exists already; a recording is not overwritten\n"
     )
 
 
@@ -150,12 +150,12 @@ def test_a_unit_has_to_be_chosen_and_to_exist(plant_path: Path, tmp_path: Path) 
     result = padwatch("record", plant_path, "--out", tmp_path / "run")
     assert (result.exit_code, result.stderr) == (
         2,
-        f"padwatch record: {plant_path}: has units U1, U2; choose one with --unit\n",
+        f"padwatch record: {plant_path}: choose one of the units U1, U2 with --unit\n",
     )
     result = padwatch("record", plant_path, "--unit", "U3", "--out", tmp_path / "run")
     assert (result.exit_code, result.stderr) == (
         2,
-        f"padwatch record: {plant_path}: has no unit U3, it has U1, U2\n",
+        f"padwatch record: {plant_path}: unknown unit U3; known units: U1, U2\n",
     )
 
 
@@ -203,9 +203,9 @@ def test_another_calibration_is_told_and_used_only_when_asked_for(
     before, told = shaft_x()
     after, told_again = shaft_x("--calibration", "plant")
     assert after / before == pytest.approx(4.0 / 3.9, rel=1e-6)
-    words = "channel ujb_shaft_x: unit_per_v was 250 when recorded, is 256.410256 now; used is the"
-    assert told == f"{recording}: {words} recorded one\n"
-    assert told_again == f"{recording}: {words} plant one\n"
+    words = "channel ujb_shaft_x: unit_per_v was 250 when recorded, is 256.410256 now; the"
+    assert told == f"{recording}: {words} recorded calibration is used\n"
+    assert told_again == f"{recording}: {words} plant calibration is used\n"
 
 
 def test_a_recording_too_short_for_a_segment_says_so(
@@ -215,4 +215,4 @@ def test_a_recording_too_short_for_a_segment_says_so(
         writer.write(feed_of(plant.unit[0], SystemClock()).advance(4095))
     result = padwatch("reanalyse", tmp_path / "short", "--plant", plant_path)
     assert (result.exit_code, result.stdout) == (1, ""), result.stderr
-    assert "no segment of 4096 samples without a gap" in result.stderr
+    assert "no 4096 successive samples are without a gap" in result.stderr

@@ -90,7 +90,7 @@ def test_verify_reads_every_page(folder: Path) -> None:
     result = padwatch_recording("verify", folder)
     assert (result.exit_code, result.stdout) == (
         0,
-        f"{folder}: sound, 200 samples of each channel\n",
+        f"{folder}: intact, 200 samples of each channel\n",
     )
     assert json.loads(padwatch_recording("verify", folder, "--json").stdout) == {
         "folder": str(folder),
@@ -106,7 +106,9 @@ def test_a_damaged_recording_is_one_sentence_and_exit_code_1(folder: Path, comma
     (folder / "samples.parquet").write_bytes(content)
     result = padwatch_recording(command, folder)
     assert (result.exit_code, result.stdout) == (1, "")
-    damaged = f"padwatch recording {command}: {folder}/samples.parquet: damaged: checksum"
+    damaged = (
+        f"padwatch recording {command}: {folder}/samples.parquet: file is damaged: its checksum is"
+    )
     assert result.stderr.startswith(damaged)
     assert result.stderr.count("\n") == 1
 
@@ -167,19 +169,24 @@ def test_what_is_exported_can_be_imported_again(
 @pytest.mark.parametrize(
     ("old", "new", "code", "words"),
     [
-        ('unit = "um"', 'unit = "mm/s"', 1, "channel ujb_shaft_x: unit 'mm/s' does not fit gap_um"),
+        (
+            'unit = "um"',
+            'unit = "mm/s"',
+            1,
+            "channel ujb_shaft_x: unit 'mm/s' cannot be converted to gap_um",
+        ),
         (
             "ujb_shaft_x",
             "ujb_shaft_z",
             1,
             "channel ujb_shaft_z is mapped, but unit U1 has ujb_shaft",
         ),
-        ('zone = "UTC"', "", 2, "time.zone (by default): is needed"),
+        ('zone = "UTC"', "", 2, "time.zone (by default): is required"),
         (
             'unit = "r/min"',
             'unit = "degF"',
             1,
-            "unit 'degF' does not fit r/min; use one of r/min, Hz",
+            "unit 'degF' cannot be converted to r/min; use one of r/min, Hz",
         ),
     ],
 )
@@ -208,4 +215,4 @@ def test_a_mapping_that_does_not_fit_is_refused_and_leaves_nothing(
 def test_nothing_that_exists_is_overwritten(folder: Path) -> None:
     result = padwatch_recording("export", folder, "--format", "csv", "--out", folder)
     assert result.exit_code == 1
-    assert "already exists; nothing is overwritten" in result.stderr
+    assert "the file exists already and is not overwritten" in result.stderr

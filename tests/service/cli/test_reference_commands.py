@@ -31,7 +31,7 @@ def test_what_was_set_is_listed_with_time_author_and_what_was_before(plant_path:
     assert [result.exit_code for result in (first, second, text)] == [0, 0, 0]
     assert first.stdout.startswith("U1 UJB: 1998.5, 2003.1 µm, given, set 20")
     assert first.stdout.endswith("Z by A. Name\n")
-    assert first.stderr.endswith("a new database; is that where the service runs?\n")
+    assert first.stderr.endswith("created a new database; check that the service uses it\n")
     assert second.stderr == ""
     assert json.loads(second.stdout) == listed["U1", "UJB"]
     upper = listed["U1", "UJB"]
@@ -57,12 +57,12 @@ def test_what_was_set_is_listed_with_time_author_and_what_was_before(plant_path:
     [
         ((), {"x_um": "nan"}, "gap x is nan µm, must be above 0 and at most 10000 µm"),
         ((), {"opposite_x_um": 2000}, "bearing UJB has no opposite probe in x"),
-        ((), {"bearing": "XJB"}, "unit U1 has no bearing XJB, it has UJB, LJB, TJB"),
-        ((), {"unit": "U9"}, "has no unit U9, it has U1, U2"),
+        ((), {"bearing": "XJB"}, "unit U1: unknown bearing XJB; known bearings: UJB, LJB, TJB"),
+        ((), {"unit": "U9"}, "unknown unit U9; known units: U1, U2"),
         (
             ("--measured",),
             {"x_um": None, "y_um": None},
-            "there is no stored result yet",
+            "no result is stored yet",
         ),
         (("--measured",), {}, "padwatch reference set: give gaps or --measured, not both"),
     ],

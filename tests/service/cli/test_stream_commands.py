@@ -22,7 +22,7 @@ SECRET = STREAM.replace("nats://", "nats://user:secret@")
         ("analyse", STREAM, ("--partition", "2"), "such as 1/2"),
         ("analyse", STREAM, ("--partition", "3/2"), "such as 1/2"),
         ("analyse", STREAM, ("--partition", "3/3"), "empty"),
-        ("acquire", STREAM, ("--unit", "U9"), "no unit 'U9'; known are U1, U2"),
+        ("acquire", STREAM, ("--unit", "U9"), "unknown unit 'U9'; known units: U1, U2"),
         ("acquire", SECRET, (), "servers"),
         ("serve", "", ("--port", "0"), NEEDS_POSTGRESQL),
     ],

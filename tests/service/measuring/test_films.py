@@ -176,7 +176,7 @@ async def test_engineers_decide_where_it_is_left_to_them(plant: Plant, film_life
     assert in_force(keeper) == 2
     with pytest.raises(BaselineRefusedError, match="version 2 is already in force"):
         await keeper.act(UJB, Accept(2), "Ada", "again")
-    with pytest.raises(BaselineRefusedError, match="no version 7"):
+    with pytest.raises(BaselineRefusedError, match="version 7 does not exist"):
         await keeper.act(UJB, Accept(7), "Ada", "a guess")
     await keeper.act(UJB, Reject(2), "Bo", "the oil sensor was wrong")
     assert in_force(keeper) is None

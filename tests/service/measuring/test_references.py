@@ -170,12 +170,12 @@ def test_as_many_gaps_are_needed_as_there_are_probes() -> None:
 @pytest.mark.parametrize(
     ("of", "near", "opposite", "said"),
     [
-        (bearing(), (1.0, None), NONE, "both axes, x and y"),
-        (bearing(), (None, 1.0), NONE, "both axes, x and y"),
-        (bearing(), NONE, NONE, "both axes, x and y"),
+        (bearing(), (1.0, None), NONE, "give the gaps in x and y"),
+        (bearing(), (None, 1.0), NONE, "give the gaps in x and y"),
+        (bearing(), NONE, NONE, "give the gaps in x and y"),
         (bearing(), (1.0, 2.0), (None, 3.0), "no opposite probe in y"),
-        (FOUR, (1.0, 2.0), NONE, "an opposite probe in x: give its gap"),
-        (FOUR, (1.0, 2.0), (3.0, None), "an opposite probe in y: give its gap"),
+        (FOUR, (1.0, 2.0), NONE, "an opposite probe in x; give its gap"),
+        (FOUR, (1.0, 2.0), (3.0, None), "an opposite probe in y; give its gap"),
         (THREE, (1.0, 2.0), (3.0, 4.0), "no opposite probe in y"),
     ],
 )
@@ -204,7 +204,7 @@ def test_the_newest_mean_gaps_become_the_reference_and_doubtful_ones_are_named()
 @pytest.mark.parametrize(
     ("found", "said"),
     [
-        (None, "no stored result yet"),
+        (None, "no result is stored yet"),
         (newest(23.0), r"from 2025-12-31T23:37:00\.000Z, 23 min ago; the maximum age is 10 min"),
         (newest(10.1), "10 min ago"),
         (newest(-23.0), "23 min ahead of this computer's clock"),

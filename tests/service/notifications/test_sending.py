@@ -169,7 +169,7 @@ async def test_what_grew_too_old_is_given_up_at_once_when_an_attempt_fails(room:
     (backlog,) = store.outbox.backlogs()
     assert backlog.n_dead == 5
     assert backlog.last_dead is not None
-    assert backlog.last_dead.answer == "too old after: 503"
+    assert backlog.last_dead.answer == "expired after the last failure: 503"
 
 
 YEAR_NS = 365 * 86_400 * 10**9

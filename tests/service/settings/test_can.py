@@ -65,7 +65,7 @@ def test_the_example_dbc_can_be_named_as_any_other(unit, stepped_clock):
             {"profile": "padwatch_int16", "channel": "socket://127.0.0.1:x"},
             "a simulated DAQ cannot use channel",
         ),
-        ({"dbc": "demo_classic.dbc", "signals": {"x": "A.b"}}, "reads CAN by its own DBC"),
+        ({"dbc": "demo_classic.dbc", "signals": {"x": "A.b"}}, "the messages of a DBC file"),
     ],
 )
 def test_a_daq_that_cannot_be_simulated_is_refused(keys, said, unit, stepped_clock):

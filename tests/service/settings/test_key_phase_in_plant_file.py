@@ -66,13 +66,13 @@ ROLL = f"{CHANNEL_1}slow_roll."
 @pytest.mark.parametrize(
     ("old", "new", "key", "said"),
     [
-        ('e = "kp"', 'e = "kq"', "unit[1].key_phase = 'kq'", "such channels: kp"),
+        ('e = "kp"', 'e = "kq"', "unit[1].key_phase = 'kq'", "known: kp"),
         ('e = "kp"', 'e = "ujb_bearing_x"', "unit[1].key_phase = 'ujb_", 'transducer "key_phase"'),
-        ('_x = "ujb_shaft_x"', '_x = "kp"', "unit[1].bearing[1].shaft_x = 'kp'", "not a vibration"),
+        ('_x = "ujb_shaft_x"', '_x = "kp"', "unit[1].bearing[1].shaft_x = 'kp'", "be a vibration"),
         (KEY, f"{KEY}\nsensitivity = 1.0", f"{CHANNEL_13}sensitivity = 1.0", "remove it"),
         (KEY, f'{KEY}\nsensitivity_unit = "V/mm"', f"{CHANNEL_13}sensitivity_unit", "remove it"),
         (KEY, f"{KEY}\n{VECTOR}", f"{CHANNEL_13}slow_roll", "remove it"),
-        (BEARING_X, f'{BEARING_X}probe = "S"\n', "unit[1].channel[3].probe = 'S'", "is a velocity"),
+        (BEARING_X, f'{BEARING_X}probe = "S"\n', "unit[1].channel[3].probe = 'S'", "not velocity"),
         ("um_pk = 8.0", "um_pk = -8.0", f"{ROLL}um_pk = -8.0", "equal to 0"),
         ("= 30.0", "= 400.0", f"{ROLL}phase_deg = 400.0", "360"),
         ("= 8.0, taken", "= 0.0, taken", f"{ROLL}speed_rpm = 0.0", "than 0"),

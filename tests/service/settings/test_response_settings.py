@@ -128,13 +128,13 @@ def test_a_calibration_sheet_is_read_as_it_was_written(tmp_path: Path, text: str
         (HEADER + "1,1,0\n3,1,0\n2,1,0\n", r":4: frequency_hz must be above .*3, got 2"),
         (HEADER + "1,1,0\n1,1,0\n", r":3: frequency_hz must be above .*1, got 1"),
         (HEADER + "1,1,0\n2,,0\n3,1,0\n", r":3: magnitude is missing"),
-        (HEADER + "1,1,0\n\n3,1,0\n", r":3: needs 3 values, got 0"),
-        (HEADER + "1,1,0\n2,1\n", r":3: needs 3 values, got 2"),
+        (HEADER + "1,1,0\n\n3,1,0\n", r":3: expected 3 values, got 0"),
+        (HEADER + "1,1,0\n2,1\n", r":3: expected 3 values, got 2"),
         (HEADER + "1,1,0\n2,0,0\n", r":3: magnitude must be above 0, got 0"),
         (HEADER + "1,nan,0\n2,1,0\n", r":2: magnitude must be finite, got nan"),
         (HEADER + "1,1,0\ninf,1,0\n", r":3: frequency_hz must be finite, got inf"),
         (HEADER + "1,1,zero\n2,1,0\n", r":2: phase_deg must be a number, got 'zero'"),
-        (HEADER + "1,1,0\n", r":2: needs two points or more, got 1"),
+        (HEADER + "1,1,0\n", r":2: expected at least two points, got 1"),
     ],
 )
 def test_a_wrong_sheet_is_refused_with_file_and_line(
@@ -152,7 +152,7 @@ def test_what_is_no_text_or_not_there_is_refused(tmp_path: Path) -> None:
         read_calibration_sheet(tmp_path)
     path = tmp_path / "sheet.csv"
     path.write_bytes(HEADER.encode() + b"1,1,0\n\xff\xfe\n")
-    with pytest.raises(SheetError, match=r"sheet\.csv:3: not UTF-8"):
+    with pytest.raises(SheetError, match=r"sheet\.csv:3: byte 39 is not valid UTF-8"):
         read_calibration_sheet(path)
     path.write_bytes(b"#" * 1_000_001)
     with pytest.raises(SheetError, match="larger than 1000000 bytes"):

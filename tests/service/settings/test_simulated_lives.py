@@ -90,12 +90,12 @@ def test_a_unit_with_fixed_films_has_no_past(stepped_clock: Any) -> None:
 
 def test_a_unit_that_cannot_have_this_life_is_refused(tmp_path: Path, stepped_clock: Any) -> None:
     odd = plant_with(LIFE.replace("life_seed = 2", "life_seed = 3"), tmp_path).unit[0]
-    with pytest.raises(ConfigError, match=r"rated_speed_rpm = 92\.3, but its life requires 90\.9"):
+    with pytest.raises(ConfigError, match=r"rated_speed_rpm = 92\.3, but life_seed requires 90\.9"):
         simulated_feed(odd, stepped_clock)
     living = plant_with(LIFE, tmp_path).unit[0]
     narrow = living.bearing[0].model_copy(update={"clearance_um": 200.0})
     unit = living.model_copy(update={"bearing": (narrow, *living.bearing[1:])})
-    with pytest.raises(ConfigError, match="UJB clearance_um = 200, but its life requires 500"):
+    with pytest.raises(ConfigError, match="UJB clearance_um = 200, but life_seed requires 500"):
         simulated_history(unit, stepped_clock.now_ns())
 
 
@@ -111,15 +111,15 @@ def test_a_life_is_no_fixed_scenario(tmp_path: Path) -> None:
     [
         ("life_seed = 2", "life_seed = -1", "simulation.life_seed = -1"),
         ("held_load = 0.95", "held_load = 0.0", "simulation.held_load = 0.0"),
-        ("held_load = 0.95", "power_mw = 300.0", "power_mw = 300.0: follows from life_seed"),
-        ("life_seed = 2\n", "speed_rpm = 92.3\n", "held_load = 0.95: needs life_seed"),
+        ("held_load = 0.95", "power_mw = 300.0", "power_mw = 300.0: applies only without life"),
+        ("life_seed = 2\n", "speed_rpm = 92.3\n", "held_load = 0.95: applies only with life_seed"),
         ("life_seed = 2\nheld_load = 0.95\n", "", "damage"),
         ("size = 0.2", "size = 1.2", "damage[1].size = 1.2"),
-        ("size = 0.2", "size = -0.2", "damage[1].size = -0.2: must be above 0; only gains"),
+        ("size = 0.2", "size = -0.2", "damage[1].size = -0.2: must be above 0, except for a gain"),
         ('"stiffness_loss"', '"rust"', "damage[1].kind = 'rust'"),
         ('"UJB"', '"XJB"', "damage[1].bearing = 'XJB'"),
-        ("after_s = 120.0\n", "", "needs either after_s or at"),
-        ("after_s = 120.0", "after_s = 1.0\nat = 2026-01-01T00:00:00Z", "either after_s or at"),
+        ("after_s = 120.0\n", "", "exactly one of after_s and at"),
+        ("after_s = 120.0", "after_s = 1.0\nat = 2026-01-01T00:00:00Z", "one of after_s and at"),
         ("after_s = 120.0", "at = 2026-01-01T00:00:00", "timezone"),
     ],
 )

@@ -53,7 +53,7 @@ def test_a_polled_source_gives_a_value_for_every_channel() -> None:
     with pytest.raises(MisfitError, match="no value for channel 'ljb_shaft_x'") as refusal:
         source.require_fit((*IDS, "ljb_shaft_x"), ())
     assert refusal.value.at == ("source", "map")
-    with pytest.raises(MisfitError, match="no such channel as 'ujb_bearing_y'") as refusal:
+    with pytest.raises(MisfitError, match="unknown channel 'ujb_bearing_y'") as refusal:
         source.require_fit(IDS[:3], ())
     assert refusal.value.at == ("source", "map", "value", 3, "channel")
 
@@ -71,25 +71,25 @@ def test_a_rack_gives_the_amplitude_of_every_channel() -> None:
 
 
 def test_vectors_and_samples_are_not_taken_for_each_other() -> None:
-    with pytest.raises(MisfitError, match='for kind "modbus_vector"'):
+    with pytest.raises(MisfitError, match='requires kind "modbus_vector"'):
         polled(map=None, map_file=SKF, poll_period_s=5.0).require_fit(IDS, ("speed",))
     amplitudes = [
         {"channel": id_, "address": n, "quantity": "order1_amplitude", "detector": "pk"}
         for n, id_ in enumerate(IDS)
     ]
     plain = {"value": [*amplitudes, *({"channel": i, "address": 90} for i in IDS[:1])]}
-    with pytest.raises(MisfitError, match='need a "quantity"'):
+    with pytest.raises(MisfitError, match="requires a vector quantity"):
         vector(map=plain, map_file=None).require_fit(IDS, ())
 
 
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"map_file": None}, 'give either a [map] table or "map_file"'),
-        ({"map": WAVES}, 'give either a [map] table or "map_file"'),
-        ({"map_file": "maps/absent.toml"}, "names a map that cannot be used"),
-        ({"poll_period_s": 0.5}, "must be 1 or more, as the register map asks"),
-        ({"poll_period_s": 40.0}, "must be two poll periods or more, 80"),
+        ({"map_file": None}, "exactly one of map and map_file must be given"),
+        ({"map": WAVES}, "exactly one of map and map_file must be given"),
+        ({"map_file": "maps/absent.toml"}, "register map cannot be used"),
+        ({"poll_period_s": 0.5}, "must be at least 1 s, the minimum in the register map"),
+        ({"poll_period_s": 40.0}, "must be at least two poll periods, 80 s"),
         ({"hop_polls": 61}, "must not be above n_polls, 60"),
         ({"min_polls": 61}, "must not be above n_polls, 60"),
     ],
@@ -101,7 +101,9 @@ def test_a_rack_that_can_never_work_is_refused(settings: dict[str, Any], said: s
 
 
 def test_a_device_is_not_given_less_time_than_its_map_asks() -> None:
-    with pytest.raises(ValidationError, match="must be 1 or more, as the register map asks"):
+    with pytest.raises(
+        ValidationError, match="must be at least 1 s, the minimum in the register map"
+    ):
         polled(map=WAVES | {"min_timeout_s": 1.0}, timeout_s=0.9)
 
 
@@ -126,7 +128,7 @@ def test_a_slow_device_measures_slow_channels_alone() -> None:
 
     slow.require_fit(known)
     assert slow.mapped_channels == known
-    with pytest.raises(MisfitError, match="no such channel as 'ljb_oil_temperature'") as refusal:
+    with pytest.raises(MisfitError, match="unknown channel 'ljb_oil_temperature'") as refusal:
         slow.require_fit(known[:3])
     assert refusal.value.at == ("slow_source", "map_file")
 
@@ -142,8 +144,8 @@ def test_a_queue_of_twelve_channels_fits_into_a_reading() -> None:
     ("settings", "n_channels", "said"),
     [
         ({}, 31, "at most 31"),
-        ({"addresses": [0, 1]}, 2, "must be 1, got 2"),
-        ({"layout": "per_channel"}, 2, "must be 2, got 1"),
+        ({"addresses": [0, 1]}, 2, "number of addresses must be 1, got 2"),
+        ({"layout": "per_channel"}, 2, "number of addresses must be 2, got 1"),
     ],
 )
 def test_queues_that_do_not_fit_the_channels_are_refused(settings, n_channels: int, said) -> None:
@@ -160,7 +162,7 @@ TWO = {"layout": "per_channel", "addresses": [0, 1]}
     [
         ({"has_counter": False, "reading": "keeps"}, "which samples are new"),
         (TWO | {"has_counter": False}, "belong together"),
-        (TWO | {"addresses": [5, 5]}, "names a queue twice"),
+        (TWO | {"addresses": [5, 5]}, "must not contain an address twice"),
         ({"addresses": [70_000]}, "less than or equal to 65535"),
     ],
 )
@@ -191,7 +193,7 @@ def test_an_identity_reaches_the_adapter_as_it_was_written() -> None:
         ({"kind": "signature", "address": 0, "words": [65_536]}, "less than or equal to 65535"),
         ({"kind": "signature", "address": 65_535, "words": [1, 2]}, "beyond register 65535"),
         ({"kind": "signature", "address": 0, "words": [1], "function": 6}, "should be 3 or 4"),
-        ({"kind": "identification"}, "needs vendor, product_code or revision"),
+        ({"kind": "identification"}, "vendor, product_code or revision must"),
         ({"kind": "face"}, "'signature', 'identification'"),
     ],
 )
@@ -230,18 +232,18 @@ def test_a_can_source_is_read_by_its_dbc_or_by_a_profile(tmp_path):
 @pytest.mark.parametrize(
     ("change", "key", "words"),
     [
-        ({"dbc": None}, "dbc", "dbc or profile must be given, found neither"),
+        ({"dbc": None}, "dbc", "exactly one of dbc and profile must be given, found neither"),
         ({"profile": "padwatch_int16"}, "dbc", "found both"),
         ({"signals": {}}, "signals", "must name a signal for each waveform channel"),
         ({"seconds": "T.s"}, "microseconds", "must be given together"),
         ({"microseconds": "T.us"}, "seconds", "must be given together"),
         ({"data_bitrate": 2_000_000}, "data_bitrate", "set fd = true"),
-        ({"stamps": "interface"}, "stamps", 'must be "host": slcan has no time stamps'),
-        ({"interface": "socketcan"}, "bitrate", "is set in the operating system: ip link set"),
+        ({"stamps": "interface"}, "stamps", 'must be "host": slcan sends no time stamps'),
+        ({"interface": "socketcan"}, "bitrate", "must be set in the operating system: ip link set"),
         (
             {"counter_counts": "frames", "frame_samples": ["W.n"]},
             "counter_counts",
-            'needs "samples"',
+            'must be "samples"',
         ),
     ],
 )
@@ -267,7 +269,7 @@ CAN_OWN = ({"signals": {"x": "A.b"}}, {"counters": ["A.b"]}, {"epoch": "A.b"})
         (CAN | {"hold_s": 0.0}, "greater than or equal"),
         (CAN | {"when_full": "block"}, "drop"),
         (CAN | {"options": {"a b": 1}}, "pattern"),
-        *((CAN_PROFILE | own, "a profile has its own") for own in CAN_OWN),
+        *((CAN_PROFILE | own, "applies only with dbc, not with profile") for own in CAN_OWN),
     ],
 )
 def test_a_wrong_value_of_a_can_source_is_refused(source, words):
@@ -278,10 +280,10 @@ def test_a_wrong_value_of_a_can_source_is_refused(source, words):
 @pytest.mark.parametrize(
     ("channels", "slow", "words"),
     [
-        (["x"], ["oil"], "no such channel; there are x"),
-        (["x", "y", "z"], ["oil"], "has no signal for z"),
-        (["x", "y"], [], "no such channel; there are none"),
-        (["x", "y"], ["oil", "speed"], "has no signal for speed"),
+        (["x"], ["oil"], "unknown channel; known channels: x"),
+        (["x", "y", "z"], ["oil"], "names no signal for z"),
+        (["x", "y"], [], "unknown channel; known channels: none"),
+        (["x", "y"], ["oil", "speed"], "names no signal for speed"),
     ],
 )
 def test_channels_and_signals_of_can_must_be_one_to_one(channels, slow, words):

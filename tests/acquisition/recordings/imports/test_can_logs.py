@@ -91,30 +91,30 @@ def test_like_frames_of_two_buses_are_never_mixed(
             channel = f"can{n % 2}" if kind == "candump" else n % 2
             log(can.Message(timestamp=1e9 + n, arbitration_id=1, data=bytes([n]), channel=channel))
     job = log_job(kind)
-    words = f'has frames of bus "{buses[0]}" and of bus "{buses[1]}": say by bus = "{buses[0]}"'
+    words = f'"{buses[0]}" and of bus "{buses[1]}"; select one, such as bus = "{buses[0]}"'
     with pytest.raises(ConfigError, match=words):
         all_frames(tmp_path / "log", job)
     for n, bus in enumerate(buses):
         (batch,) = all_frames(tmp_path / "log", replace(job, bus=bus))
         assert batch["data"][:, 0].tolist() == list(range(n, 100, 2))
-    with pytest.raises(ConfigError, match='has no frame of bus "9", but of bus'):
+    with pytest.raises(ConfigError, match='has no frame of bus "9"; its bus is'):
         all_frames(tmp_path / "log", replace(job, bus="9"))
 
 
 @pytest.mark.parametrize(
     ("lines", "words"),
     [
-        (["(1.0) can0 12345678901#00"], "line 1: .* is not a frame"),
-        (["(1.0) can0 123#00", "(1.0) can0 FFFFFFFF#00"], "line 2: .* is not a frame"),
-        (["(1.0) can0 800#00"], "frame 1: id 0x800, length 1, 1 bytes of data are impossible"),
-        (["(1.0) can0 123#000102030405060708"], "9 bytes of data are impossible on a bus"),
-        (["(1.0) can0 123##1" + "00" * 63], "63 bytes of data are impossible on a bus"),
-        (["(1.0) can0 123#0"], "line 1: .* is not a frame"),
-        (["(nan) can0 123#00"], "line 1: .* is not a frame"),
+        (["(1.0) can0 12345678901#00"], "line 1: .* is not a candump frame"),
+        (["(1.0) can0 123#00", "(1.0) can0 FFFFFFFF#00"], "line 2: .* is not a candump frame"),
+        (["(1.0) can0 800#00"], "frame 1: id 0x800, length 1 and 1 bytes of data are not"),
+        (["(1.0) can0 123#000102030405060708"], "9 bytes of data are not a valid CAN frame"),
+        (["(1.0) can0 123##1" + "00" * 63], "63 bytes of data are not a valid CAN frame"),
+        (["(1.0) can0 123#0"], "line 1: .* is not a candump frame"),
+        (["(nan) can0 123#00"], "line 1: .* is not a candump frame"),
         (["(999999999999.0) can0 123#00"], "is not a valid time"),
-        (["(1.0) can0 123#00" * 1000], "line 1: .* is not a frame"),
-        (["\x00\x01\x02"], "line 1: .* is not a frame"),
-        (["(1.0) can0 123#" + "zz"], "line 1: .* is not a frame"),
+        (["(1.0) can0 123#00" * 1000], "line 1: .* is not a candump frame"),
+        (["\x00\x01\x02"], "line 1: .* is not a candump frame"),
+        (["(1.0) can0 123#" + "zz"], "line 1: .* is not a candump frame"),
     ],
 )
 def test_frames_that_were_on_no_bus_are_refused(

@@ -18,14 +18,14 @@ START_NS = 1_767_225_600_000_000_000
 
 def test_thousands_are_not_taken_for_decimals(read_text: ReadText) -> None:
     german = CsvLayout(delimiter=";", decimal=",")
-    with pytest.raises(ConfigError, match=r"line 2: .*'\.' in number '1\.234'"):
+    with pytest.raises(ConfigError, match=r"line 2 .*number '1\.234' contains '\.'"):
         read_text("time;shaft x;shaft y\n0;1.234;2\n", csv=german)
 
 
 @pytest.mark.parametrize("year", ["9999", "2256", "1600", "0001"])
 def test_a_year_that_no_clock_can_have_had_is_refused(read_text: ReadText, year: str) -> None:
     axis = TimeAxis("column", 0, ColumnName("time"), "iso8601")
-    with pytest.raises(ConfigError, match=r"a time of .* s since 1970 is out of range"):
+    with pytest.raises(ConfigError, match=r"time .* s since 1970 is out of range"):
         read_text(f"time,shaft x,shaft y\n{year}-12-31T00:00:00,1,2\n", time=axis)
 
 
@@ -59,7 +59,7 @@ def test_a_unit_in_a_heading_must_be_the_mapped_one(read_text: ReadText, job: Im
     channels = tuple(
         replace(c, place=ColumnName(n)) for c, n in zip(job.channels, names, strict=True)
     )
-    with pytest.raises(ConfigError, match=r"'shaft x \[mm\]' is in 'mm', the mapping says 'um'"):
+    with pytest.raises(ConfigError, match=r"'shaft x \[mm\]' has unit 'mm', expected 'um'"):
         read_text(text, channels=channels)
     channels = (replace(channels[0], unit="mm", factor=1000.0), channels[1])
     found = read_text(text, channels=channels)
@@ -118,7 +118,7 @@ def test_a_pause_of_no_whole_number_of_samples_is_a_restart() -> None:
     "rate_hz", [150.0, 300.0, 400.0, 450.0, 500.0, 590.0, 601.0, 800.0, 1200.0]
 )
 def test_another_rate_is_refused_naming_both_and_never_taken_for_gaps(rate_hz: float) -> None:
-    words = rf"at 600 Hz are needed; there they come at {rate_hz:.6g}"
+    words = rf"expected samples at 600 Hz, found about {rate_hz:.6g}"
     with pytest.raises(ConfigError, match=words[:-1]):
         found_index(stamps(np.arange(20_000), rate_hz, 1))
 
@@ -126,28 +126,28 @@ def test_another_rate_is_refused_naming_both_and_never_taken_for_gaps(rate_hz: f
 def test_a_rate_that_changes_on_the_way_is_refused() -> None:
     first = stamps(np.arange(10_000))
     rest = first[-1] + stamps(np.arange(1, 5000), 300.0) - START_NS
-    with pytest.raises(ConfigError, match="there they come at 300 Hz"):
+    with pytest.raises(ConfigError, match="found about 300 Hz"):
         found_index(np.concatenate([first, rest]))
 
 
 def test_time_that_goes_back_or_stands_still_is_refused() -> None:
     times_ns = stamps(np.arange(1000))
     times_ns[700:] -= 10**9
-    with pytest.raises(ConfigError, match=r"row 701: time goes back by 599\.\d+ samples"):
+    with pytest.raises(ConfigError, match=r"row 701: time goes back by 599\.\d+ sampling periods"):
         found_index(times_ns)
     times_ns = stamps(np.arange(1000))
     times_ns[700:] = np.roll(times_ns[700:], 1)
     times_ns[700] = times_ns[699]
-    with pytest.raises(ConfigError, match=r"row 701: time goes back by -?0\.000 samples"):
+    with pytest.raises(ConfigError, match=r"row 701: time goes back by -?0\.000 sampling periods"):
         found_index(times_ns)
 
 
 def test_a_stamp_off_its_place_is_refused() -> None:
-    with pytest.raises(ConfigError, match="off its place"):  # too coarse for the rate
+    with pytest.raises(ConfigError, match="time stamp deviates"):  # too coarse for the rate
         found_index(stamps(np.arange(20_000), 900.0, 10**6), rate_hz=900.0)
     times_ns = stamps(np.arange(1000))
     times_ns[500] += 800_000
-    with pytest.raises(ConfigError, match=r"row 501: a stamp \+0\.480 samples off its place"):
+    with pytest.raises(ConfigError, match=r"row 501: the time stamp deviates by \+0\.480"):
         found_index(times_ns)
 
 

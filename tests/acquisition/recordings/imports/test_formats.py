@@ -152,7 +152,7 @@ def test_slow_values_whose_time_goes_back_are_refused(
     run: Any, imported: Imported, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
     monkeypatch.setattr(type(run), "slow_s", np.array([0.0, 2.0, 1.0]))
-    with pytest.raises(ConfigError, match="the time of slow channel oil goes back"):
+    with pytest.raises(ConfigError, match="the times of slow channel oil go back"):
         imported(kind, run.units_um)
 
 
@@ -171,10 +171,10 @@ def test_a_unit_or_a_column_that_is_not_the_mapped_one_is_refused(
     run: Any, imported: Imported, kind: str
 ) -> None:
     group = "" if kind == "csv" else "waveforms"
-    with pytest.raises(ConfigError, match="shaft z' is not there"):
+    with pytest.raises(ConfigError, match="shaft z' does not exist"):
         imported(kind, run.units_um, with_channels(place=ColumnName("shaft z", group)))
     if kind != "csv":  # has units in its headings only
-        says = r"'waveforms/shaft x' is in '(u|µ)m', the mapping says"
+        says = r"'waveforms/shaft x' has unit '(u|µ)m', expected"
         with pytest.raises(ConfigError, match=says):
             imported(kind, run.units_um, with_channels(unit="mm/s"))
 
@@ -254,12 +254,14 @@ def test_waveforms_of_different_lengths_or_times_are_refused(
     with h5py.File(tmp_path / "run.mf4", "w") as file:
         file["time"] = run.since_start_s
         file["shaft x"], file["shaft y"] = run.units_um[0], run.units_um[1, :-1]
-    with pytest.raises(ConfigError, match="'shaft y' has 1262 samples, column 'shaft x' has 1263"):
+    with pytest.raises(
+        ConfigError, match="'shaft y' has 1262 samples, but column 'shaft x' has 1263"
+    ):
         read(tmp_path / "run.mf4", replace(job, format="hdf5", slow=()))
     with asammdf.MDF() as mdf:
         for axis, delay_s, values in zip("xy", (0.0, 0.0005), run.units_um, strict=True):
             mdf.append(asammdf.Signal(values, run.since_start_s + delay_s, name=f"shaft {axis}"))
         mdf.save(tmp_path / "two.mf4")
     own = TimeAxis("file", 0)
-    with pytest.raises(ConfigError, match="'shaft y' was not sampled at the times of column"):
+    with pytest.raises(ConfigError, match="'shaft y' and 'shaft x' differ in their times"):
         read(tmp_path / "two.mf4", replace(job, format="mdf4", time=own, slow=()))

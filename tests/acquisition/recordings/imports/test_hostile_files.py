@@ -29,26 +29,32 @@ def csv_job(job: ImportJob) -> ImportJob:
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"", "column 'shaft x' is not there"),
-        (b"time,shaft x,shaft y\n0,1,2\n0.001,\x00,2\n", "line 3: has a NUL byte"),
-        (b"time,shaft x,shaft y\n0,1,2\n1,2\n", "line 3: 2 columns where the header has 3"),
-        (b"time,shaft x,shaft y\n0,1,2,3\n", "line 2: 4 columns where the header has 3"),
-        (b"time,shaft x,shaft y\n" + b"0" * 5_000_000, "line 2: longer than 1000000 bytes"),
-        (b"a" * 5_000_000, "line 1: longer than 1000000 bytes"),
-        (b"time,shaft x,shaft y\n0,eleven,2\n", "no number 'eleven'"),
-        (b"time,shaft x,shaft y\n0,=1+1,2\n", "no number '=1+1'"),
-        (b"time,shaft x,shaft y\nnan,1,2\n", "nan in the time column is not a valid time"),
-        (b"time,shaft x,shaft y\n1e300,1,2\n", "in the time column is not a valid time"),
+        (b"", "column 'shaft x' does not exist"),
+        (b"time,shaft x,shaft y\n0,1,2\n0.001,\x00,2\n", "line 3: the line contains a NUL byte"),
+        (b"time,shaft x,shaft y\n0,1,2\n1,2\n", "line 3: expected 3 columns, got 2"),
+        (b"time,shaft x,shaft y\n0,1,2,3\n", "line 2: expected 3 columns, got 4"),
+        (
+            b"time,shaft x,shaft y\n" + b"0" * 5_000_000,
+            "line 2: the line is longer than 1000000 bytes",
+        ),
+        (b"a" * 5_000_000, "line 1: the line is longer than 1000000 bytes"),
+        (b"time,shaft x,shaft y\n0,eleven,2\n", "'eleven' is not a valid number"),
+        (b"time,shaft x,shaft y\n0,=1+1,2\n", "'=1+1' is not a valid number"),
+        (b"time,shaft x,shaft y\nnan,1,2\n", "value nan of the time column is not a valid time"),
+        (b"time,shaft x,shaft y\n1e300,1,2\n", "of the time column is not a valid time"),
         (
             b"time,shaft x,shaft y\n9007199254,1,2\n",
-            "a time of 1.07744e+10 s since 1970 is out of range",
+            "time 1.07744e+10 s since 1970 is out of range",
         ),
-        (b"time,shaft x,shaft y\n0,1_000,2\n", "line 2: or one of those before it: '_' in number"),
-        (b"time,shaft x,shaft x\n0,1,2\n", "column 'shaft x' is there 2 times"),
-        (b"time,shaft x,shaft y\n\xff\xfe,1,2\n", "line 2: not UTF-8 text"),
+        (
+            b"time,shaft x,shaft y\n0,1_000,2\n",
+            "line 2 or a line shortly before it: number '1_000'",
+        ),
+        (b"time,shaft x,shaft x\n0,1,2\n", "column 'shaft x' occurs 2 times"),
+        (b"time,shaft x,shaft y\n\xff\xfe,1,2\n", "line 2: the line is not valid UTF-8"),
         (b'time,shaft x,shaft y\n"0,1,2\n' * 2, "line 4: "),
         (b'time,shaft x,shaft y\n"' + b"0,1,2\n" * 50_000, "field larger than field limit"),
-        (b"x," * 400_000 + b"\n", "400001 columns; at most 4096 are read"),
+        (b"x," * 400_000 + b"\n", "at most 4096 columns, got 400001"),
     ],
     ids=range(17),
 )
@@ -80,7 +86,7 @@ def test_a_million_columns_are_refused_or_read_in_bounded_memory(
     (tmp_path / "run.tdms").write_bytes(lead + meta)
     tdms_job = replace(placed(job), format="tdms", slow=())
     own_mb, child_mb, (said,) = measured(tdms_job, tmp_path / "run.tdms")
-    assert "is not there" in said or "needs more than 2048 MiB" in said
+    assert "does not exist" in said or "requires more than 2048 MiB" in said
     assert own_mb < 200
     assert child_mb < 2200
 
@@ -114,7 +120,7 @@ def test_a_reader_that_crashes_is_a_refusal(tmp_path: Path, read: Read, job: Imp
     lead = b"TDSm" + struct.pack("<IIQQ", 0x2, 4713, 72, 72)
     (tmp_path / "run").write_bytes(lead + struct.pack("<II", 1, 64) + b"\xff" * 64)
     says = refusal(read, tmp_path / "run", replace(job, format="tdms", slow=()))
-    assert ": not readable as tdms: " in says
+    assert ": cannot be read as tdms: " in says
 
 
 def test_places_in_groups_are_told_apart(tmp_path: Path, read: Read, job: ImportJob) -> None:
@@ -124,7 +130,7 @@ def test_places_in_groups_are_told_apart(tmp_path: Path, read: Read, job: Import
     one = replace(job.channels[0], place=ColumnName("shaft x"))
     start = TimeAxis("start", 0, start_ns=0)
     both = replace(job, format="tdms", channels=(one,), slow=(), time=start)
-    assert "'shaft x' is there 2 times: name its group" in refusal(read, tmp_path / "run", both)
+    assert "'shaft x' occurs 2 times; name its group" in refusal(read, tmp_path / "run", both)
 
 
 @pytest.fixture
@@ -137,9 +143,9 @@ def test_hdf5_links_to_elsewhere_are_not_followed(
 ) -> None:
     write_hdf5(tmp_path / "other")
     write_hdf5(tmp_path / "external", shaft_x=h5py.ExternalLink("other", "/shaft x"))
-    assert "'shaft x' is a link to elsewhere" in refusal(read, tmp_path / "external", hdf5_job)
+    assert "'shaft x' is a soft or external link" in refusal(read, tmp_path / "external", hdf5_job)
     write_hdf5(tmp_path / "soft", shaft_x=h5py.SoftLink("/shaft y"))
-    assert "'shaft x' is a link to elsewhere" in refusal(read, tmp_path / "soft", hdf5_job)
+    assert "'shaft x' is a soft or external link" in refusal(read, tmp_path / "soft", hdf5_job)
 
 
 def test_hdf5_that_has_no_such_dataset_is_refused(
@@ -148,17 +154,17 @@ def test_hdf5_that_has_no_such_dataset_is_refused(
     path = tmp_path / "run"
     with h5py.File(path, "w") as file:
         file.create_group("shaft x")
-    assert "'shaft x' is no dataset" in refusal(read, path, hdf5_job)
+    assert "'shaft x' is not a dataset" in refusal(read, path, hdf5_job)
     absent = replace(hdf5_job.channels[0], place=ColumnName("shaft x/y"))
     says = refusal(read, path, replace(hdf5_job, channels=(absent,)))
-    assert "dataset 'shaft x/y' is not there" in says
+    assert "dataset 'shaft x/y' does not exist" in says
 
 
 def test_a_file_without_times_of_its_own_says_what_to_name(
     tmp_path: Path, read: Read, hdf5_job: ImportJob
 ) -> None:
     own_times = replace(hdf5_job, time=TimeAxis("file", 0))
-    says = "column 'shaft x' has no time of its own: name a time column or a start"
+    says = "column 'shaft x' has no times in the file; name a time column or a start"
     write_hdf5(tmp_path / "run.h5")
     assert says in refusal(read, tmp_path / "run.h5", own_times)
     with nptdms.TdmsWriter(tmp_path / "run.tdms") as file:
@@ -172,15 +178,15 @@ def test_tdms_that_is_unfinished_or_no_tdms_is_refused(
 ) -> None:
     tdms_job, path = replace(job, format="tdms", slow=()), tmp_path / "run"
     path.write_bytes(b"TDSm" + struct.pack("<IIQQ", 0x2, 4713, 2**64 - 1, 0))
-    assert "has not finished its last segment" in refusal(read, path, tdms_job)
+    assert "the file is unfinished" in refusal(read, path, tdms_job)
     path.write_bytes(b"RIFF" + bytes(40))
-    assert "no TDMS file, or damaged: there is no segment at 0" in refusal(read, path, tdms_job)
+    assert "not a TDMS file, or a damaged one: byte 0" in refusal(read, path, tdms_job)
     path.write_bytes(b"TDSm" + struct.pack("<IIQQ", 0x2, 4713, 100, 0))
-    says = "cut off: its last segment ends at 128, the file at 28"
+    says = "the file is truncated: it has 28 bytes, expected 128"
     assert says in refusal(read, path, tdms_job)
     with nptdms.TdmsWriter(path) as file:
         file.write_segment([nptdms.ChannelObject("a", "shaft y", np.zeros(5))])
-    assert "'shaft x' is not there; the file has a/shaft y" in refusal(read, path, tdms_job)
+    assert "'shaft x' does not exist; the file has a/shaft y" in refusal(read, path, tdms_job)
 
 
 def test_hdf5_values_in_other_files_are_not_read(
@@ -212,16 +218,16 @@ def test_hdf5_values_that_nobody_has_written_are_not_zeros(
         if chunks:
             begun[:90] = 1.0
     says = refusal(read, tmp_path / "run", hdf5_job)
-    assert "dataset 'shaft y' is longer than what was written of it" in says
+    assert "dataset 'shaft y' is incomplete" in says
 
 
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        (np.zeros((100, 2)), "(100, 2) of float64; needed is one dimension of numbers"),
+        (np.zeros((100, 2)), "(100, 2) of float64; expected one dimension of numbers"),
         (np.array([b"a"] * 100), "has shape (100,) of |S1"),
         (np.zeros(100, np.complex128), "has shape (100,) of complex128"),
-        (np.zeros(0), "0 samples, column"),
+        (np.zeros(0), "0 samples, but column"),
     ],
     ids=["matrix", "text", "complex", "empty"],
 )
@@ -247,8 +253,8 @@ def test_hdf5_of_declared_and_packed_gigabytes_is_refused_in_little_memory(
             made = file.create_dataset(name, (n_rows,), "f4", chunks=(n_rows,), compression="gzip")
             made.id.write_direct_chunk((0,), packed)
     own_mb, child_mb, said = measured(hdf5_job, tmp_path / "declared", tmp_path / "packed")
-    assert "1073741824 samples per channel; 1 to 536870912 can be read" in said[0]
-    assert "'shaft x' has chunks of 2147483644 bytes; up to 67108864 can be read" in said[1]
+    assert "1 to 536870912 samples per channel, got 1073741824" in said[0]
+    assert "'shaft x' has chunks of 2147483644 bytes; the maximum is 67108864" in said[1]
     assert max(own_mb, child_mb) < 200
 
 
@@ -306,16 +312,16 @@ def test_objects_may_go_on_in_the_next_container(
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (lambda o: container(changed(o, 50, 8, 0)), "an object of length 0"),  # for ever
+        (lambda o: container(changed(o, 50, 8, 0)), "an object has length 0"),  # for ever
         (lambda o: container(changed(o, 50, 8, 60000)), "ends within an object"),
         (lambda o: container(changed(o, 50, 6, 3)), "Unknown object header version"),
-        (lambda o: container(changed(o, 50, 12, 7)[: len(o) // 2]), "50 objects, the header says"),
-        (lambda o: container(o[:-20]), "cut off: it ends within an object"),
+        (lambda o: container(changed(o, 50, 12, 7)[: len(o) // 2]), "50 objects, expected"),
+        (lambda o: container(o[:-20]), "truncated: it ends within an object"),
         (lambda o: container(o[:96] + bytes(40) + o[96:]), "Could not find next object"),
         (lambda o: container(zlib.compress(o), method=1), "Unknown compression method"),
         (lambda o: container(zlib.compress(o)[:-9], method=2, n_bytes=len(o)), "within an object"),
         (lambda _: container(b"\xff" * 99, method=2, n_bytes=9), "incorrect header check"),
-        (lambda o: o, "0 objects, the header says 100"),
+        (lambda o: o, "0 objects, expected 100"),
         (lambda _: OBJECT.pack(b"LOBJ", 16, 1, 20, 10) + bytes(4), "unpack_from requires a buffer"),
     ],
     ids=range(11),
@@ -336,7 +342,7 @@ def test_a_log_that_was_not_finished_is_refused(
     tmp_path: Path, blf_job: ImportJob, objects: bytes
 ) -> None:
     write(tmp_path / "run", container(objects), n_objects=0, n_bytes=HEADER)
-    with pytest.raises(ConfigError, match=r"its header says 144: cut off, or its writer"):
+    with pytest.raises(ConfigError, match=r"144 according to its header; it is truncated"):
         n_frames(tmp_path / "run", blf_job)
 
 
@@ -350,6 +356,6 @@ def test_a_container_that_unpacks_to_gigabytes_is_refused_in_little_memory(
     write(declared, container(packed, method=2, n_bytes=2**32 - 1))
     write(packed_more, container(packed, method=2, n_bytes=1000))
     own_mb, child_mb, said = measured(blf_job, declared, packed_more)
-    assert all("needs more than 256 MiB of memory to read" in words for words in said)
+    assert all("requires more than 256 MiB of memory" in words for words in said)
     assert own_mb < 250
     assert child_mb < 500

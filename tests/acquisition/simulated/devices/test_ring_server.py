@@ -171,7 +171,7 @@ def test_a_restarted_device_has_an_empty_ring_and_counts_from_zero(device):
 
 
 def test_a_ring_that_does_not_fit_into_the_address_space_is_refused(counting_feed):
-    with pytest.raises(ConfigError, match="end of the ring is"):
+    with pytest.raises(ConfigError, match="end of the ring must be"):
         RingDevice(counting_feed(n_channels=12), settings=RingDeviceSettings(n_slots=200))
 
 
@@ -180,7 +180,7 @@ def test_registers_that_do_not_exist_are_neither_written_nor_read():
     assert memory.read(99, 1) is None
     assert memory.read(105, 6) is None
     assert memory.read(105, 5) == bytes(10)
-    with pytest.raises(ValueError, match="registers 109 to 111 are not in 100 to 110"):
+    with pytest.raises(ValueError, match="registers 109 to 111 are not within 100 to 110"):
         memory.write(109, bytes(4))
 
 
@@ -205,7 +205,7 @@ def source(server, counts_calibration) -> RingSource:
 
 
 def test_an_unknown_fault_is_refused_with_those_that_are_known(server):
-    with pytest.raises(LookupError, match=r"no fault is called explode; known are .*busy.*tear"):
+    with pytest.raises(LookupError, match=r"unknown fault explode; known faults: .*busy.*tear"):
         server.inject("explode")
 
 

@@ -109,7 +109,7 @@ def test_forces_of_uneven_blocks_and_a_rate_of_zero_are_refused() -> None:
     rotor = lift(discrete_rotor(), 32)
     with pytest.raises(ValueError, match=r"\(6, 33\).*32 steps"):
         simulate(rotor, np.zeros(20), np.zeros((6, 33)))
-    with pytest.raises(ValueError, match="at least 1 step"):
+    with pytest.raises(ValueError, match="n_steps must be at least 1"):
         lift(discrete_rotor(), 0)
     with pytest.raises(ValueError, match="above 0 Hz"):
         discretize(MATRICES, np.zeros((10, 2)), np.zeros((12, 20)), 0.0)

@@ -134,7 +134,7 @@ def test_settings_that_do_not_fit_together_are_refused(
     for fitted, scenario, message in wrong:
         with pytest.raises(ConfigError, match=message):
             SimulatedUnit(machine, fitted, scenario, seed=1, start_ns=0)
-    with pytest.raises(ValueError, match="at least 1 sample, got 0"):
+    with pytest.raises(ValueError, match="n_samples must be at least 1, got 0"):
         SimulatedUnit(machine, calibration, quiet, seed=1, start_ns=0).advance(0)
 
 

@@ -204,15 +204,15 @@ def test_a_restart_begins_a_new_average(rack) -> None:
 
 def test_a_block_of_something_else_is_refused(rack) -> None:
     [block] = polls(60.0, 50.0, 20.0, 10.0, n=1)
-    with pytest.raises(ValueError, match="block of unit 'U2'"):
+    with pytest.raises(ValueError, match="block of unit 'U1', got 'U2'"):
         rack().ingest(of_unit(block, unit="U2"))
-    with pytest.raises(ValueError, match=r"1\.0 Hz, configured 0\.2 Hz"):
+    with pytest.raises(ValueError, match=r"at 0\.2 Hz, got 1\.0 Hz"):
         rack().ingest(of_unit(block, rate_hz=1.0))
-    with pytest.raises(ValueError, match="4 channels offered to a ring of 6"):
+    with pytest.raises(ValueError, match="6 channels, got 4"):
         rack(AMPLITUDES + GAPS).ingest(block)
     with pytest.raises(ValueError, match="no channel of unit"):
         rack((VectorRow("nowhere", VectorPart.GAP),))
-    with pytest.raises(ValueError, match="are the same"):
+    with pytest.raises(ValueError, match="rows must be unique"):
         rack((AMPLITUDES[0], AMPLITUDES[0]))
 
 

@@ -64,7 +64,7 @@ async def test_a_password_that_somebody_else_has_set_opens_nothing_but_its_chang
             shown = {"Cookie": f"__Host-padwatch={as_token(done)}"}
             opened = await client.get("/api/v1/units", headers=shown)
         assert (first.status_code, first.json()["password_change_needed"]) == (201, True)
-        assert (closed.status_code, closed.json()["title"]) == (403, "Change your password")
+        assert (closed.status_code, closed.json()["title"]) == (403, "Password change required")
         assert (done.status_code, done.json()["password_change_needed"]) == (201, False)
         assert opened.status_code == 200
         await admin.put(f"{ACCOUNTS}/bert/password", json={"password": OTHER})

@@ -295,7 +295,7 @@ def test_what_is_no_operation_or_two_of_one_name_is_refused() -> None:
 
     with pytest.raises(UndeclaredRouteError, match="/files"):
         declared(app)
-    with pytest.raises(UndeclaredRouteError, match="two"):
+    with pytest.raises(UndeclaredRouteError, match="declared twice"):
         declared(two)
 
 

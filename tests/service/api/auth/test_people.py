@@ -77,7 +77,7 @@ def test_neither_the_only_admin_nor_one_who_is_not_there_is_changed(
         lambda: access.accounts.set_role("nobody", Role.VIEWER, T0),
         lambda: people.set_password("nobody", PASSWORD, T0),
     ):
-        with pytest.raises(AccessRefusedError, match="there is no account nobody"):
+        with pytest.raises(AccessRefusedError, match="account nobody does not exist"):
             change()
     assert store.audit.entries(AuditQuery()) == told
     access.accounts.set_role("berta", Role.ADMIN, T0)
@@ -269,12 +269,12 @@ def test_what_is_in_force_is_the_second_recommendation_of_rfc_9106() -> None:
 @pytest.mark.parametrize(
     ("password", "said"),
     [
-        ("eleven char", "has 11"),
-        ("x" * 257, "has 257"),
+        ("eleven char", "got 11"),
+        ("x" * 257, "got 257"),
         ("ababababababab", "different characters"),
         ("aAaAbBbBcCcCdD", "different characters"),
-        ("Operator of unit 3", "name of its account"),
-        ("", "has 0"),
+        ("Operator of unit 3", "name of the account"),
+        ("", "got 0"),
     ],
 )
 def test_a_poor_password_is_refused_and_not_repeated(password: str, said: str) -> None:

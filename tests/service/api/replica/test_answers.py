@@ -121,9 +121,9 @@ async def test_readiness_and_metrics_say_who_analyses(pair: Any) -> None:
     pair.service.clock.s += 60.0
     answer = await pair.client.get("/readyz")
 
-    assert alive["analysis of U1"] == "last sign of life 0.0 s ago"
+    assert alive["analysis of U1"] == "last heartbeat 0.0 s ago"
     assert answer.status_code == 200  # others may go on; the replica does what it can
-    assert answer.json()["checks"]["analysis of U1"] == "silent: last sign of life 60.0 s ago"
+    assert answer.json()["checks"]["analysis of U1"] == "silent: last heartbeat 60.0 s ago"
 
 
 async def test_a_report_of_another_version_is_no_sign_of_life(

@@ -73,7 +73,7 @@ async def test_what_is_asked_rightly_reaches_the_engine_and_the_disk_and_is_show
     path = "/api/v1/alarms/U1:nothing:link_lost/acknowledge"
     unknown = await answered.client.post(path, json={**ANNA, "occurrence": 1})
     assert (wrong.status_code, unknown.status_code) == (409, 404)
-    assert "look at it" in wrong.json()["detail"]
+    assert "check occurrence 1" in wrong.json()["detail"]
     assert not answered.service.alarms.alarm(LINK).is_acknowledged
     answer = await post(answered, "acknowledge", occurrence=1)
 
@@ -93,7 +93,7 @@ async def test_what_nobody_carries_out_is_said_and_not_carried_out_later(pair: A
     answer = await post(pair, "acknowledge", occurrence=1)
 
     assert answer.status_code == 503
-    assert f"has not answered within {WAIT_S:g} s" in answer.json()["detail"]
+    assert f"has not replied within {WAIT_S:g} s" in answer.json()["detail"]
     await pair.carrying_out.look()
     assert not pair.service.alarms.alarm(LINK).is_acknowledged
 
@@ -169,7 +169,7 @@ async def test_a_store_that_comes_back_late_is_told_of(
         answer = await post(pair, "acknowledge", occurrence=1)
 
     assert answer.status_code == 503
-    assert "not on the disk yet" in answer.json()["detail"]
+    assert "in progress but not stored yet" in answer.json()["detail"]
 
 
 def _after(pair: Any) -> Any:

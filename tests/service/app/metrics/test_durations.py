@@ -41,7 +41,7 @@ def test_what_fails_is_not_timed(stepped_clock: Any) -> None:
 
 @pytest.mark.parametrize("bounds", [(), (0.2, 0.1), (0.1, 0.1)])
 def test_bounds_that_do_not_rise_are_refused(bounds: tuple[float, ...], stepped_clock: Any) -> None:
-    with pytest.raises(ValueError, match="must rise"):
+    with pytest.raises(ValueError, match="must increase"):
         Durations(bounds, stepped_clock)
 
 

@@ -37,7 +37,9 @@ def test_times_with_any_offset_or_in_whole_nanoseconds_are_the_same_moment(
     )
     assert {row["time_ns"] for row in rows[-3:]} == {1_740_816_000_000_000_000}
     nanoseconds = text().replace("time,", "time_ns,", 1).replace("2025-01-01T00:50:00Z", "77")
-    with pytest.raises(ReadingsError, match="line 2: time_ns is no integer: '2025-01-01T00:00:00Z"):
+    with pytest.raises(
+        ReadingsError, match="line 2: time_ns is not an integer: '2025-01-01T00:00:00Z"
+    ):
         read(nanoseconds)
     head, _, _ = nanoseconds.partition("\n")
     row = "1740816000000000001,U1,UJB,x,1e9,0.01,0.3,40,part_load,good"
@@ -70,19 +72,19 @@ def test_pieces_of_a_file_number_their_lines_on(
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        ({"time": "2025-03-01T08:00:00"}, "line 12: not a time of ISO 8601 with an offset"),
-        ({"time": "2025-13-01T08:00:00Z"}, "line 12: not a time of ISO 8601"),
-        ({"time": "1740816000"}, "line 12: not a time of ISO 8601"),
-        ({"time": ""}, "line 12: not a time of ISO 8601"),
-        ({"time": "2999-01-01T00:00:00Z"}, "line 12: not a time of ISO 8601"),
-        ({"oil_temperature_c": "warm"}, "line 12: oil_temperature_c is no number: 'warm'"),
-        ({"oil_temperature_c": "0x20"}, "line 12: oil_temperature_c is no number: '0x20'"),
-        ({"oil_temperature_c": "40,5"}, "line 12: 11 columns where the heading has 10"),
+        ({"time": "2025-03-01T08:00:00"}, "line 12: time is not ISO 8601 with an offset"),
+        ({"time": "2025-13-01T08:00:00Z"}, "line 12: time is not ISO 8601"),
+        ({"time": "1740816000"}, "line 12: time is not ISO 8601"),
+        ({"time": ""}, "line 12: time is not ISO 8601"),
+        ({"time": "2999-01-01T00:00:00Z"}, "line 12: time is not ISO 8601"),
+        ({"oil_temperature_c": "warm"}, "line 12: oil_temperature_c is not a number: 'warm'"),
+        ({"oil_temperature_c": "0x20"}, "line 12: oil_temperature_c is not a number: '0x20'"),
+        ({"oil_temperature_c": "40,5"}, "line 12: expected 10 columns, got 11"),
         ({"unit": ""}, "line 12: unit is missing"),
-        ({"unit": "U1\0"}, "line 12: has a NUL byte"),
+        ({"unit": "U1\0"}, "line 12: the line contains a NUL byte"),
         ({"unit": '"U1'}, "line 12: a quote is not closed"),
-        ({"unit": "U1\rU2"}, "line 12: a carriage return within the line"),
-        ({"unit": "U" * 20_000}, "line 12: longer than 16384 bytes"),
+        ({"unit": "U1\rU2"}, "line 12: the line contains a carriage return"),
+        ({"unit": "U" * 20_000}, "line 12: the line is longer than 16384 bytes"),
     ],
 )
 def test_a_wrong_cell_is_named_with_its_line(
@@ -94,11 +96,14 @@ def test_a_wrong_cell_is_named_with_its_line(
 def test_ten_lines_are_named_the_others_counted_and_other_encodings_refused(
     text: Text, line: Line
 ) -> None:
-    assert refusal(text()[:-20]) == "line 11: 8 columns where the heading has 10"  # cut off
+    assert refusal(text()[:-20]) == "line 11: expected 10 columns, got 8"  # cut off
     said = refusal(text(*(line(n, u_random="x") for n in range(100, 120))))
-    assert "line 21: u_random is no number: 'x'; and 10 more" in said
-    assert refusal(text(line(100, unit="Ü")).encode("latin-1")) == "line 12: not UTF-8 text"
-    assert refusal(text().encode("utf-16")) == "line 1: has a NUL byte"
+    assert "line 21: u_random is not a number: 'x'; and 10 more" in said
+    assert (
+        refusal(text(line(100, unit="Ü")).encode("latin-1"))
+        == "line 12: the line is not valid UTF-8"
+    )
+    assert refusal(text().encode("utf-16")) == "line 1: the line contains a NUL byte"
 
 
 @pytest.mark.parametrize(
@@ -107,7 +112,7 @@ def test_ten_lines_are_named_the_others_counted_and_other_encodings_refused(
         ("u_random", "uncertainty", "missing columns: u_random; unknown columns: 'uncertainty'"),
         ("time,", "", "missing columns: time or time_ns"),
         ("state", "quality", "repeated columns: 'quality'"),
-        (",unit", ",unit,time_ns", "both time and time_ns"),
+        (",unit", ",unit,time_ns", "columns time and time_ns are both given"),
         (",", ";", "line 1: columns must be separated by commas"),
         ("time", '"time', "line 1: a quote is not closed"),
     ],
@@ -117,9 +122,9 @@ def test_wrong_headings_are_named(text: Text, old: str, new: str, says: str) -> 
 
 
 def test_a_file_without_rows_a_huge_heading_and_a_line_without_end_are_refused() -> None:
-    assert refusal(b"") == refusal(b"\n\r\n") == "is empty: there is no heading"
+    assert refusal(b"") == refusal(b"\n\r\n") == "the file is empty; expected a heading"
     assert refusal(",".join(f"c{n}" for n in range(1_000_000))) == (
-        "line 1: longer than 16384 bytes"
+        "line 1: the line is longer than 16384 bytes"
     )
-    assert refusal(",".join("a" * 200)) == "200 columns; at most 100 are read"
-    assert refusal(b"x" * 20_000_000) == "line 1: longer than 16384 bytes"
+    assert refusal(",".join("a" * 200)) == "expected at most 100 columns, got 200"
+    assert refusal(b"x" * 20_000_000) == "line 1: the line is longer than 16384 bytes"

@@ -94,15 +94,15 @@ def test_names_may_be_in_a_dictionary_and_numbers_of_any_kind(written: Written) 
     [
         ("time", columns()["time"].cast(pa.timestamp("us")), "column time of type timestamp[us]:"),
         ("time", list(range(N_ROWS)), "column time of type int64: must be texts like"),
-        ("time", with_value("time", None), "row 8: not a time of ISO 8601"),
+        ("time", with_value("time", None), "row 8: time is not ISO 8601"),
         (
             "time",
             pa.array([10**15] * N_ROWS, pa.timestamp("ms", tz="UTC")),
-            "row 1: not a time of ISO 8601",
+            "row 1: time is not ISO 8601",
         ),
         ("unit", with_value("unit", None), "row 8: unit is missing"),
         ("unit", list(range(N_ROWS)), "column unit of type int64: must be texts"),
-        ("u_random", ["0.01"] * 7 + ["x"] * 13, "row 8: u_random is no number: 'x'"),
+        ("u_random", ["0.01"] * 7 + ["x"] * 13, "row 8: u_random is not a number: 'x'"),
         ("u_random", [[0.01]] * N_ROWS, "column u_random of type list"),
         ("colour", ["red"] * N_ROWS, "unknown columns: 'colour'"),
     ],
@@ -116,9 +116,9 @@ def test_a_wrong_column_or_cell_is_named_with_its_row(
 @pytest.mark.parametrize(
     ("key", "value", "says"),
     [
-        ("k_n_per_m", float("inf"), "row 8: k_n_per_m must be finite, not inf"),
+        ("k_n_per_m", float("inf"), "row 8: k_n_per_m must be finite, got inf"),
         ("unit", "U 1", "row 8: unit 'U 1' must be letters, digits"),
-        ("time", columns()["time"][3], "row 8: earlier than the row before"),
+        ("time", columns()["time"][3], "row 8: time is earlier than in"),
     ],
 )
 def test_a_row_that_makes_no_sense_is_named_with_its_file(
@@ -136,7 +136,9 @@ def test_a_reason_says_why_a_reading_is_bad(written: Written) -> None:
     reason = ["insufficient_excitation", "clipped", "few_segments", *["ok"] * 17]
     found = read_histories(written(quality=quality, reason=reason))[UJB].history
     assert found.outcome[0, :4].tolist() == [1, 2, 2, 0]
-    with pytest.raises(ReadingsError, match="row 1: quality good for the reason 'clipped'"):
+    with pytest.raises(
+        ReadingsError, match="row 1: quality must not be good for the reason 'clipped'"
+    ):
         read_histories(written(reason=["clipped"] * N_ROWS))
 
 
@@ -149,7 +151,7 @@ def test_a_file_that_is_cut_off_anywhere_or_has_too_many_rows_is_refused(
         path.write_bytes(whole[:size])
         assert refusal(path).startswith("damaged Parquet file: ")
     monkeypatch.setattr("service.cli.offline.backtest_tables.MAX_ROWS", N_ROWS - 1)
-    assert refusal(written()) == "20 rows; at most 19 are read"
+    assert refusal(written()) == "expected at most 19 rows, got 20"
 
 
 def test_texts_that_unpack_to_more_than_memory_end_the_reading_process_only(tmp_path: Path) -> None:
@@ -160,7 +162,7 @@ def test_texts_that_unpack_to_more_than_memory_end_the_reading_process_only(tmp_
     assert path.stat().st_size < 3_000_000
     with pytest.raises(ReadingsError) as refused:
         read_histories(path)
-    assert str(refused.value) == f"{path}: needs more than 3 GiB to read"
+    assert str(refused.value) == f"{path}: reading requires more than 3 GiB of memory"
 
 
 @pytest.mark.parametrize("n_seeds", fast_and_long(2, 16))

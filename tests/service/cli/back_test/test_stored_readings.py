@@ -114,11 +114,11 @@ def test_what_cannot_be_written_is_said_and_leaves_nothing_behind(
     out = tmp_path / "readings.csv"
     nothing = export(filled, out, "--start", "2027-01-01T00:00:00Z", "--end", "2028-01-01T00:00Z")
     assert (nothing.exit_code, out.exists()) == (1, False)
-    assert "has no readings of films" in nothing.output
+    assert "no film readings in this time range" in nothing.output
     assert export(filled, tmp_path / "readings.txt").exit_code == 2
     naive = export(filled, out, "--start", "2027-01-01T00:00:00")
     assert naive.exit_code == 2
-    assert "needs an offset from UTC" in naive.output
+    assert "requires an offset from UTC" in naive.output
     out.write_text("mine", encoding="utf-8")
     assert export(filled, out).exit_code == 1
     assert out.read_text(encoding="utf-8") == "mine"

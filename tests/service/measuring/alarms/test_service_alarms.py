@@ -67,7 +67,7 @@ def test_a_store_that_takes_nothing_is_an_alarm_that_says_why(watched: Watched) 
     assert watched.alarms.alarm(NOT_STORED).condition.reason == "disk full"
     assert watched.after(0.5) == [f"{NOT_STORED} returned"]
     watched.after(0.5, store_behind_s=60.0)
-    assert "does not answer" in watched.alarms.alarm(NOT_STORED).condition.reason
+    assert "does not respond" in watched.alarms.alarm(NOT_STORED).condition.reason
 
 
 def test_results_that_are_given_up_are_a_danger_for_ten_minutes(watched: Watched) -> None:

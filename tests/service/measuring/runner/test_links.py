@@ -138,7 +138,7 @@ async def test_a_bug_in_the_analysis_ends_the_run(plant: Any, scripted: Make, bl
     with pytest.raises(ExceptionGroup) as ended:
         await asyncio.wait_for(plant.runner(U1=source).run(), 30)
 
-    assert ended.group_contains(ValueError, match="samples at 99.0 Hz, configured 100.0 Hz")
+    assert ended.group_contains(ValueError, match="samples at 100.0 Hz, got 99.0 Hz")
 
 
 async def test_a_full_bus_makes_the_publisher_wait_and_drops_nothing(block: Make) -> None:

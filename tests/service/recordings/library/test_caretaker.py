@@ -106,7 +106,7 @@ def test_another_recording_in_the_place_of_one_is_not_taken_for_it(
     rig.clock.s = DAY_S + 1.0
     rig.caretaker.look()
 
-    assert "not the one" in rig.caretaker.faults[folder.name]
+    assert "the manifest has changed" in rig.caretaker.faults[folder.name]
 
 
 def test_what_is_read_once_more_takes_a_small_share_of_the_time(
@@ -177,7 +177,7 @@ def test_a_disk_that_is_away_is_told_and_its_recordings_are_not_given_up(
     rig.roots[CONTINUOUS].rename(tmp_path / "unmounted")
     keeper.look()
     assert keeper.trouble is not None
-    assert "folder of 1 recordings is not there" in keeper.trouble
+    assert "folder of 1 recordings does not exist" in keeper.trouble
     assert [file.state for file in rig.files()] == [WaveformState.PRESENT]
     (tmp_path / "unmounted").rename(rig.roots[CONTINUOUS])
     keeper.look()

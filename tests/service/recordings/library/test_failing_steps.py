@@ -114,12 +114,12 @@ def test_a_folder_that_is_away_stops_nothing_in_another(rig: Any, tmp_path: Path
     rig.roots[CAPTURE].rename(tmp_path / "unmounted")
     new = rig.make(1)
     rig.clock.s = 2 * DAY_S
-    with pytest.raises(OSError, match="captures: the folder of 1 recordings is not there"):
+    with pytest.raises(OSError, match="captures: the folder of 1 recordings does not exist"):
         rig.caretaker.look()
     assert new.name in [file.name for file in rig.files()]
     assert not rig.caretaker.faults  # the capture that is away was to be read, and was not
     rig.space = FULL
-    with pytest.raises(OSError, match="captures: the folder of 1 recordings is not there"):
+    with pytest.raises(OSError, match="captures: the folder of 1 recordings does not exist"):
         rig.caretaker.look()
 
     assert rig.gauge.is_full

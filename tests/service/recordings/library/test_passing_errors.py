@@ -79,7 +79,7 @@ def test_the_check_of_all_names_what_cannot_be_read_and_goes_on(
     one, two = RecordingCheck(rig.roots, rig.files(), rig.clock.now_ns()).results()
 
     assert (one.name, one.found) == (folder.name, RecordingState.DAMAGED)
-    assert one.reason == "it cannot be read: Input/output error"
+    assert one.reason == "the recording cannot be read: Input/output error"
     assert (two.name, two.found) == (other.name, RecordingState.SOUND)
 
 

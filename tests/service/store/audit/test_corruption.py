@@ -170,11 +170,11 @@ ALTERED: list[tuple[str, str]] = [
     ("DELETE FROM audit", "entries 1 to 9 are missing at the end: the head names 9"),
     (
         "DELETE FROM audit WHERE number = 3; UPDATE audit SET number = 3 WHERE number = 8",
-        "entry 3 is out of order: it holds entry 8",
+        "entry 3 is out of order; its content is that of entry 8",
     ),
     (
         "UPDATE audit SET number = 0 WHERE number = 3",
-        "entry 0 is in the place of entry 1",
+        "expected entry 1, found entry 0",
     ),
 ]
 
@@ -193,4 +193,4 @@ def test_a_whole_trail_of_another_database_is_not_taken_for_this_one(
     bench.path.write_bytes((tmp_path / "other.sqlite3").read_bytes())
 
     found: Any = file_trail(bench.path).verify().finding
-    assert found.detail == "entry 9 is not the one the head names"
+    assert found.detail == "entry 9 does not match the head's hash"

@@ -170,7 +170,9 @@ def test_a_cut_trail_stays_noticed_after_the_service_has_gone_on(
     assert (verdict.is_whole, verdict.contradictions) == (True, (3,))
     assert (told.actor, told.action) == ("padwatch", HEAD_DIFFERED)
     assert told.reason == (
-        "the head names entry 4, the trail ended at 2" if with_head else "the head is not there"
+        "the head names entry 4, but the trail ends at 2"
+        if with_head
+        else "the head does not exist"
     )
 
 
@@ -236,7 +238,7 @@ def test_a_trail_is_verified_while_others_write(
 
 
 def test_where_there_is_no_trail_that_is_said(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match="there is no database"):
+    with pytest.raises(StoreError, match="the database does not exist"):
         file_trail(tmp_path / "nothing.sqlite3").verify()
     sqlite3.connect(tmp_path / "other.sqlite3").close()
     (tmp_path / "broken.sqlite3").write_bytes(b"no database at all" * 500)

@@ -146,7 +146,7 @@ def test_a_damaged_database_gives_no_copy_and_costs_no_older_one(
 
 
 def test_what_is_not_there_gives_no_copy_and_makes_no_folder(database: Path, folder: Path) -> None:
-    with pytest.raises(BackupError, match="there is no such database"):
+    with pytest.raises(BackupError, match="the database does not exist"):
         back_up(database, folder, NOW_NS, 1)
     assert not folder.exists()
 
@@ -226,7 +226,7 @@ SPOILT: dict[str, tuple[Callable[[Path], None], str]] = {
     "damaged": (damage, "damaged|malformed"),
     "cut short": (lambda copy: os.truncate(copy, copy.stat().st_size // 2), "damaged|malformed"),
     "no database": (lambda copy: copy.write_text("x" * 9000) and None, "not a database"),
-    "gone": (lambda copy: copy.unlink(), "there is no such file"),
+    "gone": (lambda copy: copy.unlink(), "the file does not exist"),
 }
 
 

@@ -64,7 +64,7 @@ def test_an_older_database_is_told_with_what_is_missing_and_since_when() -> None
         (
             {"store": "00" * 16, "n_commits": 7},
             Kind.REPLACED,
-            "150 transactions.*7 are in this one",
+            "150 transactions.*this one has 7",
         ),
     ],
 )
@@ -188,9 +188,9 @@ def test_what_is_no_mark_is_said_to_be_damaged(file: MarkFile, content: bytes) -
 def test_a_mark_that_is_away_is_not_made_anew_by_the_way(tmp_path: Path) -> None:
     file = MarkFile(tmp_path / "none")
 
-    with pytest.raises(NoMarkError, match="is not there"):
+    with pytest.raises(NoMarkError, match="does not exist"):
         file.read()
-    with pytest.raises(NoMarkError, match="is not there"):
+    with pytest.raises(NoMarkError, match="does not exist"):
         file.advance(mark())
     assert list(tmp_path.iterdir()) == []
 
