@@ -1,6 +1,5 @@
 """Entry point of the `padwatch` command."""
 
-import gc
 import os
 import tempfile
 import traceback
@@ -8,6 +7,7 @@ from typing import NoReturn
 
 import typer
 
+from service.cli import commands
 from service.runtime.process import leave
 
 EXIT_BUG = 70
@@ -22,19 +22,9 @@ def main() -> NoReturn:
     leave(_exit_code())
 
 
-def _commands() -> typer.Typer:
-    """Load the program without garbage collection, and freeze the loaded objects."""
-    gc.disable()  # a hundred collections take a fifth of the loading time
-    from service.cli.commands import app
-
-    gc.freeze()
-    gc.enable()
-    return app
-
-
 def _exit_code() -> int:
     try:
-        _commands()()
+        commands.app()
     except SystemExit as ended:
         return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
     except Exception:  # last resort: a sentence for users, the traceback in the report

@@ -7,27 +7,15 @@ import sysconfig
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
-from pydantic_core import to_json
 from typer.core import TyperGroup
 
-from acquisition.errors import AcquisitionError
-from service.api.auth.passwords import PasswordRefusedError
-from service.api.http.listening import CertificateError, PortInUseError
-from service.app.storage import has_store, open_store, store_name
-from service.app.web import ClosedError
-from service.cli.offline.backtest_cells import ReadingsError
-from service.cluster.session import StreamAnewError
-from service.settings.plant import PlantFile
-from service.settings.toml_file import TomlFileError
-from service.settings.units import UnitSettings
-from service.store.access.identities import NameRefusedError
-from service.store.access.tables import AccessRefusedError
-from service.store.backup import BackupError
-from service.store.port import StoreError
-from service.store.store import Store
+if TYPE_CHECKING:
+    from service.settings.plant import PlantFile
+    from service.settings.units import UnitSettings
+    from service.store.store import Store
 
 
 def option(meaning: str, *names: str, **limits: Any) -> Any:
@@ -52,17 +40,22 @@ NewRecording = Annotated[
 ]
 JsonOutput = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
-USAGE_ERRORS = (
-    *(AccessRefusedError, NameRefusedError, PasswordRefusedError),
-    *(ClosedError, CertificateError),
-)
-"""Errors that persist on a second try; exit code 2."""
-
-FAILURES = (
-    *(AcquisitionError, StoreError, BackupError, ReadingsError),
-    *(PortInUseError, StreamAnewError),
-)
-"""Errors of devices, files, databases and ports; exit code 1."""
+EXIT_CODES = {
+    "service.settings.toml_file.TomlFileError": 2,
+    "service.store.access.tables.AccessRefusedError": 2,
+    "service.store.access.identities.NameRefusedError": 2,
+    "service.api.auth.passwords.PasswordRefusedError": 2,
+    "service.app.web.ClosedError": 2,
+    "service.api.http.listening.CertificateError": 2,
+    "acquisition.errors.AcquisitionError": 1,
+    "service.store.port.StoreError": 1,
+    "service.store.backup.BackupError": 1,
+    "service.cli.offline.backtest_cells.ReadingsError": 1,
+    "service.api.http.listening.PortInUseError": 1,
+    "service.cluster.session.StreamAnewError": 1,
+}
+"""Exit codes of expected errors: 2 if a second try would fail too, 1 for a failure of a device,
+file, database or port. The names spare each command the modules of errors that it cannot raise."""
 
 
 class CommandError(Exception):
@@ -86,14 +79,15 @@ class CommandGroup(TyperGroup):
         """Run the chosen command."""
         try:
             return super().invoke(ctx)
-        except TomlFileError as error:
-            _end(str(error), 2)
         except CommandError as error:
             _end(f"{_command_name(ctx)}: {error}", error.code)
-        except USAGE_ERRORS as error:
-            _end(f"{_command_name(ctx)}: {error}", 2)
-        except FAILURES as error:
-            _end(f"{_command_name(ctx)}: {error}", 1)
+        except Exception as error:
+            names = [f"{kind.__module__}.{kind.__name__}" for kind in type(error).__mro__]
+            code = next((EXIT_CODES[name] for name in names if name in EXIT_CODES), None)
+            if code is None:
+                raise
+            is_plant_file = "service.settings.toml_file.TomlFileError" in names
+            _end(str(error) if is_plant_file else f"{_command_name(ctx)}: {error}", code)
 
 
 def _command_name(ctx: Any) -> str:
@@ -129,6 +123,8 @@ def print_result(
     document: object, lines: Iterable[str], json_output: bool, indent: int | None = 1
 ) -> None:
     """Print a result as JSON, or as lines of text."""
+    from pydantic_core import to_json
+
     shown = (
         [to_json(document, indent=indent, inf_nan_mode="null").decode()] if json_output else lines
     )
@@ -144,7 +140,7 @@ def progress(label: str, length: int) -> Any:
 
 
 @contextmanager
-def plant_store(plant: PlantFile, creates: bool = False) -> Iterator[Store]:
+def plant_store(plant: "PlantFile", creates: bool = False) -> Iterator["Store"]:
     """Open the plant's database.
 
     Parameters
@@ -152,6 +148,8 @@ def plant_store(plant: PlantFile, creates: bool = False) -> Iterator[Store]:
     creates
         Whether a missing database is created; otherwise it ends the command.
     """
+    from service.app.storage import has_store, open_store, store_name
+
     if not has_store(plant):  # the data folder may be relative to another folder
         if not creates:
             fail(f"{store_name(plant)}: the database does not exist")
@@ -161,7 +159,7 @@ def plant_store(plant: PlantFile, creates: bool = False) -> Iterator[Store]:
         yield store
 
 
-def one_unit(plant: PlantFile, id_: str | None, path: Path) -> UnitSettings:
+def one_unit(plant: "PlantFile", id_: str | None, path: Path) -> "UnitSettings":
     """Return a unit, or end with exit code 2; the name of a plant's only unit is optional."""
     known = ", ".join(unit.id for unit in plant.unit)
     if id_ is None and len(plant.unit) > 1:

@@ -13,9 +13,6 @@ from importlib.metadata import version
 from threading import Timer
 from typing import Any, NoReturn
 
-import structlog
-import uvloop
-
 TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3
 """Parameters of mallopt(3) in the GNU C library (malloc.h)."""
 
@@ -46,8 +43,6 @@ SWITCH_S = 0.001
 """Thread switch interval of the interpreter: maximum wait of the event loop for a computing thread.
 The default is five times as long, and each response includes several such waits."""
 
-log = structlog.get_logger()
-
 
 def run_to_its_end(program: Coroutine[Any, Any, None]) -> None:
     """Run the main coroutine `program`, which must write all data before it returns.
@@ -55,6 +50,8 @@ def run_to_its_end(program: Coroutine[Any, Any, None]) -> None:
     Afterwards the event loop waits for threads of cancelled requests without a time limit. A
     thread cannot be stopped, so the process exits after `LEAVE_S`.
     """
+    import uvloop
+
     sys.setswitchinterval(SWITCH_S)
     return_large_pieces()
     with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
@@ -78,12 +75,16 @@ def leave(code: int = 0) -> NoReturn:
 
 
 def _leave_threads() -> None:
-    log.warning("exiting while threads are still running")
+    import structlog
+
+    structlog.get_logger().warning("exiting while threads are still running")
     leave()
 
 
 def set_up_logging() -> None:
     """Configure logging to standard error: coloured lines on a terminal, otherwise JSON lines."""
+    import structlog
+
     on_terminal = sys.stderr.isatty()
     structlog.configure(
         processors=[

@@ -1,6 +1,5 @@
 """The command line as a whole: exit codes, one line for people, and an end."""
 
-import gc
 import json
 import re
 import socket
@@ -8,12 +7,14 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import pytest
+import typer
 from rigs.command_line import padwatch, padwatch_program
 
-from service.cli import commands, main
+from service.cli import commands, main, options
 
 Changed = Callable[[str, str], tuple[str, int]]
 
@@ -126,7 +127,7 @@ run_to_its_end(program())
 
 ENDS_WITH_3 = """
 import atexit
-from service.cli import commands, main
+from service.cli import commands, main, options
 
 def app():
     atexit.register(print, "taken down")
@@ -173,9 +174,46 @@ def test_every_end_of_a_command_has_its_exit_code(
     codes: list[int] = []
     monkeypatch.setattr(commands, "app", app)
     monkeypatch.setattr(main, "leave", codes.append)
-    try:
-        main.main()
-    finally:
-        gc.unfreeze()  # main makes permanent what is loaded
+    main.main()
 
     assert codes == [expected]
+
+
+HELP_LOADS = """
+import sys
+from service.cli import main
+main.leave = lambda code: None
+sys.argv = ["padwatch", "--help"]
+main.main()
+print("loaded", *sorted({name.partition(".")[0] for name in sys.modules}))
+"""
+
+
+def test_the_help_of_all_commands_loads_none_of_them() -> None:
+    ended = python(HELP_LOADS)
+
+    *text, loaded = ended.stdout.splitlines()
+    assert any(line.split()[:1] == ["reanalyse"] for line in text), ended.stderr
+    assert not {"numpy", "scipy", "fastapi", "pydantic", "structlog"} & set(loaded.split())
+
+
+def test_the_help_of_all_commands_is_that_of_each_command() -> None:
+    group = typer.main.get_command(commands.app)
+    loaded = dict(group.commands.items())
+    whole = typer.core.TyperGroup(commands=loaded)
+
+    for width in (60, 80, 200):
+        texts = []
+        for each in (group, whole):
+            formatter = typer.Context(each).make_formatter()
+            formatter.width = width
+            each.format_commands(typer.Context(each), formatter)
+            texts.append(formatter.getvalue())
+        assert texts[0] == texts[1]
+        assert texts[0].count("\n") > len(loaded)
+
+
+def test_every_error_with_an_exit_code_exists() -> None:
+    for name in options.EXIT_CODES:
+        module, _, error = name.rpartition(".")
+        assert issubclass(resolve_name(f"{module}:{error}"), Exception)
