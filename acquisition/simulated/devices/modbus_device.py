@@ -202,8 +202,8 @@ class RegisterMemory:
         offset = 2 * (address - self._start)
         if offset < 0 or offset + len(data) > len(self._data):
             raise ValueError(
-                f"registers {address} to {address + len(data) // 2} are not within"
-                f" {self._start} to {self._start + len(self._data) // 2}"
+                f"registers {address} to {address + len(data) // 2 - 1} are not within"
+                f" {self._start} to {self._start + len(self._data) // 2 - 1}"
             )
         self._data[offset : offset + len(data)] = data
 

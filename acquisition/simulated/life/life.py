@@ -163,9 +163,7 @@ def require_known_bearings(damage: tuple[Damage, ...], bearings: tuple[LifeBeari
     known = {bearing.id for bearing in bearings}
     for one in damage:
         if one.bearing not in known:
-            raise ValueError(
-                f"unknown bearing {one.bearing!r}; known bearings: {', '.join(sorted(known))}"
-            )
+            raise ValueError(f"unknown bearing {one.bearing!r}; known: {', '.join(sorted(known))}")
 
 
 def life_of(

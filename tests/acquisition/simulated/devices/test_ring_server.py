@@ -180,7 +180,7 @@ def test_registers_that_do_not_exist_are_neither_written_nor_read():
     assert memory.read(99, 1) is None
     assert memory.read(105, 6) is None
     assert memory.read(105, 5) == bytes(10)
-    with pytest.raises(ValueError, match="registers 109 to 111 are not within 100 to 110"):
+    with pytest.raises(ValueError, match="registers 109 to 110 are not within 100 to 109"):
         memory.write(109, bytes(4))
 
 
