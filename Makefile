@@ -71,6 +71,7 @@ docs: develop
 bench: develop
 	$(BIN)/python benchmarks/ingest.py
 	$(BIN)/python benchmarks/polling.py
+	$(BIN)/python benchmarks/storms.py
 	$(BIN)/python benchmarks/alarms.py
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/trend_years.py
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/analysis.py

@@ -14,12 +14,12 @@ class AcquisitionError(Exception):
 
 
 class ConfigError(AcquisitionError):
-    """The settings do not match the device, for example in protocol version or channel count."""
+    """Error raised if settings do not match the device or file, for example in channel count."""
 
 
 class LinkError(AcquisitionError):
-    """The device does not respond; a later attempt may succeed."""
+    """Error raised if the device does not respond or replies wrongly; retrying may succeed."""
 
 
 class FrameError(AcquisitionError):
-    """The device sent an invalid reply or frame."""
+    """Error raised if the device sent an invalid reply or frame."""

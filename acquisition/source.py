@@ -2,7 +2,7 @@
 
 from collections.abc import AsyncIterator, Mapping
 from contextlib import AbstractAsyncContextManager
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 from core.samples.blocks import SampleBlock
 
@@ -27,16 +27,7 @@ class SampleSource(Protocol):
         ...
 
 
-@runtime_checkable
-class RefusesFrames(Protocol):
-    """Sample source that counts the invalid frames that it rejects."""
-
-    @property
-    def refused_frames(self) -> Mapping[str, int]:
-        """Number of rejected frames since the start, by reason."""
-        ...
-
-
 def refused_frames_of(source: SampleSource) -> Mapping[str, int]:
     """Return the numbers of rejected frames of a source by reason; empty if it has no counters."""
-    return source.refused_frames if isinstance(source, RefusesFrames) else {}
+    counts: Mapping[str, int] = getattr(source, "refused_frames", {})
+    return counts

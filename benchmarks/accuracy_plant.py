@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acquisition.delivery.blocks import sample_block
 from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.plant import CHUNK_SAMPLES
 from acquisition.simulated.plant.rotor import (
@@ -222,7 +221,7 @@ def _blocks(unit: Unit, scenario: Scenario, seed: int, n_blocks: int) -> Iterato
     )
     simulated = SimulatedUnit(unit, calibration, scenario, seed, START_NS)
     for _ in range(n_blocks):
-        yield sample_block([simulated.advance(CHUNK_SAMPLES)], calibration)
+        yield simulated.advance(CHUNK_SAMPLES)
 
 
 def _transform(

@@ -14,15 +14,14 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.blocks import sample_block
 from core.alarms.rules import LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import Limits
 from core.quality import Reading
 from core.samples.blocks import DeviceClock, SampleBlock
-from service.app.storage import captures_of
+from service.app.kept_files import captures_of
 from service.measuring.simulated_sources import simulated_feed
-from service.settings.core_values import calibration_of, machine_of
+from service.settings.core_values import machine_of
 from service.settings.loading import load_plant_file
 from service.settings.storage import Origin
 
@@ -43,7 +42,7 @@ def main() -> None:
     }
     rules = UnitRules(bearings={bearing.id: limits for bearing in machine.bearings})
     feed = simulated_feed(unit, SystemClock())
-    first = sample_block([feed.advance(50)], calibration_of(unit))
+    first = feed.advance(50)
     first = replace(first, clock=DeviceClock(0.01, 1.0, 0.5))
 
     def judging(blocks: list[SampleBlock]) -> float:

@@ -100,6 +100,6 @@ def readings(window: Window) -> list[FilmReading]:
     delivery, monitor = BlockAssembler(CALIBRATION), UnitMonitor(UNIT, SETTINGS)
     newest: list[Assessment] = []
     for _ in range(math.ceil(WINDOW_SAMPLES / CHUNK_SAMPLES)):
-        for block in delivery.take(feed.advance(CHUNK_SAMPLES)):
+        for block in delivery.take([feed.advance(CHUNK_SAMPLES)]):
             newest = monitor.ingest(block) or newest
     return [film_reading(found, UNKNOWN, Estimator.DYNAMIC) for found in newest]

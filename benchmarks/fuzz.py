@@ -63,11 +63,13 @@ def main() -> None:
 
 
 def fuzz(service: Fuzzed, options: argparse.Namespace, roles: list[str], folder: Path) -> int:
-    process = psutil.Process(service.pid)
+    measuring = psutil.Process(service.pid)
+    # memory of a serving process that has ended cannot be read: that ends this program, too
+    running = [measuring, *measuring.children()]
     paths = httpx2.get(f"{service.url}/api/v1/openapi.json", trust_env=False).json()["paths"]
     keys = {**service.keys, FORGED: FORGED_KEY, NO_LOGIN: None}
     outcomes = []
-    print(f"RSS {process.memory_info().rss / MIB:.0f} MiB before")
+    print(f"RSS {rss_mib(running):.0f} MiB before")
     print(f"{'role':<10}{'cases':>8}{'2xx/3xx':>9}{'4xx':>8}{'5xx':>6}{'wrong':>7}{'RSS MiB':>9}")
     for role in roles:
         outcome = fuzz_as(keys[role], service.url, options, folder, paths)
@@ -75,9 +77,13 @@ def fuzz(service: Fuzzed, options: argparse.Namespace, roles: list[str], folder:
         by_class = _classes(outcome.statuses)
         n_wrong = outcome.n_failures + outcome.undocumented.total()
         counts = f"{by_class['2'] + by_class['3']:>9}{by_class['4']:>8}{by_class['5']:>6}"
-        rss_mib = process.memory_info().rss / MIB
-        print(f"{role:<10}{outcome.n_cases:>8}{counts}{n_wrong:>7}{rss_mib:>9.0f}", flush=True)
+        memory = f"{rss_mib(running):>9.0f}"
+        print(f"{role:<10}{outcome.n_cases:>8}{counts}{n_wrong:>7}{memory}", flush=True)
     return report(outcomes, service.log.read_text(encoding="utf-8"))
+
+
+def rss_mib(processes: list[psutil.Process]) -> float:
+    return sum(process.memory_info().rss for process in processes) / MIB
 
 
 def fuzz_as(

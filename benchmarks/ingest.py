@@ -1,7 +1,7 @@
 """From wire to stored assessment: what a plant of twenty units costs the service.
 
-Three processes: simulated DAQs (20 units, 12 channels, 600 Hz, Modbus TCP on loopback), the whole
-service, and afterwards a bare pymodbus loop that reads as many registers from the same DAQs and
+Simulated DAQs (20 units, 12 channels, 600 Hz, Modbus TCP on loopback), the service with its two
+processes, and afterwards a bare pymodbus loop that reads as many registers from the same DAQs and
 does nothing with them. Prints a table; ends with 1 if a sample was lost or a limit was passed.
 """
 
@@ -25,7 +25,7 @@ from pymodbus.client import AsyncModbusTcpClient
 
 DEMO = Path(__file__).parents[1] / "deploy" / "demo.toml"
 CORE_LIMIT = 0.30
-MEMORY_LIMIT_MIB = 500.0
+MEMORY_LIMIT_MIB = 420.0
 WARM_UP_S = 20.0
 REGISTERS_PER_READ = 125
 MIB = 2**20
@@ -84,24 +84,36 @@ def daq(plant: Path) -> Iterator[dict[str, int]]:
         yield {unit: int(found["port"]) for unit, found in json.loads(line).items()}
 
 
+def processes(pid: int) -> list[psutil.Process]:
+    """Return the measuring process of a service, and its serving process."""
+    measuring = psutil.Process(pid)
+    return [measuring, *measuring.children()]
+
+
+def cpu_s(watched: psutil.Process) -> float:
+    """Return the CPU time of a process so far, s."""
+    times = watched.cpu_times()
+    return float(times.user + times.system)
+
+
 def measure_service(plant: Path, duration_s: float) -> dict[str, Any]:
-    """Let the service run and measure its process from after its start."""
+    """Let the service run and measure its processes from after its start."""
     with padwatch("run", str(plant), "--port", "0") as (process, line):
         url = line.split()[-1]
-        watched = psutil.Process(process.pid)
+        watched = processes(process.pid)
         time.sleep(WARM_UP_S)
-        before, started = watched.cpu_times(), time.monotonic()
-        peak = 0
+        before, started = [cpu_s(each) for each in watched], time.monotonic()
+        peak = [0, 0]
         while time.monotonic() - started < duration_s:
             time.sleep(1.0)
-            peak = max(peak, watched.memory_info().rss)
-        after, elapsed = watched.cpu_times(), time.monotonic() - started
-        units = fetch(f"{url}api/v1/overview")["units"]
+            peak = max(peak, [each.memory_info().rss for each in watched], key=sum)
+        after, elapsed = [cpu_s(each) for each in watched], time.monotonic() - started
+        units = fetch(f"{url}api/v1/units")
         n_results = sum(n_stored_results(url, unit) for unit in units)
     sources = [unit["source"] for unit in units]
     return {
-        "cores": (after.user + after.system - before.user - before.system) / elapsed,
-        "peak_mib": peak / MIB,
+        "cores": [(end - begin) / elapsed for begin, end in zip(before, after, strict=True)],
+        "peak_mib": [each / MIB for each in peak],
         "n_offered": sum(source["n_offered"] for source in sources),
         "n_stored": sum(source["n_stored"] for source in sources),
         "n_results": n_results,
@@ -120,26 +132,26 @@ def n_stored_results(url: str, unit: dict[str, Any]) -> int:
     query = "quantity=speed_rpm&start=2020-01-01T00:00:00Z&end=2100-01-01T00:00:00Z&max_points=5000"
     return sum(
         sum(
-            fetch(f"{url}api/v1/units/{unit['id']}/bearings/{b['bearing']}/trends?{query}")[
-                "series"
-            ]["speed_rpm"]["count"]
+            fetch(f"{url}api/v1/units/{unit['id']}/bearings/{bearing}/trends?{query}")["series"][
+                "speed_rpm"
+            ]["count"]
         )
-        for b in unit["bearings"]
+        for bearing in unit["bearing_ids"]
     )
 
 
 def n_due_results(unit: dict[str, Any]) -> int:
     """Results that the samples of a unit allow, all bearings together."""
     n_segments = (unit["source"]["n_stored"] - SEGMENT_SAMPLES) // HOP_SAMPLES + 1
-    return n_segments * len(unit["bearings"])
+    return n_segments * len(unit["bearing_ids"])
 
 
 async def bare_loop(ports: list[int], duration_s: float) -> dict[str, float]:
     """Read as many registers a second with nothing but pymodbus, one connection a device."""
     n_reads = 0
     # 12 channels at 600 Hz, 50 samples a slot: 12 slots a second of 611 registers, 5 reads each,
-    # and four looks at the header, as the service does
-    reads_per_s = 12 * 5 + 4
+    # and two looks at the header, as the service does
+    reads_per_s, period_s = 12 * 5 + 2, 0.5
     process = psutil.Process()
     started, before = time.monotonic(), process.cpu_times()
 
@@ -149,10 +161,10 @@ async def bare_loop(ports: list[int], duration_s: float) -> dict[str, float]:
         await client.connect()
         due = time.monotonic()
         while due - started < duration_s:
-            for _ in range(reads_per_s // 4):
+            for _ in range(round(reads_per_s * period_s)):
                 await client.read_holding_registers(0, count=REGISTERS_PER_READ, device_id=1)
                 n_reads += 1
-            due += 0.25
+            due += period_s
             await asyncio.sleep(max(0.0, due - time.monotonic()))
         client.close()
 
@@ -171,16 +183,21 @@ def report(n_units: int, service: dict[str, Any], bare: dict[str, float]) -> int
     print(
         f"  results on the disk, of due   {service['n_results']:>12,}   ({service['n_expected']:,})"
     )
-    print(f"  service, share of one core    {service['cores']:>12.1%}   (at most {CORE_LIMIT:.0%})")
-    print(f"  service, peak memory          {service['peak_mib']:>8.0f} MiB   (at most 500 MiB)")
+    cores, mib = sum(service["cores"]), sum(service["peak_mib"])
+    for name, share, peak in zip(
+        ("measuring", "serving"), service["cores"], service["peak_mib"], strict=True
+    ):
+        print(f"  {name:<9} process, one core   {share:>12.1%}; memory {peak:.0f} MiB")
+    print(f"  both, share of one core       {cores:>12.1%}   (at most {CORE_LIMIT:.0%})")
+    print(f"  both, peak memory             {mib:>8.0f} MiB   (at most {MEMORY_LIMIT_MIB:.0f} MiB)")
     print(f"  bare pymodbus loop, one core  {bare['cores']:>12.1%}")
     print(f"  of so many reads a second     {bare['reads_per_s']:>12,.0f}")
-    print(f"  service / bare loop           {service['cores'] / bare['cores']:>12.2f}")
+    print(f"  service / bare loop           {cores / bare['cores']:>12.2f}")
     failed = (
         lost > 0
         or service["n_results"] < service["n_expected"]
-        or service["cores"] > CORE_LIMIT
-        or service["peak_mib"] > MEMORY_LIMIT_MIB
+        or cores > CORE_LIMIT
+        or mib > MEMORY_LIMIT_MIB
     )
     return int(failed)
 

@@ -38,8 +38,8 @@ def record(folder: Path) -> None:
     delivery = BlockAssembler(calibration_of(unit))
     with RecordingWriter(folder, recorded_unit(unit), "benchmark") as writer:
         for _ in range(round(SECONDS * unit.rate_hz / unit.block_samples)):
-            for block in delivery.take(feed.advance(unit.block_samples)):
-                writer.write_block(block)
+            for block in delivery.take([feed.advance(unit.block_samples)]):
+                writer.write(block)
 
 
 def repeat(hour: Path, folder: Path) -> None:
@@ -48,10 +48,10 @@ def repeat(hour: Path, folder: Path) -> None:
     n_samples, length_ns = round(SECONDS * unit.rate_hz), ns_from_s(SECONDS)
     with RecordingWriter(folder, recorded_unit(unit), "benchmark") as writer:
         for number in range(N_HOURS):
-            for run in recording.runs():
+            for run in recording.blocks():
                 side = replace(run.side, start_ns=run.side.start_ns + number * length_ns)
                 first_index = run.first_index + number * n_samples
-                writer.write_block(replace(run, first_index=first_index, side=side))
+                writer.write(replace(run, first_index=first_index, side=side))
 
 
 def analyse(folder: Path, seconds: float) -> float:

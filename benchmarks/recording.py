@@ -31,7 +31,7 @@ def blocks_of(unit: UnitSettings) -> list[SampleBlock]:
     feed, delivery = simulated_feed(unit, FullHour()), BlockAssembler(calibration_of(unit))
     n_slots = round(SECONDS * unit.rate_hz / unit.block_samples)
     return [
-        block for _ in range(n_slots) for block in delivery.take(feed.advance(unit.block_samples))
+        block for _ in range(n_slots) for block in delivery.take([feed.advance(unit.block_samples)])
     ]
 
 

@@ -18,8 +18,9 @@ import numpy as np
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingState
 from core.monitor.catalogue import CATALOGUE
+from service.api.answers import json_of
 from service.api.routes.trend_groups import trend_groups
-from service.api.routes.trends import trend_columns, trend_model
+from service.api.routes.trends import trend_answer, trend_columns
 from service.store.buckets import Summaries
 from service.store.port import TrendQuery, ValueRange
 from service.store.rollups.gathering import SET_MARK
@@ -197,7 +198,7 @@ def print_times(store: SqliteStore, n_times: int) -> float:
         for words, query in queries(NOW_NS, max_points).items():
 
             def answer(query: TrendQuery = query) -> bytes:
-                return trend_model(query, store.trend(query)).model_dump_json().encode()
+                return json_of(trend_answer(query, store.trend(query)))
 
             spent_ms, n = cpu_ms(answer, n_times), len(store.trend(query).time_ns)
             print(f"{words:<40}{max_points:>8}{n:>9}{spent_ms:>8.0f}")

@@ -54,7 +54,7 @@ NEVER_JUDGED = Judgement(is_known=False, reason="waiting_for_data")
 
 
 def unknown(reason: str, suppressed_by: str | None = None) -> Judgement:
-    """Return the judgement of an unknown condition."""
+    """Return the judgement of an unknown condition, suppressed if `suppressed_by` is not None."""
     return Judgement(is_known=False, reason=reason, suppressed_by=suppressed_by)
 
 
@@ -120,13 +120,16 @@ class Limits:
         return too_high or (low is not None and value < low + deadband)
 
     def is_low(self, value: float) -> bool:
-        """Whether a value is nearer to the lower limits than to the upper limits."""
+        """Whether a value is nearer to the lower limits; always true without upper limits."""
         if self._highest_low is None or self._lowest_high is None:
             return self._highest_low is not None
         return value < (self._highest_low + self._lowest_high) / 2.0
 
     def of(self, level: AlarmLevel | None, value: float = math.inf) -> float | None:
-        """Return the limit of a level (alert for None): a lower limit if the value is low."""
+        """Return the limit of a level, the lower one if `value` is low; None if it is unused.
+
+        For the level None, return the alert limit or, if that is unused, the danger limit.
+        """
         if self.is_low(value):
             alert, danger = self.alert_below, self.danger_below
         else:
@@ -187,7 +190,7 @@ class DelayTimer:
     opposed_ns
         Accumulated known time for which the condition has differed from `is_on`.
     last_ns
-        Newest time at which the condition differed; None after a pause.
+        Newest time at which the condition differed; None after a pause, or if it has not differed.
     """
 
     is_on: bool = False
@@ -205,7 +208,8 @@ class DelayTimer:
         """Return the timer updated at a time; `wanted` is whether the condition is present.
 
         Each call with `wanted` different from `is_on` adds `elapsed_ns`, by default the time since
-        the previous such call, or 0 if the clock was set back.
+        the previous such call, or 0 if the clock was set back. When the sum reaches `on_delay_ns`
+        or `off_delay_ns`, `is_on` changes.
         """
         if wanted == self.is_on:
             return ON if wanted else INACTIVE

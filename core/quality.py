@@ -99,7 +99,8 @@ class Reading:
 
     def __post_init__(self) -> None:
         if (self.value is None) != (self.quality.level is Level.BAD):
-            raise ValueError(f"a reading of quality {self.quality} cannot have value {self.value}")
+            level = self.quality.level.name.lower()
+            raise ValueError(f"a reading of {level} quality cannot have the value {self.value}")
 
 
 def missing(reason: Reason) -> Reading:
@@ -108,14 +109,14 @@ def missing(reason: Reason) -> Reading:
 
 
 NOT_MEASURED = missing(Reason.NOT_MEASURED)
-"""Reading of a slow channel that is missing in a block."""
+"""Reading of a slow channel that is missing from a block."""
 
 
 def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = None) -> Reading:
     """Return the mean of the usable readings, or the newest unusable one if most are unusable.
 
-    The weights, such as numbers of samples, are equal by default; "most" is more than half of the
-    total weight.
+    `readings` has at least one reading, the oldest first. The weights, such as numbers of samples,
+    are equal by default; "most" is more than half of the total weight.
     """
     weights = [1.0] * len(readings) if weights is None else weights
     counted = [
@@ -135,8 +136,9 @@ def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = 
 def current_mean(readings: Sequence[Reading], *, is_grazed: bool = False) -> Reading:
     """Return the mean of the usable readings, or the newest reading if it is unusable.
 
-    For averages over minutes that are shown as present values. A channel that has just failed has
-    no value, unless only a few clipped samples made its newest reading unusable (`is_grazed`).
+    `readings` has at least one reading, the oldest first. Averages over minutes are shown as
+    present values. A channel that has just failed therefore has no value, unless only a few clipped
+    samples made its newest reading unusable (`is_grazed`); the mean is then uncertain.
     """
     newest = readings[-1]
     usable = [reading for reading in readings if reading.value is not None]

@@ -70,10 +70,7 @@ class BudgetLine(NamedTuple):
 class Budget:
     """Uncertainty budget: a result with all contributions to its uncertainty.
 
-    Parameters
-    ----------
-    bounded_interval
-        95 % interval of a bounded, non-normal result; None for other results.
+    `bounded_interval` is the 95 % interval of a bounded, non-normal result; None for other results.
     """
 
     value: float
@@ -111,12 +108,15 @@ class Budget:
 
 
 def random_line(name: str, standard: float, freedoms: float = math.inf) -> BudgetLine:
-    """Return a random, normally distributed contribution; `standard` is in the result's unit."""
+    """Return a random, normal contribution; `standard` is in the unit of the result.
+
+    `freedoms` are the degrees of freedom of `standard`; infinite if it is not estimated from data.
+    """
     return BudgetLine(name, Kind.RANDOM, Distribution.NORMAL, standard, 1.0, freedoms)
 
 
 def systematic_line(name: str, half_width: float, sensitivity: float) -> BudgetLine:
-    """Return a systematic, uniformly distributed contribution with a given half-width."""
+    """Return a systematic, uniform contribution; `half_width` is in the unit of the input."""
     return BudgetLine(name, Kind.SYSTEMATIC, Distribution.UNIFORM, half_width, sensitivity)
 
 
@@ -144,7 +144,7 @@ def _half_width(parts: Sequence[tuple[float, float]]) -> float:
 
 
 def proportional(value: float, budget: Budget) -> Budget:
-    """Return the budget of a value that is exactly proportional to the result of `budget`."""
+    """Return the budget of a value proportional to the result of `budget`, which is not 0."""
     factor = value / budget.value
     lines = (line._replace(sensitivity=factor * line.sensitivity) for line in budget.lines)
     return Budget(value, tuple(lines))
@@ -166,7 +166,7 @@ MIN_EFFECTIVE = 2.0
 
 
 def effective_number(values: FloatArray) -> float:
-    """Return the effective number of independent values (n,); at least 2 for two or more values.
+    """Return the effective number of independent values among values (n,); at least 2 if n is.
 
     Values of overlapping segments are correlated. The effective number for a first-order process is
     ``n (1 - r) / (1 + r)``, with the correlation r of successive values (Bayley and Hammersley

@@ -25,13 +25,14 @@ import structlog
 import uvloop
 from hypothesis import settings as hypothesis_settings
 from rigs.assessments import assessment as build_assessment
+from rigs.blocks import cell_block
 from scipy.signal import lfilter
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.simulated.feed import FeedEndedError
 from core.arrays import FloatArray
 from core.baseline.history import StiffnessHistory
 from core.monitor.assessment import Assessment
+from core.samples.blocks import SampleBlock
 from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 
 NS_PER_S = 1_000_000_000
@@ -110,14 +111,15 @@ class CountingFeed:
         self.slow = slow
         self.ok = (True,) * n_channels
         self.n_samples = 0
+        self._calibration = calibration_in_counts(n_channels, rate_hz, len(slow))
 
-    def advance(self, n_samples: int) -> RawBlock:
+    def advance(self, n_samples: int) -> SampleBlock:
         first = self.n_samples
         if first == self._stop_index:
             raise FeedEndedError
         self.n_samples += n_samples
         number = np.arange(first, self.n_samples) + np.arange(self._n_channels)[:, np.newaxis]
-        return RawBlock(
+        return cell_block(
             epoch=7,
             first_index=first,
             start_ns=self._start_ns + round(first * NS_PER_S / self._rate_hz),
@@ -125,6 +127,7 @@ class CountingFeed:
             counts=(number % 2**15).astype(np.int16),
             ok=self.ok,
             slow=self.slow,
+            calibration=self._calibration,
         )
 
 

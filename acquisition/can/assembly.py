@@ -1,4 +1,4 @@
-"""Assembly of admitted CAN frames, in order of arrival, into raw blocks."""
+"""Assembly of admitted CAN frames, in order of arrival, to sample blocks."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -13,11 +13,11 @@ from acquisition.can.frame_sets import (
 )
 from acquisition.can.gate import Frame
 from acquisition.can.plan import Part, Plan, Refusal, RefusalCounts
-from acquisition.can.side_values import RawBlockBuilder
+from acquisition.can.side_values import BlockBuilder
 from acquisition.delivery.arrival import LeastDelay
-from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import FrameError
 from core.samples.axis import Epochs, SampleAxis
+from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
 
 MAX_UNSURE_S = 1.0
@@ -75,7 +75,7 @@ class FrameAssembler:
         self._senders = DuplicateSenderDetector()
         self._counters = CounterFollower(plan, self._axis, self.refused, self._senders)
         self._sets = FrameSets(plan, self.refused, self._senders)
-        self._builder = RawBlockBuilder(plan)
+        self._builder = BlockBuilder(plan)
         self._early: dict[str | int, float] = {}
         self._reported_epoch: int | None = None
         self.n_complete = 0
@@ -117,7 +117,7 @@ class FrameAssembler:
 
     def take(
         self, frames: Iterable[Frame], arrived_ns: int, steady_ns: int | None = None
-    ) -> list[RawBlock]:
+    ) -> list[SampleBlock]:
         """Add the frames of a batch; return the completed blocks in order.
 
         Parameters
@@ -129,7 +129,7 @@ class FrameAssembler:
             log file, which has UTC times only.
         """
         passed_ns = arrived_ns if steady_ns is None else steady_ns
-        blocks: list[RawBlock] = []
+        blocks: list[SampleBlock] = []
         for key, data in frames:
             try:
                 blocks += self._take(key, data, arrived_ns, passed_ns)
@@ -142,7 +142,7 @@ class FrameAssembler:
 
     def _take(
         self, key: int, data: bytes | None, arrived_ns: int, passed_ns: int
-    ) -> list[RawBlock]:
+    ) -> list[SampleBlock]:
         message = self._plan.messages[key]
         if data is None:
             if message.multiplexer is None and message.parts[0].wave is not None:
@@ -160,7 +160,7 @@ class FrameAssembler:
                 placed = [PlacedFrame(part, data, self._next)]
         else:
             placed = self._counters.place(part, data, passed_ns)
-        blocks: list[RawBlock] = []
+        blocks: list[SampleBlock] = []
         if placed and self._axis.epoch != self._epoch:  # complete the blocks of the old epoch
             blocks = self._built(arrived_ns)
             self._begin_count()
@@ -220,7 +220,7 @@ class FrameAssembler:
             self._begin_count()
 
     def _is_confirmed(self, now_ns: int) -> bool:
-        """Whether the host's clock confirms the number of held samples."""
+        """Return whether the host's clock confirms the number of held samples."""
         late_s, now_s = self._late_s(now_ns)
         is_counted = self._plan.counted
         if late_s < (JUMP_TOLERANCE.step_s if is_counted else self._instant_s / 2):
@@ -271,6 +271,6 @@ class FrameAssembler:
         self._sets.lose(n_lost, n_held + n_rejected)
         self._held = []
 
-    def _built(self, arrived_ns: int) -> list[RawBlock]:
+    def _built(self, arrived_ns: int) -> list[SampleBlock]:
         held, self._held = self._held, []
         return self._builder.blocks(held, arrived_ns)

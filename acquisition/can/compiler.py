@@ -68,8 +68,7 @@ class _Compiler:
         self._add_values()
         hold = settings.hold_samples
         hold_samples = hold if isinstance(hold, int) else None
-        n_slow = len(self._calibration.slow)
-        return Plan(self._plans, decoder, n_slow, rate_hz, hold_samples, settings.hold_s)
+        return Plan(self._plans, decoder, self._calibration, hold_samples, settings.hold_s)
 
     def _decoder(self) -> WaveformDecoder:
         settings = self._settings

@@ -87,7 +87,7 @@ class CounterFollower:
             return self._jump([*self._doubted, frame])
         for _ in self._doubted:
             self._refused[Refusal.IMPOSSIBLE_COUNTER] += 1
-            self._senders.note_contradiction()
+            self._senders.note(contrary=True)
         self._doubted.clear()
         index = self._near_index(counter, modulus, arrived_ns) if fits else None
         if index is None:
@@ -123,7 +123,7 @@ class CounterFollower:
         return axis.index - behind if behind <= min(self._near_samples, half // 2) else None
 
     def _confirms(self, frame: _CountedFrame) -> bool:
-        """Whether a frame confirms the last held frame by following it closely."""
+        """Return whether a frame confirms the last held frame by following it closely."""
         last = self._doubted[-1]
         repeats = last.part is frame.part and last.counter == frame.counter
         if repeats or (frame.epoch is not None and frame.epoch != self._epoch_of(self._doubted)):
@@ -154,7 +154,7 @@ class CounterFollower:
         return [PlacedFrame(f.part, f.data, self._nearest(f, index)) for f in frames]
 
     def _is_gap(self, frames: Sequence[_CountedFrame], widest: _CountedFrame) -> bool:
-        """Whether a jump is a gap in the same count rather than a restart of the counter."""
+        """Return whether a jump is a gap in the same count rather than a restart of the counter."""
         axis, reports = self._axis, self._plan.reports_epoch
         if reports and all(frame.epoch is None for frame in frames):
             return True
@@ -167,7 +167,7 @@ class CounterFollower:
         return abs(deviation) <= axis.allowance(at_ns, JUMP_TOLERANCE)
 
     def _resumes(self, frame: _CountedFrame, epoch: int | None) -> bool:
-        """Whether a frame continues the previous count, which ended within the last second."""
+        """Return whether a frame continues the previous count, ended within the last second."""
         if self._left is None:
             return False
         index, modulus, left_ns, left_epoch = self._left

@@ -28,37 +28,28 @@ class DuplicateSenderDetector:
     """
 
     def __init__(self) -> None:
-        self._n_windows_to_wait = 0
-        self._n_fitting = self._n_contrary = 0
+        self._n_windows_to_wait = self._n_frames = self._n_contrary = 0
 
     @property
     def found(self) -> bool:
         """Whether a second sender is detected."""
         return self._n_windows_to_wait > 0
 
-    def note_fit(self) -> None:
-        """Count a frame that is consistent with a single sender."""
-        self._n_fitting += 1
-        self._judge()
-
-    def note_contradiction(self) -> None:
-        """Count a frame that contradicts other frames."""
-        self._n_contrary += 1
-        self._judge()
+    def note(self, *, contrary: bool) -> None:
+        """Count a frame that contradicts other frames, or is consistent with a single sender."""
+        self._n_frames += 1
+        self._n_contrary += contrary
+        if self._n_frames >= _WINDOW_FRAMES:
+            self._end_window(contrary=self._n_contrary >= _CONFLICT_SHARE * self._n_frames)
 
     def note_return(self) -> None:
         """Record that an earlier counter sequence continues, which shows a second sender."""
         self._end_window(contrary=True)
 
-    def _judge(self) -> None:
-        n_frames = self._n_fitting + self._n_contrary
-        if n_frames >= _WINDOW_FRAMES:
-            self._end_window(contrary=self._n_contrary >= _CONFLICT_SHARE * n_frames)
-
     def _end_window(self, *, contrary: bool) -> None:
         waiting = max(0, self._n_windows_to_wait - 1)
         self._n_windows_to_wait = _CLEAN_WINDOWS if contrary else waiting
-        self._n_fitting = self._n_contrary = 0
+        self._n_frames = self._n_contrary = 0
 
 
 class PlacedFrame(NamedTuple):
@@ -174,13 +165,13 @@ class FrameSets:
         return None
 
     def _is_new(self, wave: int, index: int, data: bytes) -> bool:
-        """Whether a frame is newer than all others of its message; a new frame is stored."""
+        """Return whether a frame is newer than all others of its message; a new frame is stored."""
         seen = self._seen[wave]
         last = next(reversed(seen), -1)
         if index <= last or index < self.stop:
             self._refuse_old(seen, index, data)
             return False
-        self._senders.note_fit()
+        self._senders.note(contrary=False)
         seen[index] = data
         if len(seen) > _MAX_REMEMBERED:
             del seen[next(iter(seen))]
@@ -192,7 +183,7 @@ class FrameSets:
         near = range(index - n_samples + 1, index + n_samples)
         if seen[index] != data if index in seen else any(n in seen for n in near):
             self._refused[Refusal.CONTRADICTORY] += 1
-            self._senders.note_contradiction()
+            self._senders.note(contrary=True)
             return
         again = index == next(reversed(seen), -1)
         self._refused[Refusal.DUPLICATE if again else Refusal.OUT_OF_ORDER] += 1

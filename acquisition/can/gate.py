@@ -68,7 +68,7 @@ _CONTROLLER_BYTE = 1
 
 
 def require_bus(message: Message) -> None:
-    """Raise LinkError for an error frame of a bus-off or error-passive controller.
+    """Check that an error frame reports neither a bus-off nor an error-passive controller.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def require_bus(message: Message) -> None:
 
 
 def lost_in_controller(message: Message) -> bool:
-    """Whether an error frame reports a receive overflow in the controller."""
+    """Return whether an error frame reports a receive overflow in the controller."""
     return bool(_controller_state(message) & RX_OVERFLOW)
 
 

@@ -147,7 +147,7 @@ class WaveformDecoder:
 
 
 def is_counts(signal: DbcSignal) -> bool:
-    """Whether a signal is the count of a 16-bit converter: signed, in volts or without unit."""
+    """Return whether a signal is a count of a 16-bit converter: signed, in volts or unitless."""
     source = signal.source
     plain = source.is_signed and not source.is_float and source.length == _COUNT_BITS
     return (

@@ -8,6 +8,7 @@ from enum import StrEnum
 from acquisition.can.dbc import DbcMessage
 from acquisition.can.layout import ScalarReader, WaveformDecoder
 from core.samples.blocks import UNCOUNTED_LOSS as UNCOUNTED
+from core.samples.calibration import UnitCalibration
 
 MAX_INSTANTS_PER_S = 1250.0
 """Maximum number of sample instants per second without counters: the clock drift within a second
@@ -76,8 +77,8 @@ class Plan:
     ----------
     messages
         Decoding plan of each message by frame key.
-    n_slow
-        Number of slow channels.
+    calibration
+        Calibration of the unit: channels, slow channels and sampling rate.
     hold_samples
         Number of samples for which a message with counter but no waveforms is valid; None if a
         signal contains the number.
@@ -105,15 +106,13 @@ class Plan:
         self,
         messages: Mapping[int, MessagePlan],
         decoder: WaveformDecoder,
-        n_slow: int,
-        rate_hz: float,
+        calibration: UnitCalibration,
         hold_samples: int | None,
         hold_s: float,
     ) -> None:
-        self.messages, self.decoder, self.n_slow = messages, decoder, n_slow
-        self.rate_hz, self.hold_samples = rate_hz, hold_samples
-        self.hold_uncounted = max(1, round(hold_s * rate_hz))
-        self.n_channels = len(decoder.channels)
+        self.messages, self.decoder, self.calibration = messages, decoder, calibration
+        self.rate_hz, self.hold_samples = calibration.rate_hz, hold_samples
+        self.hold_uncounted = max(1, round(hold_s * self.rate_hz))
         self.samples_per_frame = len(decoder.channels[0].columns)
         parts = [part for message in messages.values() for part in message.parts.values()]
         self.n_waves = sum(part.wave is not None for part in parts)

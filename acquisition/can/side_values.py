@@ -1,6 +1,7 @@
-"""Side values (slow values, OK bits, time stamps) by sample; raw blocks with side values."""
+"""Side values (slow values, OK bits, time stamps) by sample; sample blocks with side values."""
 
 import itertools
+import math
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -20,9 +21,8 @@ from acquisition.can.plan import (
     RefusalCounts,
 )
 from acquisition.delivery.arrival import HostStamps
-from acquisition.delivery.blocks import RawBlock
 from core.arrays import RawArray
-from core.samples.blocks import Rejection
+from core.samples.blocks import Rejection, SampleBlock, SideValues
 from core.units import NS_PER_S
 
 _MAX_ENTRIES = 4096
@@ -104,8 +104,8 @@ class SideTable:
         return start + hold
 
 
-class RawBlockBuilder:
-    """Builder of raw blocks; a block ends where a side value changes.
+class BlockBuilder:
+    """Builder of sample blocks; a block ends where a side value changes.
 
     Attributes
     ----------
@@ -124,8 +124,8 @@ class RawBlockBuilder:
         self.side.clear()
         self._rejected.clear()
 
-    def blocks(self, instants: Sequence[Instant], arrived_ns: int) -> list[RawBlock]:
-        """Return the raw blocks of sample instants, given in index order and of one epoch.
+    def blocks(self, instants: Sequence[Instant], arrived_ns: int) -> list[SampleBlock]:
+        """Return the blocks of sample instants, given in index order and of one epoch.
 
         Parameters
         ----------
@@ -148,7 +148,7 @@ class RawBlockBuilder:
             self.side.forget_before(stop)
         return blocks
 
-    def _block(self, epoch: int, first_index: int, samples: RawArray) -> RawBlock | None:
+    def _block(self, epoch: int, first_index: int, samples: RawArray) -> SampleBlock | None:
         if self._plan.needs_header and self.side.at(EPOCH, first_index) is None:
             self._rejected[Refusal.NO_HEADER] += samples.shape[1]
             return None
@@ -156,26 +156,24 @@ class RawBlockBuilder:
         if start_ns is None:
             self._rejected[Refusal.NO_TIME] += samples.shape[1]
             return None
-        slow = [self.side.at(number, first_index) for number in range(self._plan.n_slow)]
+        calibration = self._plan.calibration
+        values = [self.side.at(number, first_index) for number in range(len(calibration.slow))]
+        slow = [math.nan if value is None else value for value in values]
         rejected = tuple(Rejection(reason.value, n) for reason, n in self._rejected.items() if n)
         self._rejected.clear()
-        return RawBlock(
+        return SampleBlock(
+            calibration=calibration,
             epoch=epoch,
             first_index=first_index,
-            start_ns=start_ns,
-            rate_hz=self._plan.rate_hz,
             counts=samples,
-            ok=self._ok(first_index),
-            slow=tuple(np.nan if value is None else value for value in slow),
+            side=SideValues.of(start_ns, self._ok(first_index), slow),
             rejected=rejected,
         )
 
-    def _ok(self, index: int) -> tuple[bool, ...]:
+    def _ok(self, index: int) -> list[bool]:
         """Return the OK state of each channel; False without a valid value of the OK bits."""
-        if OK_BITS not in self._plan.quantities:
-            return (True,) * self._plan.n_channels
-        bits = int(self.side.at(OK_BITS, index) or 0)
-        return tuple(bool(bits >> c & 1) for c in range(self._plan.n_channels))
+        bits = int(self.side.at(OK_BITS, index) or 0) if OK_BITS in self._plan.quantities else -1
+        return [bool(bits >> c & 1) for c in range(len(self._plan.calibration.channels))]
 
     def _start_ns(self, index: int) -> int | None:
         if SECONDS in self._plan.quantities:

@@ -14,7 +14,7 @@ from acquisition.can.plan import SECONDS
 from acquisition.can.reader import FrameReader
 from acquisition.can.settings import CanLinkSettings, CanSettings
 from acquisition.clock import Clock
-from acquisition.delivery.blocks import MIN_BLOCK_S, BlockAssembler, RawBlock
+from acquisition.delivery.blocks import MIN_BLOCK_S, BlockAssembler
 from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock
 from core.samples.calibration import UnitCalibration
@@ -117,7 +117,7 @@ class CanSource:
         looked_s = self._clock.monotonic_s()
         look_s = _PAUSE_S if self._delivery.holds_whole_cells else _LOOK_S
         batch = await reader.next_batch(min(look_s, self._stale_after_s - self._silent_s))
-        raw_blocks: list[RawBlock] = []
+        found: list[SampleBlock] = []
         blocks: list[SampleBlock] = []
         n_complete = self._assembler.n_complete
         if batch:
@@ -125,30 +125,30 @@ class CanSource:
                 self._delivery.note_fault(batch.stamp_fault)
             arrived = batch.arrived
             steady_ns = ns_from_s(arrived.steady_s)
-            raw_blocks = self._assembler.take(batch.frames, arrived.host_ns, steady_ns)
+            found = self._assembler.take(batch.frames, arrived.host_ns, steady_ns)
             if self._assembler.trouble:
-                raw_blocks = []
-            blocks = self._delivery.take_together(raw_blocks, arrived)
+                found = []
+            blocks = self._delivery.take(found, arrived)
         # a suspended process was not listening; its suspension is no silence of the bus
         passed_s = min(self._clock.monotonic_s() - looked_s, 2 * _LOOK_S)
         has_come = self._assembler.n_complete > n_complete and not self._assembler.trouble
-        self._silent_s = 0.0 if raw_blocks or has_come else self._silent_s + passed_s
-        self._doubtful_s = 0.0 if raw_blocks else self._doubtful_s + passed_s
-        self._require_fresh(self._silent_s, self._doubtful_s)
+        self._silent_s = 0.0 if found or has_come else self._silent_s + passed_s
+        self._doubtful_s = 0.0 if found else self._doubtful_s + passed_s
+        self._require_fresh()
         if batch is None or self._doubtful_s > _PAUSE_S:
             blocks += self._delivery.release()
         return blocks
 
-    def _require_fresh(self, silent_s: float, doubtful_s: float) -> None:
+    def _require_fresh(self) -> None:
         """Raise LinkError for a bus without samples, or with samples that the clock contradicts."""
-        is_doubtful = doubtful_s >= self._stale_after_s + _MAX_DOUBT_S
-        if silent_s >= self._stale_after_s or is_doubtful:
+        is_doubtful = self._doubtful_s >= self._stale_after_s + _MAX_DOUBT_S
+        if self._silent_s >= self._stale_after_s or is_doubtful:
             refused = ", ".join(f"{reason} {n}" for reason, n in self.refused_frames.items())
             trouble = self._assembler.trouble
             if is_doubtful and not trouble:
                 trouble = "samples arrive more slowly than rate_hz;"
             raise LinkError(
                 f"{self._settings.link}: no {'plausible' if trouble else 'complete'} sample for"
-                f" {doubtful_s:.1f} s;{f' {trouble}' if trouble else ''}"
+                f" {self._doubtful_s:.1f} s;{f' {trouble}' if trouble else ''}"
                 f" frames refused so far: {refused or 'none'}"
             )

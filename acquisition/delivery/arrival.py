@@ -82,6 +82,9 @@ daily temperature changes."""
 
 _MIN_BINS = 6
 
+_Bin = tuple[float, float, int | None]
+"""Smallest delay in a bin, with its time, in seconds; and largest clock offset, ns, if known."""
+
 _HOST_STEP_S = 0.5
 """Step of the host clock above which the clock counts as set; synchronisation only slews."""
 
@@ -101,8 +104,7 @@ class ArrivalModel:
 
     def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz
-        self._bins: deque[tuple[float, float]] = deque(maxlen=_MAX_BINS)
-        self._offset_ns: deque[int] = deque(maxlen=_MAX_BINS)
+        self._bins: deque[_Bin] = deque(maxlen=_MAX_BINS)
         self._epoch: int | None = None
         self._origin: tuple[int, float] = (0, 0.0)
         self._newest: Arrival | None = None
@@ -127,17 +129,17 @@ class ArrivalModel:
         if number != self._bin:
             self._drift = _slope(self._bins)
             self._bin = number
-            self._bins.append((host_s, delay_s))
-            if offset_ns is not None:
-                self._offset_ns.append(offset_ns)
+            self._bins.append((host_s, delay_s, offset_ns))
         else:
-            self._bins[-1] = min(self._bins[-1], (host_s, delay_s), key=lambda pair: pair[1])
-            if offset_ns is not None:
-                self._offset_ns[-1] = max(self._offset_ns[-1], offset_ns)
+            before = self._bins[-1]
+            offsets_ns = [ns for ns in (before[2], offset_ns) if ns is not None]
+            host_s, delay_s, _ = min(before, (host_s, delay_s, None), key=lambda each: each[1])
+            self._bins[-1] = (host_s, delay_s, max(offsets_ns, default=None))
 
     def device_clock(self, n_faults: int = 0) -> DeviceClock:
         """Return the present offset and drift of the device clock; unknown fields are None."""
-        offset_ns = max(list(self._offset_ns)[-_MIN_BINS:], default=None)
+        offsets_ns = [ns for *_, ns in self._bins if ns is not None]
+        offset_ns = max(offsets_ns[-_MIN_BINS:], default=None)
         drift = None if self._drift is None else -1e6 * self._drift[0]
         return DeviceClock(
             offset_s=None if offset_ns is None else offset_ns / NS_PER_S,
@@ -152,20 +154,19 @@ class ArrivalModel:
     def _begin(self, epoch: int, stop_index: int, arrived_s: float) -> None:
         self._epoch, self._origin, self._bin = epoch, (stop_index, arrived_s), -1
         self._bins.clear()
-        self._offset_ns.clear()
         self._drift = None
 
 
-def _slope(points: deque[tuple[float, float]]) -> tuple[float, float] | None:
+def _slope(bins: deque[_Bin]) -> tuple[float, float] | None:
     """Return the least-squares slope and its standard uncertainty; None with few points."""
-    if len(points) < _MIN_BINS:
+    if len(bins) < _MIN_BINS:
         return None
-    host_s, delay_s = np.array(points).T
+    host_s, delay_s = np.array([(host_s, delay_s) for host_s, delay_s, _ in bins]).T
     host_s -= host_s.mean()
     spread = float(host_s @ host_s)
     slope = float(host_s @ delay_s) / spread
     rest = delay_s - delay_s.mean() - slope * host_s
-    return slope, float(np.sqrt(rest @ rest / (len(points) - 2) / spread))
+    return slope, float(np.sqrt(rest @ rest / (len(bins) - 2) / spread))
 
 
 _MAX_SLEW = 200e-6
@@ -213,7 +214,7 @@ class HostStamps:
             self._bend(stop_index, self._least_delay_ns)
 
     def start_ns(self, index: int) -> int:
-        """Return the time of a sample, UTC ns since 1970; increases with the index in an epoch."""
+        """Return the time of a sample, UTC ns since 1970; it increases within an epoch."""
         return self._ns + round((index - self._index) * self._period_ns * self._slope)
 
     def _begin(self, epoch: int, index: int, at_ns: int) -> None:
@@ -240,16 +241,8 @@ _MAX_STILL_S = 0.05
 """Longest time between the reading of two frames that may have the same stamp."""
 
 
-@dataclass(frozen=True)
-class _Pair:
-    """Interface stamp of a frame, seconds, and the time when the frame was read."""
-
-    stamp_s: float
-    read: Arrival
-
-    @property
-    def difference_s(self) -> float:
-        return self.read.steady_s - self.stamp_s
+_Pair = tuple[float, float]
+"""Interface stamp of a frame, and monotonic time when the frame was read, seconds."""
 
 
 class InterfaceClock:
@@ -277,25 +270,24 @@ class InterfaceClock:
         """
         if not math.isfinite(stamp_s) or stamp_s <= 0.0:
             return read, StampFault.REPEATED  # an interface without stamps sends 0
-        pair = _Pair(stamp_s, read)
-        good, doubted = self._good, self._doubted
+        pair, good, doubted = (stamp_s, read.steady_s), self._good, self._doubted
         fault = None if good is None else _fault(good, self._delay.least_s or 0.0, pair)
         if fault is not None:
-            if doubted is None or _fault(doubted, doubted.difference_s, pair) is not None:
+            if doubted is None or _fault(doubted, doubted[1] - doubted[0], pair) is not None:
                 self._doubted = pair
                 return read, fault
             self._delay = LeastDelay(_MAX_INTERFACE_DRIFT)
-            self._delay.late_s(doubted.difference_s, read.steady_s)
+            self._delay.late_s(doubted[1] - doubted[0], read.steady_s)
         self._good, self._doubted = pair, None
-        late_s = max(0.0, self._delay.late_s(pair.difference_s, read.steady_s))
+        late_s = max(0.0, self._delay.late_s(read.steady_s - stamp_s, read.steady_s))
         return Arrival(read.host_ns - ns_from_s(late_s), read.steady_s - late_s), None
 
 
 def _fault(before: _Pair, least_s: float, pair: _Pair) -> StampFault | None:
-    if pair.stamp_s < before.stamp_s:
+    (stamp_s, read_s), (before_stamp_s, before_read_s) = pair, before
+    if stamp_s < before_stamp_s:
         return StampFault.REGRESSED
-    still_s = pair.read.steady_s - before.read.steady_s
-    if pair.stamp_s == before.stamp_s and still_s > _MAX_STILL_S:
+    if stamp_s == before_stamp_s and read_s - before_read_s > _MAX_STILL_S:
         return StampFault.REPEATED
-    late_s = pair.difference_s - least_s
-    return None if -_MAX_EARLY_S <= late_s <= _MAX_LATE_S else StampFault.JUMPED
+    is_near = -_MAX_EARLY_S <= read_s - stamp_s - least_s <= _MAX_LATE_S
+    return None if is_near else StampFault.JUMPED

@@ -1,19 +1,15 @@
 """Check of device time stamps, and assembly of sample blocks: the last stage of every adapter."""
 
-import itertools
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from acquisition.delivery.arrival import Arrival, ArrivalModel
-from core.arrays import RawArray
 from core.samples.axis import ClockTolerance
 from core.samples.blocks import (
     DeviceClock,
-    Rejection,
     SampleBlock,
     SideValues,
     StampFault,
@@ -28,84 +24,6 @@ MIN_BLOCK_S = 0.25
 _STAMP_NS = 1000
 """Resolution of time stamps. All protocols can transfer this resolution, and slow values in single
 precision, so a recording replayed over any protocol gives equal values."""
-
-
-@dataclass(frozen=True)
-class RawBlock:
-    """Consecutive samples as delivered by a device, with one value of each slow channel.
-
-    Parameters
-    ----------
-    counts
-        int16 converter counts (n_channels, n_samples), or, from a device without counts, float32
-        engineering units, with NaN for missing samples.
-    start_ns
-        Time of the first sample, by the device stamps or by the host clock.
-    ok
-        Whether the device reports each channel as OK (n_channels,).
-    slow
-        Value of each configured slow channel; NaN if missing.
-    """
-
-    epoch: int
-    first_index: int
-    start_ns: int
-    rate_hz: float
-    counts: RawArray
-    ok: tuple[bool, ...]
-    slow: tuple[float, ...]
-    rejected: tuple[Rejection, ...] = ()
-
-    @property
-    def n_samples(self) -> int:
-        """Number of samples per channel."""
-        return int(self.counts.shape[1])
-
-    @property
-    def stop_index(self) -> int:
-        """Index of the first sample after the block."""
-        return self.first_index + self.n_samples
-
-
-def sample_block(raws: Sequence[RawBlock], calibration: UnitCalibration) -> SampleBlock:
-    """Return one sample block of consecutive raw blocks, with one cell per raw block."""
-    first = raws[0]
-    if len(raws) == 1:
-        counts, side = first.counts, SideValues.of(first.start_ns, first.ok, first.slow)
-    else:
-        counts = np.concatenate([raw.counts for raw in raws], axis=1)
-        side = SideValues(
-            starts=np.array([raw.first_index - first.first_index for raw in raws]),
-            start_ns=np.array([raw.start_ns for raw in raws]),
-            ok=np.array([raw.ok for raw in raws]).T,
-            slow=np.array([raw.slow for raw in raws], dtype=np.float64).T,
-        )
-    return SampleBlock(
-        calibration=calibration,
-        epoch=first.epoch,
-        first_index=first.first_index,
-        counts=counts,
-        side=side,
-        rejected=first.rejected,
-    )
-
-
-def cells_of(block: SampleBlock) -> Iterator[RawBlock]:
-    """Yield each cell of a sample block as a raw block, without slow values of other devices."""
-    side = block.side
-    stops = [*side.starts[1:].tolist(), block.n_samples]
-    columns = (side.starts.tolist(), stops, side.start_ns.tolist(), side.ok.T.tolist())
-    for start, stop, start_ns, ok, slow in zip(*columns, side.slow.T.tolist(), strict=True):
-        yield RawBlock(
-            epoch=block.epoch,
-            first_index=block.first_index + start,
-            start_ns=start_ns,
-            rate_hz=block.rate_hz,
-            counts=block.counts[:, start:stop],
-            ok=tuple(ok),
-            slow=tuple(slow),
-            rejected=() if start else block.rejected,
-        )
 
 
 class BlockJoiner:
@@ -128,10 +46,13 @@ class BlockJoiner:
         self._cell, self._min_samples = cell_samples, min_samples
         self._parts: list[SampleBlock] = []
 
-    def put(self, block: SampleBlock) -> list[SampleBlock]:
-        """Add a block of a device; return the completed blocks in order."""
-        done = [] if self._continued_by(block) else self.flush()
-        self._parts.append(block)
+    def put(self, blocks: Iterable[SampleBlock]) -> list[SampleBlock]:
+        """Add the next blocks of a device; return the completed blocks in order."""
+        done: list[SampleBlock] = []
+        for block in blocks:
+            if self._parts and not _follows(self._parts[-1], block):
+                done += self.flush()
+            self._parts.append(block)
         return done if self.n_whole < self._min_samples else done + self.release()
 
     @property
@@ -157,12 +78,9 @@ class BlockJoiner:
         parts, self._parts = self._parts, []
         return [_in_cells(joined(parts), self._cell)] if parts else []
 
-    def _continued_by(self, block: SampleBlock) -> bool:
-        return not self._parts or _follows(self._parts[-1], block)
-
 
 def _follows(before: SampleBlock, block: SampleBlock) -> bool:
-    """Whether a block continues `before` without missing or rejected samples in between."""
+    """Return whether a block continues `before` without missing or rejected samples in between."""
     return (
         not block.rejected
         and block.epoch == before.epoch
@@ -194,6 +112,10 @@ _POSSIBLE_NS = range(946_684_800 * NS_PER_S, 4_102_444_800 * NS_PER_S)
 """Plausible device times, 2000 to 2100; a jump out of them (1904, 1970, 2106) is a failure."""
 
 
+_Stamp = tuple[int, int]
+"""Index of a sample, and its time stamp in UTC nanoseconds since 1970."""
+
+
 class StampCheck:
     """Check of time stamps against the sample index, which is exact.
 
@@ -208,17 +130,22 @@ class StampCheck:
     """
 
     def __init__(self) -> None:
-        self._good: _Stamp | None = None
+        self._epoch: int | None = None
+        self._rate_hz = 0.0
+        self._good: _Stamp = (0, 0)
         self._doubted: _Stamp | None = None
         self.n_faults = 0
 
     def check(self, block: SampleBlock) -> tuple[SampleBlock, StampFault | None]:
         """Return the block with corrected stamps, and the fault of the first wrong one or None."""
         side, index = block.side, block.first_index + block.side.starts
-        if side.n_cells > 1 and self._all_fit(block, index):
+        if block.epoch != self._epoch:  # the first stamp of an epoch has nothing to disagree with
+            self._epoch, self._rate_hz = block.epoch, block.rate_hz
+            self._good, self._doubted = (block.first_index, block.start_ns), None
+        if side.n_cells > 1 and self._all_fit(index, side.start_ns):
             return block, None
         stamps = zip(index.tolist(), side.start_ns.tolist(), strict=True)
-        found = [self._checked(_Stamp(block.epoch, *stamp, block.rate_hz)) for stamp in stamps]
+        found = [self._checked(stamp) for stamp in stamps]
         faults = [fault for _, fault in found if fault]
         if not faults:
             return block, None
@@ -226,68 +153,44 @@ class StampCheck:
         side = replace(side, start_ns=np.array([start_ns for start_ns, _ in found]))
         return replace(block, side=side), faults[0]
 
-    def _checked(self, stamp: "_Stamp") -> tuple[int, StampFault | None]:
+    def _checked(self, stamp: _Stamp) -> tuple[int, StampFault | None]:
         """Return the corrected time of a stamp, ns, and the fault of the stamp or None."""
         good, doubted = self._good, self._doubted
-        if good is None or stamp.epoch != good.epoch:
-            self._believe(stamp)
-            return stamp.start_ns, None
-        fault = _fault(good, stamp)
-        was_set = (
-            doubted is not None and _fault(doubted, stamp) is None and not _has_failed(good, stamp)
-        )
-        if fault is None or was_set:
-            self._believe(stamp)
-            return stamp.start_ns, None
+        fault = self._fault(good, stamp)
+        was_set = doubted is not None and self._fault(doubted, stamp) is None
+        has_failed = good[1] in _POSSIBLE_NS and stamp[1] not in _POSSIBLE_NS
+        if fault is None or (was_set and not has_failed):
+            self._good, self._doubted = stamp, None
+            return stamp[1], None
         self._doubted = stamp
-        return good.start_ns + _expected_ns(good, stamp), fault
+        return good[1] + self._expected_ns(good, stamp), fault
 
-    def _all_fit(self, block: SampleBlock, index: npt.NDArray[np.int64]) -> bool:
-        """Whether all stamps of a block fit within the tolerance; accept them if so."""
-        good, times_ns = self._good, block.side.start_ns
-        if good is not None and good.epoch == block.epoch:
-            index = np.concatenate([[good.first_index], index])
-            times_ns = np.concatenate([[good.start_ns], times_ns])
-        n_passed, elapsed_ns = np.diff(index), np.diff(times_ns)
-        off_ns = np.abs(elapsed_ns - n_passed * (NS_PER_S / block.rate_hz))
+    def _all_fit(self, index: npt.NDArray[np.int64], times_ns: npt.NDArray[np.int64]) -> bool:
+        """Return whether all stamps of a block fit within the tolerance; accept them if so."""
+        n_passed = np.diff(index, prepend=self._good[0])
+        elapsed_ns = np.diff(times_ns, prepend=self._good[1])
+        off_ns = np.abs(elapsed_ns - n_passed * (NS_PER_S / self._rate_hz))
         if (n_passed <= 0).any() or (elapsed_ns <= 0).any() or (off_ns > _TOLERANCE.over(0)).any():
             return False
-        self._believe(_Stamp(block.epoch, int(index[-1]), int(times_ns[-1]), block.rate_hz))
+        self._good, self._doubted = (int(index[-1]), int(times_ns[-1])), None
         return True
 
-    def _believe(self, stamp: "_Stamp") -> None:
-        self._good, self._doubted = stamp, None
+    def _expected_ns(self, before: _Stamp, after: _Stamp) -> int:
+        return ns_from_s((after[0] - before[0]) / self._rate_hz)
 
-
-class _Stamp(NamedTuple):
-    epoch: int
-    first_index: int
-    start_ns: int
-    rate_hz: float
-
-
-def _expected_ns(before: _Stamp, after: _Stamp) -> int:
-    return ns_from_s((after.first_index - before.first_index) / after.rate_hz)
-
-
-def _has_failed(before: _Stamp, after: _Stamp) -> bool:
-    return before.start_ns in _POSSIBLE_NS and after.start_ns not in _POSSIBLE_NS
-
-
-def _fault(before: _Stamp, after: _Stamp) -> StampFault | None:
-    expected_ns = _expected_ns(before, after)
-    elapsed_ns = after.start_ns - before.start_ns
-    if elapsed_ns == 0 and expected_ns:
-        return StampFault.REPEATED
-    if elapsed_ns * expected_ns < 0:
-        return StampFault.REGRESSED
-    if abs(elapsed_ns - expected_ns) > _TOLERANCE.over(expected_ns):
-        return StampFault.JUMPED
-    return None
+    def _fault(self, before: _Stamp, after: _Stamp) -> StampFault | None:
+        expected_ns, elapsed_ns = self._expected_ns(before, after), after[1] - before[1]
+        if elapsed_ns == 0 and expected_ns:
+            return StampFault.REPEATED
+        if elapsed_ns * expected_ns < 0:
+            return StampFault.REGRESSED
+        if abs(elapsed_ns - expected_ns) > _TOLERANCE.over(expected_ns):
+            return StampFault.JUMPED
+        return None
 
 
 class BlockAssembler:
-    """Assembler of sample blocks from raw blocks of a device, with checked time stamps.
+    """Assembler of the blocks of a device to blocks of whole cells, with checked time stamps.
 
     An adapter uses one assembler across all its connections, because the next connection may
     complete an unfinished block.
@@ -295,7 +198,7 @@ class BlockAssembler:
     Parameters
     ----------
     stamped
-        Whether ``start_ns`` of the raw blocks is a device stamp, not a host stamp.
+        Whether the time stamps of the blocks are those of the device, not of the host.
     samples_when_asked
         Whether the device samples only when polled, and so has no sampling rate that could drift.
     min_block_s
@@ -311,7 +214,6 @@ class BlockAssembler:
         samples_when_asked: bool = False,
         min_block_s: float = 0.0,
     ) -> None:
-        self._calibration = calibration
         self._stamped = stamped
         self._samples_when_asked = samples_when_asked
         min_samples = min_block_s * calibration.rate_hz
@@ -327,13 +229,13 @@ class BlockAssembler:
 
     def take(
         self,
-        raw: RawBlock,
+        blocks: Sequence[SampleBlock],
         arrived: Arrival | None = None,
         held_s: float = 0.0,
         *,
         has_stamp: bool = True,
     ) -> list[SampleBlock]:
-        """Add the next raw block; return the completed sample blocks.
+        """Add the next blocks of the device, oldest first; return the completed sample blocks.
 
         Parameters
         ----------
@@ -341,32 +243,17 @@ class BlockAssembler:
             Arrival time of the last sample; None for a recording, whose device clock is not
             judged.
         held_s
-            Time for which the device had held the last sample before its arrival.
+            Time in seconds for which the device had held the last sample before its arrival.
         has_stamp
-            Whether this block has a device stamp, if the device provides stamps.
+            Whether these blocks have device stamps, if the device provides stamps.
         """
-        return self._joined([self._checked(raw, arrived, held_s, has_stamp)])
-
-    def take_together(
-        self, raws: Sequence[RawBlock], arrived: Arrival | None = None, read_for_s: float = 0.0
-    ) -> list[SampleBlock]:
-        """Add raw blocks that arrived together, oldest first; return the completed sample blocks.
-
-        Parameters
-        ----------
-        read_for_s
-            Time for which the device had held the newest block before its arrival.
-        """
-        blocks: list[SampleBlock] = []
-        n_after = sum(raw.n_samples for raw in raws)
-        for raw in raws:
-            n_after -= raw.n_samples
-            blocks.append(self._checked(raw, arrived, read_for_s + n_after / raw.rate_hz))
-        return self._joined(blocks)
-
-    def take_block(self, block: SampleBlock) -> list[SampleBlock]:
-        """Add a recorded block; return the completed sample blocks."""
-        return self._joined([self._marked(*self._stamps.check(block))])
+        checked: list[SampleBlock] = []
+        n_after = sum(block.n_samples for block in blocks)
+        for block in blocks:
+            n_after -= block.n_samples
+            late_s = held_s + n_after / block.rate_hz
+            checked.append(self._checked(block, arrived, late_s, has_stamp))
+        return self._with_clock(self._joiner.put(checked))
 
     @property
     def holds_whole_cells(self) -> bool:
@@ -382,25 +269,16 @@ class BlockAssembler:
         return self._joiner.flush()
 
     def _checked(
-        self, raw: RawBlock, arrived: Arrival | None, held_s: float, has_stamp: bool = True
+        self, block: SampleBlock, arrived: Arrival | None, held_s: float, has_stamp: bool
     ) -> SampleBlock:
-        block, fault = self._stamps.check(sample_block([raw], self._calibration))
+        block, own_fault = self._stamps.check(block)
         if arrived is not None:
-            stop_ns = block.stop_ns if self._stamped and has_stamp and not fault else None
-            self._arrivals.add(raw.epoch, raw.stop_index, stop_ns, arrived)
+            is_stamped = self._stamped and has_stamp and not own_fault
+            stop_ns = block.stop_ns if is_stamped else None
+            self._arrivals.add(block.epoch, block.stop_index, stop_ns, arrived)
             block = replace(block, sampled_s=arrived.steady_s - held_s)
-        return self._marked(block, fault)
-
-    def _marked(self, block: SampleBlock, own_fault: StampFault | None) -> SampleBlock:
         fault, self._fault = own_fault or self._fault, None
         return replace(block, stamp_fault=fault) if fault else block
-
-    def _joined(self, blocks: Sequence[SampleBlock]) -> list[SampleBlock]:
-        """Return the blocks completed by these blocks; runs of consecutive blocks are joined."""
-        cuts = [n for n in range(1, len(blocks)) if not _follows(blocks[n - 1], blocks[n])]
-        runs = itertools.pairwise([0, *cuts, len(blocks)])
-        done = [b for run in runs if blocks for b in self._joiner.put(joined(blocks[slice(*run)]))]
-        return self._with_clock(done)
 
     def _with_clock(self, done: Sequence[SampleBlock]) -> list[SampleBlock]:
         return [b if b.sampled_s is None else replace(b, clock=self._clock()) for b in done]

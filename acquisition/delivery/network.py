@@ -1,4 +1,4 @@
-"""Host name resolution outside the default thread pool, and reliable task cancellation.
+"""Host name resolution outside the default thread pool.
 
 The name resolution of the event loop occupies a thread of the default pool, which the database also
 uses, until the name servers time out, even after its caller was cancelled.
@@ -106,29 +106,3 @@ def _is_address(host: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def n_stops() -> int:
-    """Return the number of pending cancellation requests of the current task.
-
-    Before Python 3.13, a task group that fails while its task waits for it does not reset its own
-    request.
-    """
-    task = asyncio.current_task()
-    return 0 if task is None else task.cancelling()
-
-
-def let_stop_through(n_before: int = 0) -> None:
-    """Raise `asyncio.CancelledError` if a library has suppressed a cancellation of this task.
-
-    Before Python 3.12, `asyncio.wait_for` loses a cancellation if the awaited result arrives at the
-    same time (CPython issue 86296), so the task would never end. Call this function after every
-    wait of a library that uses `wait_for`.
-
-    Parameters
-    ----------
-    n_before
-        `n_stops` before the wait, for tasks that use task groups.
-    """
-    if n_stops() > n_before:
-        raise asyncio.CancelledError

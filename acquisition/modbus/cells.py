@@ -37,7 +37,7 @@ INTEGERS = (NumberType.INT16, NumberType.UINT16, NumberType.INT32, NumberType.UI
 
 
 def reads_as(found: float, type_: NumberType, number: float) -> bool:
-    """Whether a number read from the device equals a number from its manual.
+    """Return whether a number read from the device equals a number from its manual.
 
     Integers are compared by their bits: 0x8000 equals -32768. For float32, the number from the
     manual is rounded to float32 before the comparison.

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from itertools import count
 
-from acquisition.delivery.network import KnownAddresses, let_stop_through
+from acquisition.delivery.network import KnownAddresses
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.connection import (
     CLOSED,
@@ -256,7 +256,7 @@ class ModbusClient:
         return replies
 
     def _shows_too_many(self, error: LinkError | FrameError) -> bool:
-        """Whether an error indicates that the device cannot handle several requests in flight."""
+        """Return whether an error shows that a device cannot handle several requests in flight."""
         if isinstance(error, SilenceError | FrameError):
             return True
         self._n_closed_bursts += 1
@@ -295,8 +295,6 @@ class ModbusClient:
                     why = reason_of(error)
                 else:
                     return
-                finally:
-                    let_stop_through()
         except OSError as error:
             why = str(error)
         raise LinkError(f"{self.where}: {why}")

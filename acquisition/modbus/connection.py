@@ -27,7 +27,7 @@ def reason_of(error: OSError | EOFError) -> str:
 
 
 class SilenceError(LinkError):
-    """Error of a device that did not reply within the timeout."""
+    """Error raised if the device did not reply within the timeout."""
 
 
 class ReplyProtocol(asyncio.Protocol):
@@ -158,7 +158,7 @@ class SerialLine(asyncio.Transport):
         protocol.connection_made(self)
 
     def is_closing(self) -> bool:
-        """Whether the port is closed."""
+        """Return whether the port is closed."""
         return not self._port.is_open
 
     def write(self, data: bytes | bytearray | memoryview) -> None:

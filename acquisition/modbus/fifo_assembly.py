@@ -61,12 +61,13 @@ class CountedSamples:
         self._drained_ns = ns_from_s(now_s)
 
     def is_ambiguous(self, now_s: float) -> bool:
-        """Whether the counter may have advanced by half its period since the last sample.
+        """Return whether the counter may have advanced by half its period since the last sample.
 
         Samples in the queue are then of unknown age, and must be discarded.
         """
-        now_ns = ns_from_s(now_s)
-        return self._axis.index is not None and not self._is_within_half_a_wrap(now_ns)
+        axis, now_ns = self._axis, ns_from_s(now_s)
+        limit = WRAP / 2 - axis.allowance(now_ns, _TOLERANCE)
+        return axis.index is not None and axis.elapsed(now_ns) >= limit
 
     def place(self, counter: int, now_s: float) -> SamplePlace | None:
         """Return epoch and index of a sample by its counter; None if it was read before.
@@ -89,9 +90,6 @@ class CountedSamples:
             axis.epochs.begin()
             return self._put(counter, now_ns)
         return self._put(axis.index + jump, now_ns)
-
-    def _is_within_half_a_wrap(self, now_ns: int) -> bool:
-        return self._axis.elapsed(now_ns) < WRAP / 2 - self._axis.allowance(now_ns, _TOLERANCE)
 
     def _put(self, index: int, now_ns: int) -> SamplePlace:
         self._axis.stand_at(index + 1, now_ns)
@@ -128,7 +126,7 @@ class UncountedSamples:
         return SamplePlace(self._epochs.number, first)
 
     def has_lost(self, now_s: float) -> bool:
-        """Whether samples have been lost by `now_s` (monotonic); the queue must then be empty."""
+        """Return whether samples were lost by the monotonic time `now_s`, at an empty queue."""
         return self._delay.late_s(now_s - self._next / self._rate_hz, now_s) > self._tolerance_s
 
 

@@ -1,12 +1,13 @@
 """`FifoSource`: sample source that reads FIFO queues of a Modbus device (function 0x18)."""
 
+import math
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, asynccontextmanager
 from dataclasses import dataclass
 
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival, HostStamps
-from acquisition.delivery.blocks import BlockAssembler, RawBlock
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.polling import Freshness
 from acquisition.errors import LinkError
 from acquisition.modbus.client import ModbusClient
@@ -20,7 +21,7 @@ from acquisition.modbus.fifo_assembly import (
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout, FifoPiece
 from acquisition.modbus.transport import LinkSettings
 from core.samples.axis import Epochs
-from core.samples.blocks import SampleBlock
+from core.samples.blocks import SampleBlock, SideValues
 from core.samples.calibration import UnitCalibration
 
 
@@ -60,6 +61,8 @@ class FifoSource:
     ) -> None:
         self._settings, self._layout = settings, layout
         self._calibration, self._clock = calibration, clock
+        self._are_ok = (True,) * len(calibration.channels)
+        self._no_slow = (math.nan,) * len(calibration.slow)
         self._client = ModbusClient(settings)
         self._delivery = BlockAssembler(calibration, stamped=False)
         self._stamps = HostStamps(calibration.rate_hz)
@@ -116,8 +119,9 @@ class FifoSource:
                 reading_s = 0.0 if drained else reading_s + arrived.steady_s - begun_s
                 self._require_in_time(reading_s)
             except LinkError:
-                for block in self._saved(waiting, arrived):
-                    yield block
+                if self._layout.has_counter:  # else a loss among these samples cannot be excluded
+                    for block in self._delivered(waiting, arrived):  # they cannot be read again
+                        yield block
                 raise
             if not drained:
                 continue
@@ -131,16 +135,22 @@ class FifoSource:
             self._freshness.note(repr(self._newest).encode(), arrived.steady_s)
             await self._clock.sleep(self._settings.poll_period_s)
 
-    def _saved(self, waiting: list[PlacedSamples], arrived: Arrival) -> list[SampleBlock]:
-        """Return blocks of the samples read before the link was lost; they cannot be read again.
-
-        Without a counter, the samples are dropped, because a loss among them cannot be excluded.
-        """
-        return self._delivered(waiting, arrived) if self._layout.has_counter else []
-
     def _delivered(self, waiting: list[PlacedSamples], arrived: Arrival) -> list[SampleBlock]:
-        raw_blocks = self._raw_blocks(waiting, arrived.host_ns)
-        return self._delivery.take_together(raw_blocks, arrived)
+        """Return the blocks that the samples read up to an arrival complete."""
+        newest = {samples.epoch: samples.stop_index for samples in waiting}
+        blocks = []
+        for samples in waiting:
+            if self._newest != (samples.epoch, newest[samples.epoch]):
+                self._newest = (samples.epoch, newest[samples.epoch])
+                self._stamps.add(*self._newest, arrived.host_ns)
+            start_ns = self._stamps.start_ns(samples.first_index)
+            side = SideValues.of(start_ns, self._are_ok, self._no_slow)
+            blocks.append(
+                SampleBlock(
+                    self._calibration, samples.epoch, samples.first_index, samples.counts, side
+                )
+            )
+        return self._delivery.take(blocks, arrived)
 
     async def _read(self) -> list[FifoPiece]:
         contents = await self._client.read_fifos(self._layout.addresses)
@@ -153,7 +163,7 @@ class FifoSource:
         return place_records(pieces[0], samples, now_s)
 
     def _is_drained(self, pieces: list[FifoPiece]) -> bool:
-        """Whether a reading emptied the queues; always true if reading does not remove samples."""
+        """Return whether a reading emptied the queues; True if reading does not remove samples."""
         full = any(piece.n_samples >= self._layout.most_samples for piece in pieces)
         return not self._layout.removes or not full
 
@@ -164,24 +174,3 @@ class FifoSource:
                 f" {self._settings.stale_after_s:g} s; the link is too slow for"
                 f" {self._calibration.rate_hz:g} samples/s"
             )
-
-    def _raw_blocks(self, placed: list[PlacedSamples], arrived_ns: int) -> list[RawBlock]:
-        newest = {samples.epoch: samples.stop_index for samples in placed}
-        blocks = []
-        for samples in placed:
-            if self._newest != (samples.epoch, newest[samples.epoch]):
-                self._newest = (samples.epoch, newest[samples.epoch])
-                self._stamps.add(*self._newest, arrived_ns)
-            blocks.append(self._raw_block(samples))
-        return blocks
-
-    def _raw_block(self, samples: PlacedSamples) -> RawBlock:
-        return RawBlock(
-            epoch=samples.epoch,
-            first_index=samples.first_index,
-            start_ns=self._stamps.start_ns(samples.first_index),
-            rate_hz=self._calibration.rate_hz,
-            counts=samples.counts,
-            ok=(True,) * self._layout.n_channels,
-            slow=(float("nan"),) * len(self._calibration.slow),
-        )

@@ -4,6 +4,7 @@ Each poll is one sample. Its index counts poll periods, so that missed polls are
 their number.
 """
 
+import math
 from collections.abc import AsyncGenerator, AsyncIterator, Sequence
 from contextlib import aclosing, asynccontextmanager
 from dataclasses import dataclass, replace
@@ -12,7 +13,7 @@ import numpy as np
 
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival, HostStamps
-from acquisition.delivery.blocks import BlockAssembler, RawBlock
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.polling import Freshness, PollClock
 from acquisition.errors import ConfigError
 from acquisition.modbus.cells import reads_as
@@ -21,7 +22,7 @@ from acquisition.modbus.decoding import CellDecoder, MapDecoder, MapReading, Val
 from acquisition.modbus.read_plan import plan_signature
 from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.transport import LinkSettings
-from core.samples.blocks import SampleBlock
+from core.samples.blocks import SampleBlock, SideValues
 from core.samples.calibration import UNLIMITED, UnitCalibration
 from core.spectra.polls import VectorPart, VectorRow
 
@@ -142,8 +143,10 @@ class PolledSource:
         self._stamped = (
             time is not None and settings.poll_period_s >= _MIN_STAMP_STEPS * time.resolution_s
         )
-        polled = replace(calibration, rate_hz=self._rate_hz)
-        self._delivery = BlockAssembler(polled, stamped=self._stamped, samples_when_asked=True)
+        self._calibration = replace(calibration, rate_hz=self._rate_hz)
+        self._delivery = BlockAssembler(
+            self._calibration, stamped=self._stamped, samples_when_asked=True
+        )
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
@@ -162,24 +165,24 @@ class PolledSource:
             self._stamps.add(self._ticks.epoch, tick, polled_ns)
             time_ns = reading.time_ns if self._stamped else None
             start_ns = self._stamps.start_ns(tick) if time_ns is None else time_ns
-            raw = self._raw_block(reading, tick, start_ns)
+            sample = self._block(reading, tick, start_ns)
             arrived = Arrival.now(self._clock)
-            for block in self._delivery.take(raw, arrived, has_stamp=time_ns is not None):
+            for block in self._delivery.take([sample], arrived, has_stamp=time_ns is not None):
                 yield block
 
-    def _raw_block(self, reading: MapReading, index: int, start_ns: int) -> RawBlock:
+    def _block(self, reading: MapReading, index: int, start_ns: int) -> SampleBlock:
         samples = [
             _sample(float(reading.values[n]), reading.states[n], full_scale)
             for n, full_scale in zip(self._rows, self._full_scale, strict=True)
         ]
-        return RawBlock(
+        is_ok = [reading.states[n] is not ValueState.FLAGGED for n in self._rows]
+        slow = [math.nan if n is None else slow_number(reading, n) for n in self._slow]
+        return SampleBlock(
+            calibration=self._calibration,
             epoch=self._ticks.epoch,
             first_index=index,
-            start_ns=start_ns,
-            rate_hz=self._rate_hz,
             counts=np.array(samples, dtype=np.float32)[:, np.newaxis],
-            ok=tuple(reading.states[n] is not ValueState.FLAGGED for n in self._rows),
-            slow=tuple(float("nan") if n is None else slow_number(reading, n) for n in self._slow),
+            side=SideValues.of(start_ns, is_ok, slow),
         )
 
 
@@ -217,13 +220,13 @@ def vector_calibration(
 def slow_number(reading: MapReading, position: int) -> float:
     """Return the value at a position of the register map; NaN unless its state is OK."""
     is_ok = reading.states[position] is ValueState.OK
-    return float(reading.values[position]) if is_ok else float("nan")
+    return float(reading.values[position]) if is_ok else math.nan
 
 
 def _sample(value: float, state: ValueState, full_scale: float) -> float:
     """Return a value as input of the calibration: NaN if invalid, full scale if clipped."""
     if state is ValueState.INVALID or not abs(value) <= _LARGEST:
-        return float("nan")
+        return math.nan
     if state is ValueState.CLIPPED:
         return full_scale if value >= 0.0 else -full_scale
     return value

@@ -11,7 +11,7 @@ from acquisition.modbus.requests import BIT_FUNCTIONS, Span
 
 
 class MapError(ConfigError):
-    """Error in a register map: its cells cannot be read as the map requires.
+    """Error raised if the cells of a register map cannot be read as the map requires.
 
     Parameters
     ----------

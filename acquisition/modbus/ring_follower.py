@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import lru_cache
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.requests import Span
@@ -19,7 +18,7 @@ from acquisition.modbus.ring_profile import (
 )
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
 from core.samples.axis import Epochs
-from core.samples.blocks import Rejection
+from core.samples.blocks import Rejection, SampleBlock, SideValues
 from core.samples.calibration import UnitCalibration
 
 _N_TRIES = 4
@@ -98,7 +97,7 @@ class RingFollower:
     """
 
     def __init__(self, reader: RingReader, calibration: UnitCalibration, begun_ns: int) -> None:
-        self._reader = reader
+        self._reader, self._calibration = reader, calibration
         self._expected = {
             "n_channels": len(calibration.channels),
             "rate in mHz": round(calibration.rate_hz * 1000.0),
@@ -140,7 +139,7 @@ class RingFollower:
         """Number of unread slots up to the newest slot of the last header."""
         return 0 if self._header is None else max(0, ahead(self._header.newest, self._handled))
 
-    async def poll(self) -> list[RawBlock]:
+    async def poll(self) -> list[SampleBlock]:
         """Read new slots, oldest first, up to 0.5 s of samples; return the accepted samples.
 
         Raises
@@ -222,14 +221,14 @@ class RingFollower:
                 [slots[i]] = await self._reader.slots(layout, [sequence])
         return slots
 
-    def _placed(self, found: Sequence[tuple[int, Slot]], header: RingHeader) -> list[RawBlock]:
+    def _placed(self, found: Sequence[tuple[int, Slot]], header: RingHeader) -> list[SampleBlock]:
         blocks = []
         for sequence, slot in found:
             index = self._judge(sequence, slot, header)
             if isinstance(index, Refusal):
                 self._rejected[index] += header.layout.samples_per_slot
             elif index is not None:
-                blocks.append(self._raw_block(slot, index, header))
+                blocks.append(self._block(slot, index))
         return blocks
 
     def _judge(self, sequence: int, slot: Slot, header: RingHeader) -> int | Refusal | None:
@@ -249,17 +248,16 @@ class RingFollower:
             return Refusal.TORN
         return self._timeline.place(slot)
 
-    def _raw_block(self, slot: Slot, index: int, header: RingHeader) -> RawBlock:
+    def _block(self, slot: Slot, index: int) -> SampleBlock:
         rejected = tuple(Rejection(str(r), n) for r, n in self._rejected.items())
         self._rejected.clear()
-        return RawBlock(
+        is_ok = _verdicts(slot.ok_bits, len(slot.counts))
+        return SampleBlock(
+            calibration=self._calibration,
             epoch=self._epochs.number,
             first_index=index,
-            start_ns=slot.start_ns,
-            rate_hz=header.layout.rate_mhz / 1000.0,
             counts=slot.counts,
-            ok=_verdicts(slot.ok_bits, header.layout.n_channels),
-            slow=slot.slow,
+            side=SideValues.of(slot.start_ns, is_ok, slot.slow),
             rejected=rejected,
         )
 
@@ -270,13 +268,13 @@ def _verdicts(ok_bits: int, n_channels: int) -> tuple[bool, ...]:
 
 
 def _overwritten_or_old(slot: Slot, sequence: int, layout: RingLayout) -> bool:
-    """Whether the ring position contains the slot of an earlier or later turn of the ring."""
+    """Return whether the ring position contains a slot of an earlier or later turn of the ring."""
     other = slot.sequence != sequence
     return other and slot.sequence % layout.n_slots == sequence % layout.n_slots
 
 
 def _doubtful(slot: Slot, sequence: int, layout: RingLayout) -> bool:
-    """Whether a slot is torn, damaged or misplaced, so that a second read may differ."""
+    """Return whether a slot is torn, damaged or misplaced, so that a second read may differ."""
     if slot.blank:
         return False
     misplaced = slot.sequence != sequence and not _overwritten_or_old(slot, sequence, layout)

@@ -79,13 +79,13 @@ class RingSource:
         due_s = self._clock.monotonic_s()
         while True:
             begun_s = self._clock.monotonic_s()
-            raw_blocks = await self._follower.poll()
+            found = await self._follower.poll()
             arrived = Arrival.now(self._clock)
             n_waiting = self._follower.n_waiting
             read_for_s = arrived.steady_s - begun_s + n_waiting * self._slot_s
-            for block in self._delivery.take_together(raw_blocks, arrived, read_for_s):
+            for block in self._delivery.take(found, arrived, read_for_s):
                 yield block
-            if raw_blocks:
+            if found:
                 self._fresh_at_s = self._clock.monotonic_s()
                 if n_waiting:
                     continue

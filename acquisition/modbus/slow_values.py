@@ -1,9 +1,10 @@
-"""`PolledSlowValues`: slow values of a separate device, polled in addition to the waveforms."""
+"""Slow values of a separate device, polled in addition to the waveforms of another device."""
 
 import asyncio
 import random
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncGenerator, AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import replace
 
 from acquisition.clock import Clock
 from acquisition.delivery.polling import Freshness
@@ -11,8 +12,10 @@ from acquisition.errors import AcquisitionError, ConfigError
 from acquisition.modbus.decoding import MapDecoder, MapReading
 from acquisition.modbus.polled_source import MapReader, PolledSettings, slow_number
 from acquisition.modbus.register_map import RegisterMap
+from acquisition.source import SampleSource, refused_frames_of
 from core.quality import Reading, Reason, missing
-from core.samples.calibration import SlowCalibration
+from core.samples.blocks import SampleBlock
+from core.samples.calibration import SlowCalibration, UnitCalibration
 
 _MIN_RETRY_S = 1.0
 _CONFIG_RETRY_S = 15.0
@@ -120,3 +123,54 @@ class PolledSlowValues:
             channel.id: channel.reading(slow_number(reading, n))
             for n, channel in self._channels.items()
         }
+
+
+class JoinedSource:
+    """Source that adds the current slow values of a second device to each waveform block.
+
+    If the slow device is lost or faulty, its values are missing with a reason, and the waveforms
+    continue. The slow device is polled only while the waveform source is connected, so that retries
+    of the waveform link do not reconnect it.
+    """
+
+    def __init__(self, source: SampleSource, slow: PolledSlowValues) -> None:
+        self._source, self._slow = source, slow
+
+    @property
+    def refused_frames(self) -> Mapping[str, int]:
+        """Number of rejected frames of the waveform source, by reason."""
+        return refused_frames_of(self._source)
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
+        """Open both links; leaving the context closes them.
+
+        Raises
+        ------
+        LinkError, ConfigError
+            As raised by the waveform source.
+        """
+        async with self._source.connect() as blocks, self._slow.watch():
+            joined = self._joined(blocks)
+            try:
+                yield joined
+            finally:
+                await joined.aclose()
+
+    async def _joined(
+        self, blocks: AsyncIterator[SampleBlock]
+    ) -> AsyncGenerator[SampleBlock, None]:
+        async for block in blocks:
+            yield replace(block, elsewhere={**block.elsewhere, **self._slow.current()})
+
+
+def only_slow(calibration: UnitCalibration, ids: frozenset[str]) -> UnitCalibration:
+    """Return the calibration of the slow-value device: only the slow channels `ids`."""
+    slow = tuple(channel for channel in calibration.slow if channel.id in ids)
+    return replace(calibration, channels=(), slow=slow)
+
+
+def without_slow(calibration: UnitCalibration, ids: frozenset[str]) -> UnitCalibration:
+    """Return the calibration of the waveform device, without the slow channels `ids`."""
+    slow = tuple(channel for channel in calibration.slow if channel.id not in ids)
+    return replace(calibration, slow=slow)

@@ -77,7 +77,7 @@ class Timeline:
         return self._accepted_index
 
     def repeats(self, slot: Slot) -> bool:
-        """Whether a slot is an older slot of this axis, delivered again.
+        """Return whether a slot is an older slot of this axis, delivered again.
 
         A device that was reset repeats the counter values, but with other time stamps.
         """
@@ -91,7 +91,7 @@ class Timeline:
         self._refused, self._n_miscounted = None, 0
 
     def _is_miscounted(self, reference: Slot, slot: Slot) -> bool:
-        """Whether index and time of a slot are consistent, regardless of its sequence number.
+        """Return whether index and time of a slot agree, regardless of its sequence number.
 
         After a reset, index and time disagree: the index is low, the time at least two slots later.
         """
@@ -105,7 +105,7 @@ class Timeline:
         n_samples: int,
         tolerance: ClockTolerance = _TOLERANCE,
     ) -> bool:
-        """Whether the time stamps of two slots differ by `n_samples` periods within tolerance."""
+        """Return whether two time stamps differ by `n_samples` periods within the tolerance."""
         expected_ns = n_samples * 1000 * NS_PER_S // self._layout.rate_mhz
         deviation_ns = slot.start_ns - reference.start_ns - expected_ns
         return abs(deviation_ns) <= tolerance.over(expected_ns)

@@ -25,7 +25,7 @@ from acquisition.recordings.imports.csv_file import csv_rows
 from acquisition.recordings.imports.hdf5_file import hdf5_file
 from acquisition.recordings.imports.job import ImportJob
 from acquisition.recordings.imports.mdf_file import mdf_file
-from acquisition.recordings.imports.rows import Rows, raw_blocks
+from acquisition.recordings.imports.rows import Rows, sample_blocks
 from acquisition.recordings.imports.series import series_rows
 from acquisition.recordings.imports.tdms_file import tdms_file
 from acquisition.recordings.manifest import (
@@ -39,9 +39,9 @@ from acquisition.recordings.messages import (
     FAILED,
     READY,
     Message,
-    block_message,
     blocks_message,
     frames_message,
+    heads_of,
     send,
 )
 from core.arrays import RawArray
@@ -122,8 +122,8 @@ def _import(path: Path, request: Mapping[str, Any]) -> Iterator[Message]:
         for batch, done in read_frames(path, job):
             yield frames_message(batch, done)
     else:
-        for block, done in raw_blocks(_ROWS[job.format](path, job), job):
-            yield block_message(block, done)
+        for block, done in sample_blocks(_ROWS[job.format](path, job), job):
+            yield blocks_message(heads_of(block), (), block.counts, done)
 
 
 def _recording(folder: Path, request: Mapping[str, Any]) -> Iterator[Message]:

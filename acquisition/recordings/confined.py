@@ -66,7 +66,7 @@ class ConfinedProcess:
         return self._process.wait()
 
     def is_running(self) -> bool:
-        """Whether the child is still running."""
+        """Return whether the child is still running."""
         return self._process.poll() is None
 
     def clear_log(self) -> None:

@@ -1,13 +1,11 @@
 """Export of recordings to CSV and Parquet: engineering units, UTC times, one row per sample."""
 
-import math
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from enum import StrEnum
 from functools import partial
 from io import RawIOBase
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +14,17 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 
-from acquisition.delivery.blocks import RawBlock, sample_block
 from acquisition.delivery.units import UNIT_OF
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import Manifest
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.tables import foreign_errors_of
-from core.arrays import SampleArray
+from core.checks.channels import VERDICTS
 from core.quality import Level
+from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
 
-_BLOCKS_AT_ONCE = 512
+_ROWS_AT_ONCE = 25_600
 _OWN = ("time_utc", "epoch", "index")
 _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 
@@ -92,15 +90,21 @@ def write_rows(recording: Recording, kind: ExportFormat, sink: Path | RawIOBase)
 
 
 def export_tables(recording: Recording, schema: Any) -> Iterator[Any]:
-    """Yield the rows of a recording as pyarrow tables of some thousand rows.
+    """Yield the rows of a recording as pyarrow tables of some ten thousand rows.
 
     Missing samples have no rows: time and index jump. Times are whole microseconds. Samples of a
     bad channel and implausible slow values are NaN. Raises ConfigError if a file of the recording
     is unreadable.
     """
-    blocks = recording.raw_blocks()
-    while some := list(islice(blocks, _BLOCKS_AT_ONCE)):
-        yield _table(some, recording.manifest, schema)
+    tables, n_rows = [], 0
+    for block in recording.blocks():
+        tables.append(_table(block, schema))
+        n_rows += block.n_samples
+        if n_rows >= _ROWS_AT_ONCE:
+            yield pa.concat_tables(tables)
+            tables, n_rows = [], 0
+    if tables:
+        yield pa.concat_tables(tables)
 
 
 def csv_schema(manifest: Manifest) -> Any:
@@ -124,7 +128,7 @@ def parquet_schema(manifest: Manifest) -> Any:
     columns = _columns(manifest)
     for id_, _ in columns:
         if id_ in _OWN:
-            raise ConfigError(f"channel {id_!r} has a name that Parquet exports reserve; use CSV")
+            raise ConfigError(f"channel '{id_}' has a name that Parquet exports reserve; use CSV")
     schema = _schema(manifest, "ns", [id_ for id_, _ in columns])
     for at, (_, unit) in enumerate(columns, start=len(_OWN)):
         schema = schema.set(at, schema.field(at).with_metadata({"unit": unit}))
@@ -155,33 +159,24 @@ def _schema(manifest: Manifest, time_unit: str, names: list[str]) -> Any:
     )
 
 
-def _table(blocks: list[RawBlock], manifest: Manifest, schema: Any) -> Any:
-    lengths = [block.n_samples for block in blocks]
-    times_ns = np.concatenate([_times_ns(block) for block in blocks])
-    slow = np.array([_slow(block, manifest) for block in blocks], np.float64)
+def _table(block: SampleBlock, schema: Any) -> Any:
+    side = block.side
+    lengths = np.diff(side.starts, append=block.n_samples)
+    since = np.arange(block.n_samples) - np.repeat(side.starts, lengths)
+    since_ns = np.rint(since * (NS_PER_S / block.rate_hz)).astype(np.int64)
+    times_us = (np.repeat(side.start_ns, lengths) + since_ns) // 1000
+    is_bad = np.array([quality.level is Level.BAD for quality in VERDICTS])[block.verdicts]
+    samples = np.where(np.repeat(is_bad, lengths, axis=1), np.float32(np.nan), block.samples)
+    slow = [
+        np.where((c.minimum <= values) & (values <= c.maximum), values, np.nan)
+        for c, values in zip(block.calibration.slow, side.slow, strict=True)
+    ]
     columns = [
-        times_ns // 1000 if schema.field(0).type.unit == "us" else times_ns,
-        np.repeat([block.epoch for block in blocks], lengths),
-        np.concatenate([np.arange(b.first_index, b.stop_index) for b in blocks]),
-        *np.concatenate([_samples(block, manifest) for block in blocks], axis=1),
-        *np.repeat(slow.reshape(len(blocks), -1).T, lengths, axis=1),
+        times_us if schema.field(0).type.unit == "us" else times_us * 1000,
+        np.full(block.n_samples, block.epoch),
+        np.arange(block.first_index, block.stop_index),
+        *samples,
+        *(np.repeat(values, lengths) for values in slow),
     ]
     arrays = [pa.array(c, type=field.type) for c, field in zip(columns, schema, strict=True)]
     return pa.table(arrays, schema=schema)
-
-
-def _times_ns(block: RawBlock) -> np.ndarray:
-    since_ns = np.rint(np.arange(block.n_samples) * (NS_PER_S / block.rate_hz)).astype(np.int64)
-    return np.asarray((block.start_ns + since_ns) // 1000 * 1000)
-
-
-def _samples(block: RawBlock, manifest: Manifest) -> SampleArray:
-    found = sample_block([block], manifest.calibration)
-    bad = [quality.level is Level.BAD for quality in found.channel_quality]
-    return np.where(np.array(bad)[:, np.newaxis], np.float32(np.nan), found.samples)
-
-
-def _slow(block: RawBlock, manifest: Manifest) -> list[float]:
-    channels = manifest.calibration.slow
-    readings = [c.reading(value) for c, value in zip(channels, block.slow, strict=True)]
-    return [math.nan if reading.value is None else reading.value for reading in readings]

@@ -2,8 +2,6 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -13,7 +11,6 @@ from pydantic import model_validator as validated
 from acquisition.delivery.small_file import read_small_file
 from acquisition.errors import ConfigError
 from core.machine.channel import Measurand
-from core.samples.blocks import Rejection
 from core.samples.calibration import (
     BLOCK_SAMPLES,
     ChannelCalibration,
@@ -162,62 +159,6 @@ class Manifest(RecordedUnit):
     n_samples: Annotated[int, Field(ge=1, le=MAX_SAMPLES)]
     files: Annotated[dict[FileName, RecordedFile], Field(min_length=2)]
     checksum: Sha256 | None = None
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Position in a recording after the last block that was written or read.
-
-    Parameters
-    ----------
-    n_passed
-        Number of samples per channel so far, including gaps within an epoch.
-    epoch
-        Epoch of the last block; None before the first block.
-    stop_index
-        Sample index after the end of the last block; 0 before the first block.
-    """
-
-    n_passed: int = 0
-    epoch: int | None = None
-    stop_index: int = 0
-
-    def after(
-        self, epoch: int, first_index: int, n_samples: int, rejected: Sequence[Rejection]
-    ) -> "Progress":
-        """Return the position after the next block.
-
-        Raises
-        ------
-        ConfigError
-            If the block is invalid at this position.
-        """
-        if not 1 <= n_samples <= MAX_BLOCK_SAMPLES:
-            raise ConfigError(
-                f"number of samples of a block must be 1 to {MAX_BLOCK_SAMPLES}, got {n_samples}"
-            )
-        for name, value in (("epoch", epoch), ("first index", first_index)):
-            if not 0 <= value <= MAX_INDEX:
-                raise ConfigError(f"{name} of a block must be 0 to {MAX_INDEX}, got {value}")
-        expected = self.stop_index if epoch == self.epoch else 0
-        n_missing = max(first_index - expected, 0)
-        _require_room(rejected, n_missing)
-        n_gap = n_missing if epoch == self.epoch else 0
-        return Progress(self.n_passed + n_gap + n_samples, epoch, first_index + n_samples)
-
-
-def _require_room(rejected: Sequence[Rejection], n_missing: int) -> None:
-    if len(rejected) > MAX_REJECTIONS:
-        raise ConfigError(f"a block has {len(rejected)} rejections, more than {MAX_REJECTIONS}")
-    for rejection in rejected:
-        if not 1 <= len(rejection.reason) <= MAX_REASON_LENGTH or rejection.n_samples < 1:
-            raise ConfigError(
-                f"a rejection must have at least 1 sample and a reason of 1 to {MAX_REASON_LENGTH}"
-                f" characters, got {rejection.n_samples} and {rejection.reason[:80]!r}"
-            )
-    n_rejected = sum(rejection.n_samples for rejection in rejected)
-    if n_rejected > n_missing:
-        raise ConfigError(f"a block has {n_rejected} rejected, but {n_missing} missing samples")
 
 
 class _Head(BaseModel):

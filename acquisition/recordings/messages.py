@@ -2,7 +2,6 @@
 
 import itertools
 import json
-from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, BinaryIO
@@ -11,9 +10,14 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, NonNegativeInt, ValidationError
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.recordings.manifest import SampleType
+from acquisition.recordings.manifest import (
+    MAX_BLOCK_SAMPLES,
+    MAX_INDEX,
+    MAX_REASON_LENGTH,
+    MAX_REJECTIONS,
+    SampleType,
+)
 from core.arrays import RawArray
 from core.samples.blocks import Rejection, SampleBlock, SideValues
 from core.samples.calibration import UnitCalibration
@@ -30,11 +34,15 @@ MAX_DATA = 64
 """Maximum length of the data of a CAN FD frame, in bytes."""
 
 HEAD_NUMBERS = ("epoch", "first_index", "start_ns", "n_samples", "ok")
+"""Fields of a block header, before the slow values."""
 
 Message = tuple[dict[str, Any], bytes]
 
 Frames = npt.NDArray[np.void]
 """(n_frames,) data frames of type `FRAME` in log order, without error and remote frames."""
+
+Heads = npt.NDArray[np.void]
+"""(n_blocks,) headers of recorded blocks, of type :func:`head_type`; each has one cell."""
 
 Rejected = tuple[int, str, int]
 """Row of the block in the message, reason of the rejection, number of rejected samples."""
@@ -76,26 +84,13 @@ def _read(stream: BinaryIO, n_bytes: int) -> bytes:
     return found
 
 
-@dataclass(frozen=True)
-class BlockHead:
-    """Header of a recorded block; fields as in :class:`acquisition.delivery.blocks.RawBlock`."""
-
-    epoch: int
-    first_index: int
-    start_ns: int
-    n_samples: int
-    ok: tuple[bool, ...]
-    slow: tuple[float, ...]
-    rejected: tuple[Rejection, ...]
-
-
 def head_type(n_slow: int) -> np.dtype[np.void]:
     """Return the dtype of a block header; ``ok`` has one bit per channel, channel 0 lowest."""
     return np.dtype([*((name, "<i8") for name in HEAD_NUMBERS), ("slow", "<f8", (n_slow,))])
 
 
 def blocks_message(
-    heads: npt.NDArray[np.void],
+    heads: Heads,
     rejected: Sequence[Rejected] = (),
     counts: RawArray | None = None,
     done: float = 0.0,
@@ -105,7 +100,7 @@ def blocks_message(
     Parameters
     ----------
     heads
-        (n_blocks,) block headers of type :func:`head_type`.
+        Headers of the blocks.
     rejected
         Rejections before the blocks.
     counts
@@ -119,110 +114,170 @@ def blocks_message(
     return head | {"sample_type": counts.dtype.name}, heads.tobytes() + counts.tobytes()
 
 
-def block_message(block: RawBlock, done: float) -> Message:
-    """Return a message with a single block."""
-    row = np.zeros(1, head_type(len(block.slow)))
-    ok = sum(is_ok << n for n, is_ok in enumerate(block.ok))
-    row[0] = (block.epoch, block.first_index, block.start_ns, block.n_samples, ok, block.slow)
-    return blocks_message(row, (), block.counts, done)
+def heads_of(block: SampleBlock) -> Heads:
+    """Return the headers of the cells of a block."""
+    side = block.side
+    heads = np.empty(side.n_cells, head_type(len(side.slow)))
+    heads["epoch"], heads["first_index"] = block.epoch, block.first_index + side.starts
+    heads["start_ns"] = side.start_ns
+    heads["n_samples"] = np.diff(side.starts, append=block.n_samples)
+    heads["ok"] = (side.ok.astype(np.int64) << np.arange(len(side.ok))[:, np.newaxis]).sum(axis=0)
+    heads["slow"] = side.slow.T
+    return heads
+
+
+def blocks_in(
+    message: Message,
+    calibration: UnitCalibration,
+    sample_types: Sequence[str] = ("int16", "float32"),
+) -> Iterator[SampleBlock]:
+    """Yield the blocks in a message; blocks without a gap between them are joined.
+
+    Parameters
+    ----------
+    sample_types
+        Permitted types of the samples.
+
+    Raises
+    ------
+    ConfigError
+        If the message does not contain such blocks of the channels in the calibration.
+    """
+    heads, rejected, sample_type = heads_in(message, len(calibration.slow))
+    n_channels, n_samples = len(calibration.channels), heads["n_samples"]
+    is_possible = ((n_samples > 0) & (n_samples <= len(message[1]))).all()
+    if sample_type not in sample_types or not is_possible:
+        raise _malformed()
+    samples: RawArray = np.frombuffer(message[1], sample_type, offset=heads.nbytes)
+    if len(samples) != n_channels * int(n_samples.sum()):
+        raise _malformed()
+    samples, stops = samples.reshape(n_channels, -1), np.cumsum(n_samples)
+    is_ok = (heads["ok"] >> np.arange(n_channels)[:, np.newaxis] & 1).astype(np.bool_)
+    expected = (heads["first_index"] + n_samples)[:-1]
+    begins = (np.diff(heads["epoch"]) != 0) | (heads["first_index"][1:] != expected)
+    firsts = sorted({0, *(np.flatnonzero(begins) + 1).tolist(), *rejected})
+    for first, stop in itertools.pairwise([*firsts, len(heads)] if len(heads) else []):
+        start, cells = int(stops[first] - n_samples[first]), slice(first, stop)
+        yield SampleBlock(
+            calibration=calibration,
+            epoch=int(heads["epoch"][first]),
+            first_index=int(heads["first_index"][first]),
+            counts=samples[:, start : int(stops[stop - 1])],
+            side=SideValues(
+                starts=stops[cells] - n_samples[cells] - start,
+                start_ns=heads["start_ns"][cells],
+                ok=is_ok[:, cells],
+                slow=heads["slow"][cells].T,
+            ),
+            rejected=tuple(rejected.get(first, ())),
+        )
+
+
+def heads_in(
+    message: Message, n_slow: int
+) -> tuple[Heads, Mapping[int, list[Rejection]], SampleType | None]:
+    """Return the headers in a message, the rejections by row, and the sample type or None.
+
+    Raises
+    ------
+    ConfigError
+        If the message does not contain blocks with `n_slow` slow values each.
+    """
+    try:
+        head = _BlocksHead.model_validate(message[0])
+    except ValidationError as error:
+        raise _malformed() from error
+    type_ = head_type(n_slow)
+    if head.n * type_.itemsize > len(message[1]):
+        raise _malformed()
+    rejected: dict[int, list[Rejection]] = {}
+    for row, reason, n_rejected in head.rejected:
+        if not 0 <= row < head.n:
+            raise _malformed()
+        rejected.setdefault(row, []).append(Rejection(reason, n_rejected))
+    return np.frombuffer(message[1], type_, head.n), rejected, head.sample_type
 
 
 @dataclass(frozen=True)
-class BlockLayout:
-    """Expected layout of the blocks from a child: channels and permitted sample types."""
+class Progress:
+    """Position in a recording after the last block that was written or read.
 
-    calibration: UnitCalibration
-    sample_types: tuple[str, ...] = ("int16", "float32")
-
-    def heads(self, message: Message) -> list[BlockHead]:
-        """Return the headers of the blocks in a message.
-
-        Raises
-        ------
-        ConfigError
-            If the message does not contain blocks of this layout.
-        """
-        rows, rejected, _ = self.parts(message)
-        n_channels = len(self.calibration.channels)
-        numbers, ok_bits = rows[list(HEAD_NUMBERS[:-1])].tolist(), rows["ok"].tolist()
-        return [
-            BlockHead(
-                *(epoch, first_index, start_ns, n_samples),
-                tuple(bool(ok >> n & 1) for n in range(max(n_channels, ok.bit_length()))),
-                tuple(slow),
-                tuple(rejected[row]),
-            )
-            for row, ((epoch, first_index, start_ns, n_samples), ok, slow) in enumerate(
-                zip(numbers, ok_bits, rows["slow"].tolist(), strict=True)
-            )
-        ]
-
-    def runs(self, message: Message) -> Iterator[SampleBlock]:
-        """Yield the sample blocks in a message; blocks without a gap between them are joined.
-
-        Raises
-        ------
-        ConfigError
-            As in :meth:`heads`, and if the samples do not match the headers.
-        """
-        rows, rejected, sample_type = self.parts(message)
-        n_channels, n_samples = len(self.calibration.channels), rows["n_samples"]
-        is_possible = ((n_samples > 0) & (n_samples <= len(message[1]))).all()
-        if sample_type not in self.sample_types or not is_possible:
-            raise _malformed()
-        samples: RawArray = np.frombuffer(message[1], sample_type, offset=rows.nbytes)
-        if len(samples) != n_channels * int(n_samples.sum()):
-            raise _malformed()
-        samples, stops = samples.reshape(n_channels, -1), np.cumsum(n_samples)
-        begins = ~follows(rows, rejected)
-        is_ok = (rows["ok"] >> np.arange(n_channels)[:, np.newaxis] & 1).astype(np.bool_)
-        for first, stop in itertools.pairwise([*np.flatnonzero(begins).tolist(), len(rows)]):
-            start, cells = int(stops[first] - n_samples[first]), slice(first, stop)
-            yield SampleBlock(
-                calibration=self.calibration,
-                epoch=int(rows["epoch"][first]),
-                first_index=int(rows["first_index"][first]),
-                counts=samples[:, start : int(stops[stop - 1])],
-                side=SideValues(
-                    starts=stops[cells] - n_samples[cells] - start,
-                    start_ns=rows["start_ns"][cells],
-                    ok=is_ok[:, cells],
-                    slow=rows["slow"][cells].T,
-                ),
-                rejected=tuple(rejected[first]),
-            )
-
-    def parts(
-        self, message: Message
-    ) -> tuple[npt.NDArray[np.void], Mapping[int, list[Rejection]], SampleType | None]:
-        """Return (n_blocks,) headers of `head_type`, the rejections by row, and the sample type."""
-        try:
-            head = _BlocksHead.model_validate(message[0])
-        except ValidationError as error:
-            raise _malformed() from error
-        type_ = head_type(len(self.calibration.slow))
-        if head.n * type_.itemsize > len(message[1]):
-            raise _malformed()
-        rejected = defaultdict(list)
-        for row, reason, n_rejected in head.rejected:
-            if not 0 <= row < head.n:
-                raise _malformed()
-            rejected[row].append(Rejection(reason, n_rejected))
-        return np.frombuffer(message[1], type_, head.n), rejected, head.sample_type
-
-
-def follows(
-    rows: npt.NDArray[np.void], rejected: Mapping[int, list[Rejection]]
-) -> npt.NDArray[np.bool_]:
-    """Return a mask (n_blocks,): whether a block follows the previous one without a gap.
-
-    Rejected samples before a block count as a gap. False for the first block.
+    Parameters
+    ----------
+    n_blocks, n_samples
+        Number of blocks, and of samples per channel, so far.
+    n_passed
+        The same number of samples, with the samples missing in gaps within an epoch.
+    epoch
+        Epoch of the last block; None before the first block.
+    stop_index
+        Sample index after the end of the last block; 0 before the first block.
     """
-    found = np.zeros(len(rows), dtype=np.bool_)
-    found[1:] = rows["epoch"][1:] == rows["epoch"][:-1]
-    found[1:] &= rows["first_index"][1:] == (rows["first_index"] + rows["n_samples"])[:-1]
-    found[list(rejected)] = False
-    return found
+
+    n_blocks: int = 0
+    n_samples: int = 0
+    n_passed: int = 0
+    epoch: int | None = None
+    stop_index: int = 0
+
+    def missing(self, heads: Heads) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
+        """Return whether each next block continues an epoch, and the samples missing before it.
+
+        Both are (n_blocks,) arrays. In a new epoch, the samples before the first index are missing.
+        """
+        stops = heads["first_index"] + heads["n_samples"]
+        continues = np.append(-1 if self.epoch is None else self.epoch, heads["epoch"][:-1])
+        continues = continues == heads["epoch"]
+        expected = np.where(continues, np.append(self.stop_index, stops[:-1]), 0)
+        return continues, np.maximum(heads["first_index"] - expected, 0)
+
+    def after(
+        self, heads: Heads, rejected: Mapping[int, Sequence[Rejection]], n_channels: int
+    ) -> "Progress":
+        """Return the position after the next blocks.
+
+        Raises
+        ------
+        ConfigError
+            If a block is invalid at this position; the message contains its number.
+        """
+        for name, least, most in (
+            ("n_samples", 1, MAX_BLOCK_SAMPLES),
+            ("epoch", 0, MAX_INDEX),
+            ("first_index", 0, MAX_INDEX),
+            ("ok", 0, (1 << n_channels) - 1),
+        ):
+            wrong = np.flatnonzero((heads[name] < least) | (heads[name] > most))
+            if wrong.size:
+                place, found = f"block {self.n_blocks + wrong[0]}", heads[name][wrong[0]]
+                raise ConfigError(f"{place}: {name} must be {least} to {most}, got {found}")
+        continues, n_missing = self.missing(heads)
+        for row, rejections in rejected.items():
+            wrong_words = _wrong_rejections(rejections, int(n_missing[row]))
+            if wrong_words:
+                raise ConfigError(f"block {self.n_blocks + row}: {wrong_words}")
+        n_samples = int(heads["n_samples"].sum())
+        return Progress(
+            self.n_blocks + len(heads),
+            self.n_samples + n_samples,
+            self.n_passed + n_samples + int(n_missing[continues].sum()),
+            int(heads["epoch"][-1]),
+            int(heads["first_index"][-1] + heads["n_samples"][-1]),
+        )
+
+
+def _wrong_rejections(rejections: Sequence[Rejection], n_missing: int) -> str:
+    """Return how the rejections before a block are invalid; empty if they are valid."""
+    if len(rejections) > MAX_REJECTIONS:
+        return f"{len(rejections)} rejections, more than {MAX_REJECTIONS}"
+    for each in rejections:
+        if not 1 <= len(each.reason) <= MAX_REASON_LENGTH or each.n_samples < 1:
+            return (
+                f"a rejection must have at least 1 sample and a reason of 1 to {MAX_REASON_LENGTH}"
+                f" characters, got {each.n_samples} and {each.reason[:80]!r}"
+            )
+    n_rejected = sum(each.n_samples for each in rejections)
+    return f"{n_rejected} rejected, but {n_missing} missing samples" * (n_rejected > n_missing)
 
 
 class _BlocksHead(BaseModel):

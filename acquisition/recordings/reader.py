@@ -4,24 +4,11 @@ import hashlib
 import stat
 from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
-from acquisition.delivery.blocks import RawBlock, cells_of
 from acquisition.errors import ConfigError
-from acquisition.recordings.manifest import (
-    BLOCKS,
-    MAX_BLOCK_SAMPLES,
-    MAX_INDEX,
-    Manifest,
-    Progress,
-    RecordedFile,
-    read_manifest,
-)
-from acquisition.recordings.messages import BlockHead, BlockLayout, Message, follows
+from acquisition.recordings.manifest import BLOCKS, Manifest, RecordedFile, read_manifest
+from acquisition.recordings.messages import Heads, Message, Progress, blocks_in, heads_in
 from acquisition.recordings.reading import confined_messages
 from core.samples.blocks import Rejection, SampleBlock
 
@@ -37,37 +24,23 @@ class Recording:
     folder: Path
     manifest: Manifest
 
-    def raw_blocks(
-        self, first_block: int = 0, stop_block: int | None = None
-    ) -> Generator[RawBlock]:
-        """Yield the blocks as written, from `first_block` to `stop_block` (excluded; None for all).
+    def blocks(self, first_block: int = 0, stop_block: int | None = None) -> Generator[SampleBlock]:
+        """Yield the blocks from `first_block` to `stop_block` (excluded; None for all).
 
-        The first block of the recording has number 0.
+        Blocks without a gap between them are joined; each is then a cell of the joined block. The
+        first block of the recording has number 0.
         """
-        for run in self.runs(first_block, stop_block):
-            yield from cells_of(run)
-
-    def runs(self, first_block: int = 0, stop_block: int | None = None) -> Generator[SampleBlock]:
-        """Yield the same blocks as `raw_blocks`; blocks without a gap between them are joined."""
+        calibration = self.manifest.calibration
         stop_block = self.manifest.n_blocks if stop_block is None else stop_block
         for message in self._messages(first_block, stop_block, with_samples=True):
-            yield from self._layout.runs(message)
+            yield from blocks_in(message, calibration, (self.manifest.sample_type,))
 
-    def heads(self) -> Iterator[BlockHead]:
-        """Yield the headers of all blocks."""
+    def heads(self) -> Iterator[tuple[Heads, Mapping[int, list[Rejection]]]]:
+        """Yield the headers of some hundred blocks at a time, with the rejections by row."""
         for message in self._messages(0, self.manifest.n_blocks, with_samples=False):
-            yield from self._layout.heads(message)
-
-    def rows(self) -> Iterator[tuple[npt.NDArray[np.void], Mapping[int, list[Rejection]]]]:
-        """Yield the headers of all blocks in arrays, with rejections; see `BlockLayout.parts`."""
-        for message in self._messages(0, self.manifest.n_blocks, with_samples=False):
-            rows, rejected, _ = self._layout.parts(message)
-            if rows.size:
-                yield rows, rejected
-
-    @cached_property
-    def _layout(self) -> BlockLayout:
-        return BlockLayout(self.manifest.calibration, (self.manifest.sample_type,))
+            heads, rejected, _ = heads_in(message, len(self.manifest.slow_channels))
+            if heads.size:
+                yield heads, rejected
 
     def _messages(self, first: int, stop: int, *, with_samples: bool) -> Iterator[Message]:
         request = {"first": first, "stop": stop, "samples": with_samples}
@@ -111,28 +84,12 @@ def _require_file(path: Path, expected: RecordedFile) -> None:
 
 def _require_lengths(recording: Recording) -> None:
     """Check the block headers: each must be valid, and the total length must match the manifest."""
-    path, manifest = recording.folder / BLOCKS, recording.manifest
-    n_samples, n_blocks, progress = 0, 0, Progress()
-    for rows, rejected in recording.rows():
-        first_index, length = rows["first_index"], rows["n_samples"]
-        has_more = rows["ok"] >> len(manifest.channels) != 0
-        is_plain = follows(rows, rejected) & ~has_more & (first_index <= MAX_INDEX)
-        is_plain &= (length >= 1) & (length <= MAX_BLOCK_SAMPLES)
-        for row in np.flatnonzero(~is_plain).tolist():
-            try:
-                if has_more[row]:
-                    raise ConfigError("OK bits are set for channels that are not recorded")
-                before = progress if row == 0 else _end_of(rows[row - 1])
-                epoch, first, n = rows[["epoch", "first_index", "n_samples"]][row].tolist()
-                before.after(epoch, first, n, rejected.get(row, ()))
-            except ConfigError as error:
-                raise ConfigError(f"{path}: block {n_blocks + row}: {error}") from error
-        progress = _end_of(rows[-1])
-        n_samples, n_blocks = n_samples + int(length.sum()), n_blocks + len(rows)
-    if n_samples != manifest.n_samples:
-        raise ConfigError(f"{path}: blocks have {n_samples} samples, expected {manifest.n_samples}")
-
-
-def _end_of(row: np.void) -> Progress:
-    stop_index = int(row["first_index"]) + int(row["n_samples"])
-    return Progress(epoch=int(row["epoch"]), stop_index=stop_index)
+    path, manifest, progress = recording.folder / BLOCKS, recording.manifest, Progress()
+    for heads, rejected in recording.heads():
+        try:
+            progress = progress.after(heads, rejected, len(manifest.channels))
+        except ConfigError as error:
+            raise ConfigError(f"{path}: {error}") from error
+    if progress.n_samples != manifest.n_samples:
+        found = f"blocks have {progress.n_samples} samples, expected {manifest.n_samples}"
+        raise ConfigError(f"{path}: {found}")

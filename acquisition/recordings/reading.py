@@ -3,7 +3,6 @@
 import atexit
 import errno
 import json
-import math
 import os
 import signal
 import stat
@@ -14,20 +13,19 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from acquisition.delivery.blocks import RawBlock, cells_of
 from acquisition.errors import ConfigError
 from acquisition.recordings.confined import ConfinedProcess, printable
 from acquisition.recordings.imports.job import ImportJob
 from acquisition.recordings.messages import (
     FAILED,
     READY,
-    BlockLayout,
     Frames,
     Message,
+    blocks_in,
     frames_of,
     receive,
 )
-from core.samples.calibration import UNLIMITED, SlowCalibration, UnitCalibration
+from core.samples.blocks import SampleBlock
 
 SILENCE_S = 300.0
 """Timeout for a message of the child, in seconds; after it the child is considered hung."""
@@ -151,21 +149,19 @@ def close_idle_children() -> None:
 atexit.register(close_idle_children)
 
 
-def imported_blocks(path: Path, job: ImportJob) -> Generator[tuple[RawBlock, float]]:
+def imported_blocks(path: Path, job: ImportJob) -> Generator[tuple[SampleBlock, float]]:
     """Yield all blocks of a waveform file, each with the fraction of the file read so far.
+
+    The calibration of the blocks is :attr:`ImportJob.calibration`.
 
     Raises
     ------
     ConfigError
         If the file is missing or does not match the job; one sentence with the path of the file.
     """
-    slow = tuple(SlowCalibration(column.id, -math.inf, math.inf) for column in job.slow)
-    layout = BlockLayout(
-        UnitCalibration("", job.rate_hz, (UNLIMITED,) * len(job.channels), slow, job.block_samples)
-    )
+    calibration = job.calibration
     for message in _imported(path, job, "blocks"):
-        for run in layout.runs(message):
-            yield from ((raw, _done(message)) for raw in cells_of(run))
+        yield from ((block, _done(message)) for block in blocks_in(message, calibration))
 
 
 def imported_frames(path: Path, job: ImportJob) -> Generator[tuple[Frames, float]]:

@@ -10,7 +10,7 @@ import numpy as np
 from acquisition.clock import Clock
 from acquisition.delivery.blocks import MIN_BLOCK_S, BlockAssembler
 from acquisition.errors import ConfigError
-from acquisition.recordings.manifest import Progress, RecordedUnit
+from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.reader import Recording
 from core.machine.unit import Unit
 from core.samples.blocks import SampleBlock
@@ -147,8 +147,8 @@ class RecordingSource:
         self._speed = speed
         self._block_samples = max(1, round(block_s * recording.manifest.rate_hz))
         self._start_s: float | None = None
-        self._next_block = 0
-        self._progress = Progress()
+        self._next_block = self._n_passed = 0
+        self._stop = (-1, 0)
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
@@ -165,28 +165,29 @@ class RecordingSource:
             yield blocks
 
     async def _blocks(self, missed_s: float) -> AsyncGenerator[SampleBlock]:
-        with closing(self._recording.runs(self._next_block)) as runs:
-            for piece in (piece for run in runs for piece in self._pieces(run)):
-                after = self._progress.after(
-                    piece.epoch, piece.first_index, piece.n_samples, piece.rejected
-                )
-                due_s = after.n_passed / piece.rate_hz / self._speed if self._speed else 0.0
+        with closing(self._recording.blocks(self._next_block)) as recorded:
+            for piece in (piece for block in recorded for piece in self._pieces(block)):
+                epoch, stop_index = self._stop
+                n_gap = max(0, piece.first_index - stop_index) if piece.epoch == epoch else 0
+                n_passed = self._n_passed + n_gap + piece.n_samples
+                due_s = n_passed / piece.rate_hz / self._speed if self._speed else 0.0
                 missed = 0.0 < due_s <= missed_s
                 await self._clock.sleep(0.0 if missed else max(0.0, due_s - self._elapsed_s()))
-                self._progress, self._next_block = after, self._next_block + piece.side.n_cells
+                self._n_passed, self._stop = n_passed, (piece.epoch, piece.stop_index)
+                self._next_block += piece.side.n_cells
                 if not missed:
-                    for block in self._delivery.take_block(self._selection.of(piece)):
+                    for block in self._delivery.take([self._selection.of(piece)]):
                         yield block
             for block in self._delivery.flush():
                 yield block
 
-    def _pieces(self, run: SampleBlock) -> Iterator[SampleBlock]:
-        """Yield a run split at recorded block boundaries into pieces of about the block length."""
-        starts = run.side.starts
-        stretch = (run.first_index + starts) // self._block_samples
+    def _pieces(self, block: SampleBlock) -> Iterator[SampleBlock]:
+        """Yield a block split at its cells into pieces of about the block length."""
+        starts = block.side.starts
+        stretch = (block.first_index + starts) // self._block_samples
         cuts = starts[1:][np.diff(stretch) > 0].tolist()
-        for start, stop in itertools.pairwise([0, *cuts, run.n_samples]):
-            yield run.from_sample(start, stop)
+        for start, stop in itertools.pairwise([0, *cuts, block.n_samples]):
+            yield block.from_sample(start, stop)
 
     def _elapsed_s(self) -> float:
         return self._clock.monotonic_s() - (self._start_s or 0.0)

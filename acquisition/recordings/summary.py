@@ -4,7 +4,9 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from acquisition.recordings.messages import BlockHead
+import numpy as np
+
+from acquisition.recordings.messages import Progress
 from acquisition.recordings.reader import Recording
 from core.samples.gaps import Gap
 from core.units import ns_from_s
@@ -61,42 +63,40 @@ def summary_of(recording: Recording) -> RecordingSummary:
     ConfigError
         If a file of the recording has become unreadable.
     """
-    rate_hz, ids = recording.manifest.rate_hz, [c.id for c in recording.manifest.channels]
-    first: BlockHead | None = None
-    last: BlockHead | None = None
+    manifest, progress = recording.manifest, Progress()
+    channels = np.arange(len(manifest.channels))[:, np.newaxis]
+    start_ns: int | None = None
+    stop_ns = n_gaps = n_gap_samples = 0
     gaps: list[Gap] = []
     epochs: list[int] = []
-    n_gaps = n_gap_samples = n_samples = 0
     rejected: Counter[str] = Counter()
-    n_not_ok: Counter[int] = Counter()
-    for head in recording.heads():
-        if last is None or head.epoch != last.epoch:
-            epochs.append(head.epoch)
-        elif (gap := _gap(last, head)).n_samples > 0:
-            gaps += [gap] if n_gaps < MAX_GAPS_LISTED else []
-            n_gaps += 1
-            n_gap_samples += gap.n_samples
-        n_samples += head.n_samples
-        for rejection in head.rejected:
-            rejected[rejection.reason] += rejection.n_samples
-        n_not_ok.update({n: head.n_samples for n, ok in enumerate(head.ok) if not ok})
-        first, last = first or head, head
+    n_not_ok = np.zeros(len(channels), dtype=np.int64)
+    for heads, rejections in recording.heads():
+        continues, n_missing = progress.missing(heads)
+        n_lost = np.where(continues, n_missing, 0)
+        for row, before in rejections.items():
+            n_lost[row] -= sum(rejection.n_samples for rejection in before)
+            rejected.update({rejection.reason: rejection.n_samples for rejection in before})
+        rows = np.flatnonzero(n_lost > 0)
+        for row in rows[: MAX_GAPS_LISTED - len(gaps)].tolist():
+            epoch, index, time_ns, *_ = heads[row].item()
+            gaps.append(Gap(epoch, index - int(n_missing[row]), int(n_lost[row]), time_ns))
+        n_gaps, n_gap_samples = n_gaps + rows.size, n_gap_samples + int(n_lost[rows].sum())
+        epochs += heads["epoch"][~continues].tolist()
+        n_not_ok += ((heads["ok"] >> channels & 1 == 0) * heads["n_samples"]).sum(axis=1)
+        start_ns = int(heads["start_ns"][0]) if start_ns is None else start_ns
+        last_s = int(heads["n_samples"][-1]) / manifest.rate_hz
+        stop_ns = int(heads["start_ns"][-1]) + ns_from_s(last_s)
+        progress = progress.after(heads, rejections, len(channels))
     return RecordingSummary(
-        start_ns=first.start_ns if first else 0,
-        stop_ns=last.start_ns + ns_from_s(last.n_samples / rate_hz) if last else 0,
-        n_samples=n_samples,
-        n_passed=n_samples + n_gap_samples + rejected.total(),
+        start_ns=start_ns or 0,
+        stop_ns=stop_ns,
+        n_samples=progress.n_samples,
+        n_passed=progress.n_samples + n_gap_samples + rejected.total(),
         gaps=tuple(gaps),
         n_gaps=n_gaps,
         n_gap_samples=n_gap_samples,
         rejected=dict(rejected),
         epochs=tuple(epochs),
-        n_not_ok={ids[n]: count for n, count in sorted(n_not_ok.items())},
+        n_not_ok={c.id: int(n) for c, n in zip(manifest.channels, n_not_ok, strict=True) if n},
     )
-
-
-def _gap(last: BlockHead, head: BlockHead) -> Gap:
-    """Return the gap between two blocks of an epoch, without rejected samples; it may be empty."""
-    n_missing = head.first_index - last.first_index - last.n_samples
-    n_rejected = sum(rejection.n_samples for rejection in head.rejected)
-    return Gap(head.epoch, head.first_index - n_missing, n_missing - n_rejected, head.start_ns)

@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import MAX_REASON_LENGTH, RecordedUnit
-from acquisition.recordings.messages import HEAD_NUMBERS, Rejected, head_type
+from acquisition.recordings.messages import HEAD_NUMBERS, Heads, Rejected, head_type
 from core.arrays import RawArray
+from core.samples.blocks import Rejection
 
 ZSTD_LEVEL = 1
 """Compression level; higher levels save less than 1 % on bit-packed differences."""
@@ -53,18 +52,16 @@ def samples_table(counts: RawArray, unit: RecordedUnit) -> Any:
     return pa.table(list(counts), schema=samples_schema(unit))
 
 
-def blocks_table(blocks: Sequence[RawBlock], unit: RecordedUnit) -> Any:
-    """Return the headers of blocks as a table."""
+def blocks_table(heads: Heads, rejected: Sequence[Sequence[Rejection]], unit: RecordedUnit) -> Any:
+    """Return the headers of blocks and the rejections before each block as a table."""
     columns = [
-        [b.epoch for b in blocks],
-        [b.first_index for b in blocks],
-        [b.start_ns for b in blocks],
-        [b.n_samples for b in blocks],
-        [sum(ok << i for i, ok in enumerate(b.ok)) for b in blocks],
-        *([b.slow[i] for b in blocks] for i in range(len(unit.slow_channels))),
-        [[asdict(rejection) for rejection in b.rejected] for b in blocks],
+        *(heads[name] for name in HEAD_NUMBERS),
+        *heads["slow"].T,
+        [[asdict(rejection) for rejection in of_block] for of_block in rejected],
     ]
-    return pa.table(columns, schema=blocks_schema(unit))
+    schema = blocks_schema(unit)
+    arrays = [pa.array(c, field.type) for c, field in zip(columns, schema, strict=True)]
+    return pa.table(arrays, schema=schema)
 
 
 def samples_writer(path: Path, unit: RecordedUnit) -> Any:
@@ -130,7 +127,7 @@ def read_counts(file: Any, group: int) -> RawArray:
     return np.stack([column.to_numpy() for column in columns])
 
 
-def read_heads(file: Any, n_slow: int) -> Iterator[tuple[npt.NDArray[np.void], list[Rejected]]]:
+def read_heads(file: Any, n_slow: int) -> Iterator[tuple[Heads, list[Rejected]]]:
     """Yield the block headers and their rejections, some hundred blocks at a time."""
     for batch in file.iter_batches(_HEADS_AT_ONCE, use_threads=False):
         *numbers, rejected = batch.columns
@@ -153,7 +150,7 @@ def _require_shape(file: Any, path: Path, schema: Any, n_rows: int, group_rows: 
     found, metadata = file.schema_arrow, file.metadata
     if not found.equals(schema):
         name = next((a for a, b in zip(found, schema, strict=False) if a != b), None)
-        words = f"column {name.name!r} ({name.type})" if name else "the number of columns"
+        words = f"column '{name.name}' ({name.type})" if name else "the number of columns"
         raise ConfigError(f"{path}: {words} does not match the manifest")
     if metadata.num_rows != n_rows:
         raise ConfigError(f"{path}: file has {metadata.num_rows} rows, expected {n_rows}")

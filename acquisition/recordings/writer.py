@@ -1,8 +1,8 @@
-"""`RecordingWriter`: atomic writing of a recording from raw blocks."""
+"""`RecordingWriter`: atomic writing of a recording from sample blocks."""
 
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +10,6 @@ from typing import Any, Self
 
 import numpy as np
 
-from acquisition.delivery.blocks import RawBlock, cells_of
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import (
     BLOCKS,
@@ -22,12 +21,11 @@ from acquisition.recordings.manifest import (
     SAMPLES,
     VERSION,
     Manifest,
-    Progress,
     RecordedFile,
     RecordedUnit,
-    SampleType,
     manifest_text,
 )
+from acquisition.recordings.messages import Heads, Progress, heads_of
 from acquisition.recordings.tables import (
     blocks_table,
     blocks_writer,
@@ -35,8 +33,8 @@ from acquisition.recordings.tables import (
     samples_table,
     samples_writer,
 )
-from core.arrays import RawArray
-from core.samples.blocks import SampleBlock
+from core.arrays import FloatArray, RawArray
+from core.samples.blocks import Rejection, SampleBlock
 from core.samples.calibration import UnitCalibration
 
 INCOMPLETE = ".incomplete"
@@ -46,16 +44,15 @@ INCOMPLETE = ".incomplete"
 class RecordingWriter:
     """Writer of a recording; its folder has a temporary name until it is complete and synced.
 
-    As a context manager, the writer finishes the recording, or removes it after an exception.
+    As a context manager, the writer finishes the recording, or removes it after an exception. The
+    first block determines the sample type.
 
     Parameters
     ----------
     folder
-        Folder of the recording; it must not exist.
+        Folder of the recording; it must not exist. Missing parent folders are created.
     made_by
         Program and person that make the recording, for the manifest.
-    first_decides
-        Whether the first block determines the sample type; otherwise `unit` does.
 
     Raises
     ------
@@ -63,23 +60,19 @@ class RecordingWriter:
         If the folder exists, is being written by another process, or cannot be created.
     """
 
-    def __init__(
-        self, folder: Path, unit: RecordedUnit, made_by: str, *, first_decides: bool = False
-    ) -> None:
+    def __init__(self, folder: Path, unit: RecordedUnit, made_by: str) -> None:
         self.unit = unit
-        self.n_samples = 0
-        self.n_blocks = 0
         self._folder = folder
         self._aside = folder.with_name(folder.name + INCOMPLETE)
         self._made_by = made_by
         self._calibration = unit.calibration
         self._progress = Progress()
         self._start_ns = 0
-        self._first_decides = first_decides
         self._samples_file: Any = None
         self._counts: list[RawArray] = []
         self._n_waiting = 0
-        self._blocks: list[RawBlock] = []
+        self._heads: list[Heads] = []
+        self._rejected: list[Sequence[Rejection]] = []
         if os.path.lexists(folder):
             raise ConfigError(f"{folder}: folder exists already; a recording is not overwritten")
         if os.path.lexists(self._aside):
@@ -88,7 +81,7 @@ class RecordingWriter:
                 " writing to it"
             )
         with foreign_errors_of(self._aside):
-            self._aside.mkdir()
+            self._aside.mkdir(parents=True)
             self._blocks_file = blocks_writer(self._aside / BLOCKS, unit)
 
     def __enter__(self) -> Self:
@@ -106,53 +99,46 @@ class RecordingWriter:
             raise
 
     @property
+    def n_samples(self) -> int:
+        """Number of samples per channel that were written so far."""
+        return self._progress.n_samples
+
+    @property
     def duration_s(self) -> float:
         """Duration of the recording in seconds, including gaps within but not between epochs."""
         return self._progress.n_passed / self.unit.rate_hz
 
-    def write(self, raw: RawBlock) -> None:
-        """Append a raw block.
-
-        Raises
-        ------
-        ConfigError
-            If the block does not match the unit, exceeds the limits of the format, or cannot be
-            written.
-        """
-        if self._first_decides:
-            self._decide(_type_of(raw))
-        _require_fit(raw, self.unit)
-        n_samples = raw.counts.shape[1]
-        progress = self._progress.after(raw.epoch, raw.first_index, n_samples, raw.rejected)
-        if self.n_samples + n_samples > MAX_SAMPLES:
-            raise ConfigError(f"more than {MAX_SAMPLES} samples per channel; begin a new recording")
-        self._progress = progress
-        if self.n_blocks == 0:
-            self._start_ns = raw.start_ns
-        self.n_blocks += 1
-        self.n_samples += n_samples
-        self._counts.append(raw.counts)
-        self._n_waiting += n_samples
-        self._blocks.append(raw)
-        with foreign_errors_of(self._aside):
-            if self._n_waiting >= ROWS_PER_GROUP:
-                self._write_counts(ROWS_PER_GROUP)
-            if len(self._blocks) >= BLOCKS_PER_GROUP:
-                self._write_blocks()
-
-    def write_block(self, block: SampleBlock) -> None:
-        """Append a sample block, with one raw block for each of its cells.
+    def write(self, block: SampleBlock) -> None:
+        """Append a sample block; each of its cells is recorded as a block.
 
         Slow values measured by another device are included; a missing value is recorded as NaN.
 
         Raises
         ------
         ConfigError
-            As in :meth:`write`, and if the unit or the calibration of the block differs.
+            If the unit, the calibration or the sample type of the block differ, it exceeds the
+            limits of the format, or it cannot be written.
         """
-        _require_calibration(block, self._calibration)
-        for raw in _cells(block, self._calibration):
-            self.write(raw)
+        if not self._progress.n_blocks:
+            self.unit = self.unit.model_copy(update={"sample_type": block.counts.dtype.name})
+        self._require_fit(block)
+        side = replace(block.side, slow=_slow(block, self._calibration))
+        heads = heads_of(replace(block, calibration=self._calibration, side=side))
+        progress = self._progress.after(heads, {0: block.rejected}, len(block.counts))
+        if progress.n_samples > MAX_SAMPLES:
+            raise ConfigError(f"more than {MAX_SAMPLES} samples per channel; begin a new recording")
+        if not self._progress.n_blocks:
+            self._start_ns = block.start_ns
+        self._progress = progress
+        self._counts.append(block.counts)
+        self._n_waiting += block.n_samples
+        self._heads.append(heads)
+        self._rejected += [block.rejected, *[()] * (len(heads) - 1)]
+        with foreign_errors_of(self._aside):
+            while self._n_waiting >= ROWS_PER_GROUP:
+                self._write_counts(ROWS_PER_GROUP)
+            while len(self._rejected) >= BLOCKS_PER_GROUP:
+                self._write_heads(BLOCKS_PER_GROUP)
 
     def finish(self) -> Manifest:
         """Sync all files, rename the recording to its final name, and return its manifest.
@@ -162,12 +148,12 @@ class RecordingWriter:
         ConfigError
             If no block was written, or writing to the disk fails.
         """
-        if self.n_blocks == 0:
+        if not self._progress.n_blocks:
             self.abandon()
             raise ConfigError(f"{self._folder}: nothing was recorded, because no samples arrived")
         with foreign_errors_of(self._aside):
             self._write_counts(self._n_waiting)
-            self._write_blocks()
+            self._write_heads(len(self._rejected))
             self._close()
             manifest = self._manifest()
             (self._aside / MANIFEST).write_text(manifest_text(manifest), encoding="utf-8")
@@ -193,9 +179,22 @@ class RecordingWriter:
                 (self._aside / name).unlink(missing_ok=True)
             self._aside.rmdir()
 
-    def _decide(self, sample_type: SampleType) -> None:
-        self.unit = self.unit.model_copy(update={"sample_type": sample_type})
-        self._first_decides = False
+    def _require_fit(self, block: SampleBlock) -> None:
+        own, expected = block.calibration, self._calibration
+        known = {channel.id: channel for channel in expected.slow}
+        if (own.unit, own.rate_hz, own.channels) != (
+            expected.unit,
+            expected.rate_hz,
+            expected.channels,
+        ) or any(known.get(channel.id) != channel for channel in own.slow):
+            raise ConfigError(
+                f"the samples of unit {own.unit} from index {block.first_index} on have another"
+                " calibration than the recording"
+            )
+        if block.counts.dtype.name != self.unit.sample_type:
+            raise ConfigError(
+                f"samples must be {self.unit.sample_type}, got {block.counts.dtype.name}"
+            )
 
     def _write_counts(self, n_samples: int) -> None:
         if n_samples == 0:
@@ -207,10 +206,12 @@ class RecordingWriter:
         rest = counts[:, n_samples:].copy()
         self._counts, self._n_waiting = [rest], rest.shape[1]
 
-    def _write_blocks(self) -> None:
-        if self._blocks:
-            self._blocks_file.write_table(blocks_table(self._blocks, self.unit))
-            self._blocks = []
+    def _write_heads(self, n_blocks: int) -> None:
+        if n_blocks == 0:
+            return
+        heads, rejected = np.concatenate(self._heads), self._rejected[:n_blocks]
+        self._blocks_file.write_table(blocks_table(heads[:n_blocks], rejected, self.unit))
+        self._heads, self._rejected = [heads[n_blocks:]], self._rejected[n_blocks:]
 
     def _close(self) -> None:
         for file in (self._samples_file, self._blocks_file):
@@ -224,8 +225,8 @@ class RecordingWriter:
             version=VERSION,
             made_by=self._made_by,
             start=f"{np.datetime64(self._start_ns, 'ns')}Z",
-            n_blocks=self.n_blocks,
-            n_samples=self.n_samples,
+            n_blocks=self._progress.n_blocks,
+            n_samples=self._progress.n_samples,
             files={name: _recorded_file(self._aside / name) for name in (SAMPLES, BLOCKS)},
         )
 
@@ -238,47 +239,17 @@ def _recorded_file(path: Path) -> RecordedFile:
         )
 
 
-def _type_of(raw: RawBlock) -> SampleType:
-    return "int16" if raw.counts.dtype == np.int16 else "float32"
-
-
-def _require_calibration(block: SampleBlock, calibration: UnitCalibration) -> None:
-    own = block.calibration
-    known = {channel.id: channel for channel in calibration.slow}
-    if (own.unit, own.channels) != (calibration.unit, calibration.channels) or any(
-        known.get(channel.id) != channel for channel in own.slow
-    ):
-        raise ConfigError(
-            f"the samples of unit {own.unit!r} from index {block.first_index} on have another"
-            " calibration than the recording"
-        )
-
-
-def _cells(block: SampleBlock, calibration: UnitCalibration) -> Iterator[RawBlock]:
-    """Yield one raw block per cell of a block, with the slow channels of the recording."""
-    side, ids = block.side, block.calibration.slow_ids
-    slow = np.full((len(calibration.slow), side.n_cells), np.nan)
+def _slow(block: SampleBlock, calibration: UnitCalibration) -> FloatArray:
+    """Return the values of the recording's slow channels in each cell, (n_slow, n_cells)."""
+    ids = block.calibration.slow_ids
+    slow = np.full((len(calibration.slow), block.side.n_cells), np.nan)
     for row, channel in enumerate(calibration.slow):
         if channel.id in block.elsewhere:
             value = block.elsewhere[channel.id].value
             slow[row] = np.nan if value is None else value
         elif channel.id in ids:
-            slow[row] = side.slow[ids.index(channel.id)]
-    for raw, recorded in zip(cells_of(block), slow.T.tolist(), strict=True):
-        yield replace(raw, slow=tuple(recorded))
-
-
-def _require_fit(raw: RawBlock, unit: RecordedUnit) -> None:
-    n_channels, n_slow = len(unit.channels), len(unit.slow_channels)
-    found = (len(raw.counts), len(raw.ok), len(raw.slow), raw.counts.dtype.name)
-    expected = (n_channels, n_channels, n_slow, unit.sample_type)
-    if found != expected:
-        raise ConfigError(
-            f"channels, OK flags, slow values and sample type of a block must be {expected},"
-            f" got {found}"
-        )
-    if raw.rate_hz != unit.rate_hz:
-        raise ConfigError(f"expected a block at {unit.rate_hz} Hz, got {raw.rate_hz} Hz")
+            slow[row] = block.side.slow[ids.index(channel.id)]
+    return slow
 
 
 def _sync(path: Path) -> None:

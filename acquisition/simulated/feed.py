@@ -7,19 +7,19 @@ from contextlib import aclosing, asynccontextmanager
 from typing import Protocol
 
 from acquisition.clock import Clock
-from acquisition.delivery.blocks import MIN_BLOCK_S, BlockAssembler, RawBlock
+from acquisition.delivery.blocks import MIN_BLOCK_S, BlockAssembler
 from core.samples.blocks import SampleBlock
 from core.samples.calibration import UnitCalibration
 
 
 class FeedEndedError(Exception):
-    """A sample feed has ended, for example at the end of a recording."""
+    """Error raised if a sample feed has ended, for example at the end of a recording."""
 
 
 class SampleFeed(Protocol):
-    """Protocol of the source of raw sample blocks of a simulated device."""
+    """Protocol of the source of sample blocks of a simulated device."""
 
-    def advance(self, n_samples: int) -> RawBlock:
+    def advance(self, n_samples: int) -> SampleBlock:
         """Return the next samples, at most `n_samples`.
 
         A simulated unit returns exactly `n_samples` consecutive samples. A recording returns fewer
@@ -34,7 +34,7 @@ class SampleFeed(Protocol):
 
 
 class Ledger:
-    """Count of samples per channel produced by each unit in each epoch, with lost samples."""
+    """Count of samples per channel produced by each unit in each epoch, including lost samples."""
 
     def __init__(self) -> None:
         self._offered: Counter[tuple[str, int]] = Counter()
@@ -52,16 +52,15 @@ class SlotFeed:
     """Sample feed divided into slots of equal length, with look-ahead by one slot.
 
     The sample index of the next slot shows the length of a gap before it. Each slot begins at a
-    multiple of its length.
-    Incomplete slots before a gap, a restart or the end of the feed are discarded.
+    multiple of its length. Incomplete slots before a gap, a restart or the end are discarded.
     """
 
     def __init__(self, feed: SampleFeed, samples_per_slot: int) -> None:
         self._feed = feed
         self._samples_per_slot = samples_per_slot
-        self._ahead: RawBlock | None = None
+        self._ahead: SampleBlock | None = None
 
-    def peek(self) -> RawBlock | None:
+    def peek(self) -> SampleBlock | None:
         """Return the next slot without removing it; None if the feed has ended."""
         if self._ahead is None:
             try:
@@ -70,17 +69,17 @@ class SlotFeed:
                 return None
         return self._ahead
 
-    def take(self) -> RawBlock | None:
+    def take(self) -> SampleBlock | None:
         """Remove and return the next slot; None if the feed has ended."""
         slot = self.peek()
         self._ahead = None
         return slot
 
-    def number(self, slot: RawBlock) -> int:
+    def number(self, slot: SampleBlock) -> int:
         """Return the number of a slot: its first sample index divided by the slot length."""
         return slot.first_index // self._samples_per_slot
 
-    def _next(self) -> RawBlock:
+    def _next(self) -> SampleBlock:
         """Return the next complete slot; incomplete slots of the feed are discarded."""
         while True:
             piece = self._feed.advance(self._samples_per_slot)
@@ -119,7 +118,7 @@ class SimulatedSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Yield the blocks of the feed; see :class:`acquisition.source.SampleSource`."""
+        """Yield an iterator of the feed's blocks; see :class:`acquisition.source.SampleSource`."""
         if self._start_s is None:
             self._start_s = self._clock.monotonic_s()
         if self._paced:
@@ -129,11 +128,11 @@ class SimulatedSource:
 
     async def _blocks(self) -> AsyncGenerator[SampleBlock]:
         while True:
-            raws = [self._feed.advance(self._block_samples) for _ in range(self._n_at_once)]
+            pieces = [self._feed.advance(self._block_samples) for _ in range(self._n_at_once)]
             self._n_taken += self._n_at_once * self._block_samples
             due_s = self._n_taken / self._rate_hz if self._paced else 0.0
             await self._clock.sleep(max(0.0, due_s - self._elapsed_s()))
-            for block in self._delivery.take_together(raws):
+            for block in self._delivery.take(pieces):
                 yield block
 
     async def _skip_to(self, index: int) -> None:

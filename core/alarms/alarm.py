@@ -10,7 +10,7 @@ from core.limits import INACTIVE, NEVER_JUDGED, AlarmLevel, DelayTimer, Judgemen
 
 
 class AlarmState(StrEnum):
-    """Life-cycle state of an alarm: states A to H of ISA-18.2, 5.4, without the latched states."""
+    """Life-cycle state of an alarm: states A to I of ISA-18.2, 5.4, without the latched states."""
 
     NORMAL = "normal"
     UNACKNOWLEDGED = "unacknowledged"
@@ -55,8 +55,8 @@ class Hold:
 
     Parameters
     ----------
-    actor
-        Name of the person.
+    actor, reason
+        Name of the person, and the reason that the person gave.
     since_ns
         Host time of the action.
     until_ns
@@ -79,7 +79,7 @@ class AlarmRule:
         Time for which the condition must be present without interruption before a level becomes
         active. Time with unknown condition does not count.
     off_delay_ns
-        Time for which the condition must be absent before a level ends; counted likewise.
+        Time for which the condition must be absent before a level ends, counted in the same way.
     is_latching
         Whether the alarm stays active after its condition has ended, until it is reset.
     """
@@ -98,7 +98,8 @@ class Alarm:
     level
         Level after delays and latch; None if the alarm is inactive.
     occurrence
-        Number of the newest occurrence: how often the alarm was raised or escalated so far.
+        Number of the newest occurrence: how often the alarm was raised or escalated so far; 0 for
+        an alarm that was never raised.
     is_acknowledged
         Whether the newest occurrence is acknowledged.
     raised_ns
@@ -111,10 +112,9 @@ class Alarm:
         Newest judgement of the alarm's condition.
     suppressed_by
         Reason why the alarm is suppressed by design; None if it is not suppressed.
-    shelf
-        Record of the shelving; None if the alarm is not shelved.
-    outage
-        Record of the removal from service; None if the alarm is in service.
+    shelf, outage
+        Records of the shelving and of the removal from service; None if the alarm is not shelved,
+        or is in service.
     is_latched
         Whether the alarm is active only because of its latch.
     timers
@@ -195,9 +195,14 @@ class AlarmEvent:
     number
         Sequence number among the events of this alarm, from 1 without gaps.
     level
-        Level after the event, or before it if the alarm has returned or was reset.
+        Level after the event, or before it if the alarm is inactive after it; None if inactive in
+        both.
     time_ns
         Time of the samples that caused the event; host time for actions and link events.
+    occurrence, raised_at
+        Number and operating point of the newest occurrence, as in `Alarm`.
+    value, limit
+        Numbers of the judgement at the time of the event; None if it had none.
     actor
         Person who performed the action; empty for automatic events.
     reason
@@ -235,7 +240,10 @@ def changed(
     actor: str = "",
     reason: str = "",
 ) -> tuple[Alarm, AlarmEvent]:
-    """Return the alarm `after` with its event count incremented, and the event of the change."""
+    """Return `after` with the event count of `before` plus one, and the event of the change.
+
+    `actor` and `reason` are those of the event; both are empty if there are none.
+    """
     after = replace(after, n_events=before.n_events + 1)
     event = AlarmEvent(
         identity=after.identity,

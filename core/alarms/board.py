@@ -24,8 +24,10 @@ class AlarmMemory:
         Newest operating point of each bearing and its sample time in ns, by bearing id.
     stop
         Epoch and sample index at the end of the newest judged block; None before the first block.
+    is_connected
+        Whether the link to the device was up.
     link_reason
-        Reason why the link to the device was down; None if unknown, or if it was up.
+        Reason why the link was down; None if it was up, or if the reason is unknown.
     """
 
     alarms: tuple[Alarm, ...]
@@ -45,7 +47,7 @@ RESTARTED, NO_LONGER_WATCHED = "restarted", "no_longer_watched"
 
 
 class AlarmBoard:
-    """Set of alarms with their rules. All alarms are inactive at first; all events are recorded."""
+    """Set of alarms, one for each definition in `watched`; all are inactive at first."""
 
     def __init__(self, watched: Iterable[Watch] = ()) -> None:
         watches = list(watched)
@@ -66,19 +68,22 @@ class AlarmBoard:
         return self._alarms[id_]
 
     def update(self, watch: Watch, condition: Judgement, now_ns: int) -> None:
-        """Update an alarm with a judgement; skip an inactive alarm that would stay inactive."""
+        """Update an alarm as `record` does, but skip an inactive alarm that would stay inactive."""
         is_within = condition.level is None and condition.is_known
         if not (is_within and self._alarms[watch.id].is_settled_inactive):
             self.record(watch.id, condition, now_ns)
 
     def record(self, id_: str, condition: Judgement, now_ns: int) -> None:
-        """Update an alarm with a judgement; an alarm that stays inactive gets the new value too."""
+        """Update the alarm with an id from a judgement; `drain_news` returns the resulting events.
+
+        An alarm that stays inactive gets the new value too. Raises `KeyError` for an unknown id.
+        """
         self._note(id_, *update(self._alarms[id_], condition, now_ns, self._rules[id_]))
 
     def pause(self, spared: str | None = None) -> None:
         """Pause the delay timers of all alarms, except those of the alarm kind `spared`.
 
-        For times when samples are missing or the clock was set, and the elapsed time is unknown.
+        The elapsed time is unknown if samples are missing or the clock was set.
         """
         self._alarms = {
             id_: alarm if alarm.identity.kind == spared else interrupted(alarm)
@@ -86,7 +91,7 @@ class AlarmBoard:
         }
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """End the shelving that has expired at a host time; return the changed alarms."""
+        """End all shelving that has expired at a host time; return the changed alarms."""
         for id_, alarm in self._alarms.items():
             if alarm.shelf is not None:
                 self._note(id_, *expire(alarm, host_ns))
@@ -108,18 +113,18 @@ class AlarmBoard:
     def restore(
         self, stored: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
     ) -> list[AlarmNews]:
-        """Restore alarms after a restart: active alarms stay active with unknown condition.
+        """Restore alarms after a restart; return the alarms that this changes, with the events.
 
-        An alarm without a rule returns to normal and stays on the list until acknowledged.
+        An active alarm stays active; its condition is unknown unless the memory includes it. An
+        alarm without a rule returns to normal and stays on the list until acknowledged.
 
         Parameters
         ----------
         stored
             Alarms as stored with their newest events.
         memory
-            State at the last block; None if samples were lost since then. Its conditions and delay
-            timers continue. A stored alarm may be newer than the memory because of an action or
-            a link event. Alarms in the memory that have no rule are ignored.
+            State at the last block; None if samples were lost since then. A stored alarm may be
+            newer because of an action or a link event. Alarms without a rule are ignored.
         """
         kept = memory.alarms if memory else ()
         remembered = {a.identity.id: a for a in kept if a.identity.id in self._rules}
@@ -140,7 +145,7 @@ class AlarmBoard:
         return self.drain_news()
 
     def drain_news(self) -> list[AlarmNews]:
-        """Return the changed alarms and their events since the last call, and clear the list."""
+        """Return the alarms changed since the last call, with their events, and clear the list."""
         news, self._news = self._news, []
         return news
 

@@ -21,7 +21,7 @@ SENSOR_FAULTS = (Reason.DEAD, Reason.STUCK, Reason.CLIPPED)
 
 
 def fault_judgement(fault: str | None) -> Judgement:
-    """Return an alert with the fault as its reason; a judgement within limits for None."""
+    """Return an alert with the fault as its reason, or `WITHIN` if the fault is None."""
     return WITHIN if fault is None else Judgement(AlarmLevel.ALERT, reason=fault)
 
 
@@ -37,7 +37,8 @@ def channel_judgement(
     segment_fault
         Fault detected from segments, or None; used if the newest samples are good.
     clipped_percent
-        Percentage of clipped samples in the newest segment; None if none or unknown.
+        Percentage of clipped samples in the newest segment, which is the value of an alert for
+        clipping; None if none or unknown.
     """
     fault = segment_fault if quality.level is Level.GOOD else quality.reason
     found = fault_judgement(fault)
@@ -70,14 +71,17 @@ def fault_after_segment(
 
 
 def offset_reading(clock: DeviceClock | None) -> Reading:
-    """Return the absolute offset of the device time stamps from the host clock in seconds."""
+    """Return the absolute offset, in s, of the device clock from host time; bad if unknown."""
     if clock is None or clock.offset_s is None:
         return NOT_MEASURED
     return Reading(abs(clock.offset_s))
 
 
 def drift_reading(clock: DeviceClock | None) -> Reading:
-    """Return the excess of the absolute sampling-rate drift over its 95 % uncertainty in ppm."""
+    """Return the excess, in ppm, of the absolute sampling-rate drift over its 95 % uncertainty.
+
+    The reading is 0 without an excess, and bad if the drift or its uncertainty is unknown.
+    """
     if clock is None or clock.drift_ppm is None or clock.u_drift_ppm is None:
         return missing(Reason.WAITING_FOR_DATA)
     return Reading(max(0.0, abs(clock.drift_ppm) - COVERAGE * clock.u_drift_ppm))
@@ -106,19 +110,22 @@ class OrderVector:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.amplitude_um_pk) and self.amplitude_um_pk >= 0.0):
-            raise ValueError(f"amplitude {self.amplitude_um_pk:g} must be a number of 0 or more")
+            raise ValueError(f"1× amplitude must be a number >= 0, got {self.amplitude_um_pk:g} µm")
         if self.phase_deg is not None and not math.isfinite(self.phase_deg):
-            raise ValueError(f"phase {self.phase_deg:g} must be a number")
+            raise ValueError(f"1× phase must be a number of degrees, got {self.phase_deg:g}")
 
     def change_um_pk(self, other: "OrderVector") -> float:
-        """Return the length of the vector difference, without a phase the amplitude difference."""
+        """Return the length of the vector difference.
+
+        If a phase is None, return the absolute difference of the amplitudes instead.
+        """
         if self.phase_deg is None or other.phase_deg is None:
             return abs(self.amplitude_um_pk - other.amplitude_um_pk)
         return abs(self.phasor_um_pk - other.phasor_um_pk)
 
     @property
     def phasor_um_pk(self) -> complex:
-        """Complex phasor of the vector; an unknown phase counts as 0."""
+        """Complex phasor in µm 0-pk; an unknown phase counts as 0."""
         return cmath.rect(self.amplitude_um_pk, math.radians(self.phase_deg or 0.0))
 
 
@@ -126,10 +133,8 @@ class OrderVector:
 class VectorReference:
     """Reference 1× vectors of a healthy bearing in one operating state.
 
-    Parameters
-    ----------
-    vectors
-        Known vectors by measuring point: "shaft_x", "shaft_y", "bearing_x", "bearing_y".
+    `vectors` contains the known vectors by measuring point: "shaft_x", "shaft_y", "bearing_x",
+    "bearing_y".
     """
 
     unit: str
@@ -150,7 +155,8 @@ def vector_judgement(
     A crack, a loose part or a rub can turn the vector without a change of its amplitude, so the
     length of the complex difference is judged. Without a phase, only the amplitude difference is
     known. It is never larger than that length, so it can raise an alarm but not clear an alarm
-    whose reference has a phase. `watch.source` is the measuring point ("shaft_x").
+    whose reference has a phase. The judgement is unknown without an amplitude or a reference.
+    `watch.source` is the measuring point ("shaft_x"); `held` is the level of the last judgement.
     """
     place = watch.source
     amplitude = readings[f"order1_{place}_um_pk"]

@@ -42,9 +42,10 @@ class AlarmKind:
         Name of the reading of an `Assessment` that is compared with limits; for a 1× vector, its
         measuring point. None if the alarm is judged in another way.
     needs
-        Field of `Bearing` that must not be None for the bearing to have this alarm.
+        Field of `Bearing` that must not be None for the bearing to have this alarm; None if every
+        bearing has it.
     advice
-        Recommended action, for alarms about data acquisition.
+        Recommended action; empty except for alarms about data acquisition.
     """
 
     name: str
@@ -198,23 +199,29 @@ class Watch:
         return self.identity.id
 
     def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
-        """Compare a reading with the limits. Raises `TypeError` for an alarm without limits."""
+        """Return the judgement of a reading by the limits; see `LimitRule.judge`.
+
+        Raises `TypeError` if the alarm has no limits.
+        """
         if self.limits is None:
-            raise TypeError(f"{self.id} has no limits")
+            raise TypeError(f"alarm {self.id} has no limits with which a reading can be compared")
         return self.limits.judge(reading, point, held)
 
 
 def watch(
     identity: AlarmIdentity, rule: AlarmRule | LimitRule, source: str, group: str = ""
 ) -> Watch:
-    """Return the definition of an alarm with a rule, which may include limits."""
+    """Return the definition of an alarm; a `LimitRule` gives it limits as well as an alarm rule.
+
+    `source` and `group` are those of `Watch`.
+    """
     if isinstance(rule, LimitRule):
         return Watch(identity, rule.rule, source, group, rule)
     return Watch(identity, rule, source, group)
 
 
 def watches_of(unit: Unit, rules: UnitRules) -> list[Watch]:
-    """Return the definitions of all alarms that the rules give a unit, without duplicates."""
+    """Return the definitions of all alarms of a unit that have a rule, each alarm once."""
     watches: list[Watch] = []
 
     def add(kind: AlarmKind, subject: str, source: str, group: str, own: BearingRules) -> None:

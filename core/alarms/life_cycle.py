@@ -1,7 +1,7 @@
 """Alarm transitions caused by the plant (ISA-18.2), computed from judgements.
 
-No function reads a clock. Times are sample times, so a replay of the same samples produces the same
-events at any speed.
+No function reads a clock. With sample times, a replay of the same samples produces the same events
+at any speed.
 """
 
 from dataclasses import replace
@@ -17,8 +17,8 @@ def update(
 ) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
     """Update an alarm with the newest judgement; return the alarm and its new events.
 
-    While the condition is unknown, an active alarm stays active, and a pending alarm stays pending
-    with its delay paused. The level and value of an unknown condition are the last known ones.
+    While the condition is unknown, the level does not change and the delays are paused. Level,
+    value and limit of an unknown condition are the last known ones.
     """
     events: list[AlarmEvent] = []
 
@@ -68,7 +68,7 @@ def interrupted(alarm: Alarm) -> Alarm:
 
 
 def shown_again(alarm: Alarm) -> Alarm:
-    """Return an alarm that is no longer hidden: unacknowledged if active (ISA-18.2, G/H to B)."""
+    """Return an alarm that is no longer hidden: unacknowledged if active (ISA-18.2, G/H/I to B)."""
     return replace(alarm, is_acknowledged=alarm.is_acknowledged and alarm.level is None)
 
 
@@ -80,7 +80,7 @@ def restored(alarm: Alarm) -> Alarm:
 
 
 def standing_level(timers: Timers) -> AlarmLevel | None:
-    """Return the highest level whose delay timer is on, regardless of the latch; None without."""
+    """Return the highest level whose delay timer is on, or None; the latch is disregarded."""
     return max((n for n, t in zip(AlarmLevel, timers, strict=True) if t.is_on), default=None)
 
 

@@ -13,12 +13,15 @@ set back. Clock differences between hosts and steps by NTP are smaller."""
 
 
 class ActionRefusedError(ValueError):
-    """An action does not fit the state of the alarm; the message states the reason."""
+    """Error raised if an action does not fit the state of the alarm; the message says why."""
 
 
 @dataclass(frozen=True)
 class Acknowledge:
-    """Acknowledge an occurrence of an alarm; refused if the alarm has a newer occurrence."""
+    """Acknowledgement of the newest occurrence of an alarm; other occurrences are refused.
+
+    It has no effect if the occurrence is already acknowledged.
+    """
 
     actor: str
     occurrence: int
@@ -27,7 +30,7 @@ class Acknowledge:
 
 @dataclass(frozen=True)
 class Shelve:
-    """Shelve an alarm: remove it from the alarm list until host time `until_ns`."""
+    """Shelving of an alarm: hidden until host time `until_ns`, which must be in the future."""
 
     actor: str
     reason: str
@@ -36,14 +39,14 @@ class Shelve:
 
 @dataclass(frozen=True)
 class Unshelve:
-    """End the shelving of an alarm before it expires."""
+    """Early end of the shelving of an alarm; no effect on an alarm that is not shelved."""
 
     actor: str
 
 
 @dataclass(frozen=True)
 class TakeOutOfService:
-    """Remove an alarm from the alarm list without an end time, for example for maintenance."""
+    """Removal of an alarm from service without an end time, for example for maintenance."""
 
     actor: str
     reason: str
@@ -51,21 +54,21 @@ class TakeOutOfService:
 
 @dataclass(frozen=True)
 class ReturnToService:
-    """Put an alarm that is out of service back on the alarm list."""
+    """Return of an alarm to service; no effect on an alarm that is in service."""
 
     actor: str
 
 
 @dataclass(frozen=True)
 class Reset:
-    """Release the latch of an alarm whose condition has ended."""
+    """Release of the latch of an alarm; refused unless the alarm is latched and acknowledged."""
 
     actor: str
 
 
 @dataclass(frozen=True)
 class Comment:
-    """Add a comment to the history of an alarm without a change of its state."""
+    """Comment on an alarm, added to its history without a change of its state."""
 
     actor: str
     text: str
@@ -77,7 +80,7 @@ Action: TypeAlias = (
 
 
 def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
-    """Return the alarm after a person's action at a host time, with its event; none if no effect.
+    """Return the alarm after an action at host time `now_ns`, and its event if it had an effect.
 
     Raises
     ------
@@ -98,7 +101,7 @@ def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[Ala
             change = AlarmChange.ACKNOWLEDGED
         case Shelve(actor, reason, until_ns):
             if until_ns <= now_ns:
-                raise ActionRefusedError("the end of shelving is in the past")
+                raise ActionRefusedError("the end of shelving must be later than the present time")
             after = replace(alarm, shelf=Hold(actor, reason, now_ns, until_ns))
             change = AlarmChange.SHELVED
         case Unshelve():
@@ -129,7 +132,7 @@ def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[Ala
 
 
 def expire(alarm: Alarm, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
-    """End the shelving of an alarm when it has expired by the host clock.
+    """Return the alarm, unshelved if its shelving has expired at host time, and the event if so.
 
     Shelving also ends if the host clock is more than `CLOCK_MARGIN_NS` earlier than the time of
     shelving: the clock was set back, so the expiry time is too late by the same amount. An alarm is

@@ -53,7 +53,7 @@ class Region:
 
     @property
     def ranges(self) -> tuple[Range | None, Range | None, Range | None]:
-        """Ranges of eccentricity ratio, oil temperature and attitude angle."""
+        """Ranges of eccentricity ratio, oil temperature and attitude angle, or None."""
         return self.eccentricity_ratio, self.oil_temperature_c, self.attitude_deg
 
 
@@ -73,6 +73,8 @@ class LimitRule:
     limits
         Limits in the operating states `states`, outside the regions of `tables`; None if only
         `tables` apply, as for zones.
+    rule
+        Delays and latching of the alarm.
     states
         Operating states in which `limits` are valid.
     tables
@@ -99,7 +101,8 @@ class LimitRule:
     def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
         """Return the worst judgement by all limits that may be valid; on a tie, the lowest limit's.
 
-        Without valid limits the condition is unknown, so a suppressed alarm does not return.
+        `held` is the level of the previous judgement, for the deadband. Without valid limits the
+        condition is unknown, so a suppressed alarm does not return.
         """
         found = [judge(reading, limits, held) for limits in self.at(point)]
         if not found:
@@ -136,7 +139,7 @@ class UnitRules:
     channel
         Rule for faults of waveform channels.
     slow_channel
-        Rule for faults of slow channels that have limits. Another device may deliver them late.
+        Rule for faults of slow channels with limits; they may come late from another device.
     bearings
         Limit rules by bearing id.
     films

@@ -18,7 +18,7 @@ SHOWN_NS = 600 * NS_PER_S
 
 @dataclass(frozen=True)
 class ChatterRule:
-    """Definition of chattering: number of activations of an alarm within a time window.
+    """Definition of chattering: `n_activations` of an alarm within `window_ns`.
 
     An alarm that is active for less than the window counts as fleeting.
     """
@@ -36,7 +36,7 @@ class ChatterWatch:
         self._chattered: dict[str, int] = {}
 
     def note(self, event: AlarmEvent, seen_ns: int) -> None:
-        """Add an event received at host time `seen_ns`, which may be later than the event time."""
+        """Add an event received at host time `seen_ns`; only raised and escalated alarms count."""
         if event.change not in ANNOUNCED:
             return
         n_wanted = self._rule.n_activations
@@ -46,7 +46,7 @@ class ChatterWatch:
             self._chattered[event.identity.id] = seen_ns
 
     def is_chattering(self, alarm: str, now_ns: int) -> bool:
-        """Whether an alarm has chattered within the last `SHOWN_NS`."""
+        """Whether the alarm with an id chattered within `SHOWN_NS` before host time `now_ns`."""
         seen_ns = self._chattered.get(alarm)
         return seen_ns is not None and now_ns - seen_ns <= SHOWN_NS
 
@@ -79,8 +79,9 @@ class AlarmFigures:
 
     Parameters
     ----------
-    n_alarms
-        Number of announcements: alarms raised, escalated, or active when no longer hidden.
+    n_alarms, per_day, per_10_min, n_by_level
+        Number of announcements (alarms raised, escalated, or active when no longer hidden), its
+        means per day and per ten minutes, and the numbers by level.
     most_in_10_min
         Largest number of announcements within ten minutes.
     share_in_flood
@@ -88,9 +89,9 @@ class AlarmFigures:
     most_frequent
         At most `N_MOST_FREQUENT` alarms, the most frequent first.
     chattering
-        Number of chattering activations, by alarm.
+        Number of chattering activations by alarm id.
     n_fleeting
-        Number of alarms that returned within the window of `ChatterRule`.
+        Number of times that an alarm returned within the window of `ChatterRule`.
     """
 
     n_alarms: int
@@ -114,7 +115,10 @@ def is_announced(event: AlarmEvent) -> bool:
 def figures_of(
     events: Iterable[AlarmEvent], start_ns: int, end_ns: int, rule: ChatterRule
 ) -> AlarmFigures:
-    """Return the metrics of a period; `events` outside it, or exactly at its end, do not count.
+    """Return the metrics of the period from `start_ns` up to, but not including, `end_ns`.
+
+    `events` are in order of time; those outside the period do not count. `rule` defines chattering
+    and fleeting alarms.
 
     Raises
     ------
@@ -122,7 +126,7 @@ def figures_of(
         If the end is not after the start.
     """
     if end_ns <= start_ns:
-        raise ValueError(f"end {end_ns} must be after start {start_ns}")
+        raise ValueError(f"the end, {end_ns} ns, must be after the start, {start_ns} ns")
     within = [event for event in events if start_ns <= event.time_ns < end_ns]
     announced = [event for event in within if is_announced(event)]
     by_alarm = Counter(event.identity.id for event in announced)
@@ -146,7 +150,7 @@ def figures_of(
 
 
 def stale_alarms(alarms: Iterable[Alarm], now_ns: int) -> list[Alarm]:
-    """Return the visible alarms that have been active for more than a day, the oldest first."""
+    """Return the active, not `HIDDEN` alarms raised over a day before `now_ns`, oldest first."""
     standing = [
         (alarm.raised_ns, alarm)
         for alarm in alarms

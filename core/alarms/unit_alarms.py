@@ -99,15 +99,15 @@ class UnitAlarms(AlarmBoard):
         return self._references.get((bearing, state))
 
     def refer_to(self, reference: VectorReference) -> None:
-        """Set the reference 1× vectors of a bearing and state, from the next assessment on."""
+        """Set the reference 1× vectors of a bearing and state; the next assessment uses them."""
         self._references[reference.bearing, reference.state] = reference
 
     def take(
         self, block: SampleBlock, assessments: Iterable[Assessment], host_ns: int
     ) -> list[AlarmNews]:
-        """Update all alarms from a block and new assessments; return the changed alarms.
+        """Update the alarms from a block and new assessments; return the changed alarms.
 
-        A block without new samples has no effect.
+        A block without new samples has no effect. `host_ns` is the time for device clock alarms.
         """
         if self._is_repeated(block):
             return []
@@ -130,7 +130,7 @@ class UnitAlarms(AlarmBoard):
         return self.drain_news()
 
     def films(self, conditions: Mapping[str, Judgement], now_ns: int) -> list[AlarmNews]:
-        """Update film alarms by judgements of sample time `now_ns`; return the changed alarms.
+        """Update film alarms with judgements by alarm id, at a sample time; return changed alarms.
 
         Raises
         ------
@@ -144,13 +144,13 @@ class UnitAlarms(AlarmBoard):
         return self.drain_news()
 
     def link(self, is_connected: bool, reason: str | None, host_ns: int) -> list[AlarmNews]:
-        """Update the link alarm with the state of the link; return the changed alarm."""
+        """Update the link alarm; return the changed alarms. `reason` is None if up or unknown."""
         self._link = (is_connected, reason)
         self._take_link(host_ns)
         return self.drain_news()
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Judge the link and unshelve expired alarms at a host time; return the changed alarms."""
+        """Judge the link and end expired shelving at a host time; return the changed alarms."""
         self._take_link(host_ns)
         return super().tick(host_ns)
 
@@ -254,8 +254,8 @@ class UnitAlarms(AlarmBoard):
     def _take_channels(self, block: SampleBlock, assessments: deque[Assessment]) -> None:
         """Judge the channels in each cell of a block, after the assessments up to its end.
 
-        A block may contain several segments. In order of time, its alarms do not depend on its
-        length, which differs between wires. Cells with unchanged qualities are skipped.
+        A block may contain several segments. The order of time makes the alarms independent of the
+        block length, which differs between devices. Cells with unchanged qualities are skipped.
         """
         if not assessments and block.channel_quality == self._inactive_with:
             return

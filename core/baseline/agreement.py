@@ -17,7 +17,7 @@ def mean_difference(first: BearingBaseline, second: BearingBaseline) -> dict[str
     """Return the mean difference of ln stiffness by direction, second minus first baseline.
 
     The mean is over cells with `Support.OWN` in both, weighted by the number of readings in the
-    first. A direction without common cells is omitted.
+    first. A direction without such cells, or with different grids, is omitted.
     """
     found: dict[str, float] = {}
     for one in first.quantities:
@@ -61,7 +61,7 @@ def learning_drift(
 ) -> Drift | None:
     """Return the drift of ln stiffness about the baseline during the learning period.
 
-    `is_settled` (n,) selects the readings. None if too few recur under equal conditions.
+    `is_settled` (n,) selects the readings. None if too few can be compared within a cell.
     """
     conditions, value = history.conditions, history.ln_k[DIRECTIONS.index(baseline.direction)]
     usable = is_settled & baseline.is_known(conditions) & np.isfinite(value)
@@ -77,7 +77,7 @@ def learning_drift(
 def drift_within(
     day: npt.NDArray[np.int64], value: FloatArray, cell: npt.NDArray[np.int64]
 ) -> Drift | None:
-    """Return the drift of values over days from comparisons within each cell; arrays are (n,).
+    """Return the drift of values (n,) over the days (n,), compared within each cell (n,).
 
     None if fewer than `MIN_SPELLS` time blocks contain values that can be compared.
     """
@@ -117,8 +117,8 @@ def far_readings(
 ) -> str | None:
     """Return a warning text if settled readings are at least twice or at most half the baseline.
 
-    None if there are no such readings. The robust fit rejects them, so the baseline itself does not
-    show them.
+    None if there are no such readings. `is_settled` (n,) selects the readings. The robust fit
+    rejects such readings, so the baseline itself does not show them.
     """
     counts = []
     for learned in baseline.quantities:
@@ -128,4 +128,4 @@ def far_readings(
             counts.append(f"{n} of {deviation.size} readings in {learned.direction}")
     if not counts:
         return None
-    return f"{' and '.join(counts)} are at least twice or at most half of the others; check units"
+    return f"{' and '.join(counts)} are at least twice or at most half the baseline; check units"

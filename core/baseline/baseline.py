@@ -17,6 +17,8 @@ from core.condition.cells import CellGrid, FilmConditions
 class TimeScatter:
     """Relative scatter of the mean deviation over a time scale, for correlated readings.
 
+    Raises `ValueError` if a value is not above 0.
+
     Parameters
     ----------
     time_scale_h
@@ -36,7 +38,7 @@ class TimeScatter:
 
 @dataclass(frozen=True)
 class Origin:
-    """Identity of a baseline: unit, bearing, version, author and time.
+    """Identity of a baseline: unit, bearing, estimator, version, author and time.
 
     Parameters
     ----------
@@ -59,7 +61,7 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class Deviations:
-    """Deviations of n readings of ln stiffness from their baseline.
+    """Deviations of n readings of ln stiffness from their baseline, with standard deviations in ln.
 
     Parameters
     ----------
@@ -68,9 +70,9 @@ class Deviations:
     place : (n,)
         Row of the reading's cell in the table; -1 if the reading cannot be compared.
     deviation : (n,)
-        ln of the measured stiffness over the learned stiffness.
+        ln of the measured stiffness over the learned stiffness; invalid where `place` is -1.
     weight : (n,)
-        Weight of the reading: 1 for typical noise, less for a noisier reading.
+        Typical variance of readings divided by the variance of this reading, at most 1.
     scatter : (n,)
         Part of the scatter of readings in the cell that averaging reduces.
     lasting : (n,)
@@ -97,18 +99,20 @@ class Deviations:
 class QuantityBaseline:
     """Learned film stiffness in one direction.
 
+    Raises `ValueError` if a value is out of its range, or sizes or order of values are wrong.
+
     Parameters
     ----------
-    quantity
-        Name of the quantity in stored documents.
+    quantity, direction
+        Name of the quantity in stored documents, and direction "x" or "y".
     attitude_covariance
         Covariance of the attitude terms of the surface; empty without attitude terms.
     max_surface_std
-        Standard uncertainty of the surface above which readings are not compared.
+        Standard uncertainty of the surface, in ln, above which readings are not compared.
     scatter
-        Typical scatter of single readings about the surface over all cells.
+        Typical standard deviation, in ln, of single readings about the surface over all cells.
     u_random
-        Typical random uncertainty of a reading, which `scatter` includes.
+        Typical random uncertainty of a reading, in ln, which `scatter` includes.
     reading_h
         Interval between readings in running hours.
     time_scatter
@@ -132,7 +136,7 @@ class QuantityBaseline:
 
     def __post_init__(self) -> None:
         if self.direction not in DIRECTIONS:
-            raise ValueError(f"direction must be one of {DIRECTIONS}, got {self.direction!r}")
+            raise ValueError(f"direction must be {' or '.join(DIRECTIONS)}, got {self.direction}")
         if not (self.scatter > 0.0 and self.u_random >= 0.0 and self.reading_h > 0.0):
             raise ValueError(
                 "scatter and reading_h must be above 0 and u_random not below 0, got"
@@ -140,10 +144,13 @@ class QuantityBaseline:
             )
         n_terms = ATTITUDE_TERMS if self.surface.shape.has_attitude else 0
         if [len(row) for row in self.attitude_covariance] != [n_terms] * n_terms:
-            raise ValueError(f"attitude_covariance must be {n_terms} by {n_terms}")
+            found = ", ".join(str(len(row)) for row in self.attitude_covariance) or "none"
+            wanted = f"{n_terms} rows of length {n_terms}"
+            raise ValueError(f"attitude_covariance needs {wanted}, got lengths {found}")
         times_h = [time.time_scale_h for time in self.time_scatter]
         if times_h != sorted(set(times_h)):
-            raise ValueError(f"time scales of time_scatter must increase, got {times_h} h")
+            found = ", ".join(f"{time_h:g} h" for time_h in times_h)
+            raise ValueError(f"time scales of time_scatter must increase, got {found}")
 
     def compare(
         self, conditions: FilmConditions, value: FloatArray, u_random: FloatArray
@@ -180,7 +187,7 @@ class QuantityBaseline:
         return conditions.is_known(self.grid.has_attitude or self.surface.shape.has_attitude)
 
     def eccentricity_rise(self, conditions: FilmConditions) -> FloatArray:
-        """Return d ln(stiffness) / d ln(eccentricity ratio) at n conditions; NaN if unknown."""
+        """Return d ln(stiffness) / d ln(eccentricity ratio) at conditions (n,); NaN if unknown."""
         known = self.is_known(conditions)
         rise = np.full(known.size, np.nan)
         here = conditions.rows(known)

@@ -28,7 +28,7 @@ class Support(StrEnum):
 
 @dataclass(frozen=True)
 class CellStatistics:
-    """Statistics of one condition cell.
+    """Statistics of one condition cell. Raises `ValueError` if a value is out of its range.
 
     Parameters
     ----------
@@ -75,24 +75,28 @@ class CellStatistics:
                 f"lasting = {self.lasting:g} must be 0 or more and below scatter = {self.scatter:g}"
             )
         if len(self.node_std) != NODES**2 or not min(self.node_std) >= 0.0:
-            raise ValueError(f"node_std must be {NODES**2} numbers >= 0, got {self.node_std}")
+            found = ", ".join(f"{std:g}" for std in self.node_std)
+            raise ValueError(f"node_std must be {NODES**2} numbers >= 0, got {found}")
 
 
 @dataclass(frozen=True)
 class CellTable:
-    """Table of the condition cells of a baseline, one row per cell."""
+    """Table of the condition cells of a baseline, one row per cell.
+
+    Raises `ValueError` if a cell is repeated, or the cells differ in the number of axes.
+    """
 
     cells: tuple[CellStatistics, ...]
 
     def __post_init__(self) -> None:
         names = [cell.cell for cell in self.cells]
         if len(set(names)) < len(names):
-            raise ValueError("cells must be unique")
+            raise ValueError(f"cells must be unique, got {len(names) - len(set(names))} repeated")
         if len({len(name) for name in names}) > 1:
-            raise ValueError("cells must all have the same number of axes")
+            raise ValueError("all cells must have the same number of axes, 2 or 3")
 
     def find(self, cells: CellArray) -> npt.NDArray[np.int64]:
-        """Return the table row of each of n cells; -1 for a missing or unsupported cell."""
+        """Return the table row of each of n cells (n,); -1 for a missing or unsupported cell."""
         if not self.cells:
             return np.full(cells.shape[1], -1)
         low, places = self._places
@@ -142,14 +146,10 @@ class CellTable:
 
 
 def cells_between(own: frozenset[Cell], reach: int) -> frozenset[Cell]:
-    """Return the cells that lie between two cells of own support along an axis.
+    """Return the cells that lie between two cells of `own` along an axis.
 
-    Parameters
-    ----------
-    own
-        Cells of own support.
-    reach
-        Largest number of cells between two cells of own support.
+    `own` contains the cells with enough own readings. Cells between two of them are included if
+    they are at most `reach` in number.
     """
     found: set[Cell] = set()
     for cell in own:

@@ -80,20 +80,26 @@ with normal errors (Maronna, Martin and Yohai, Robust Statistics, 2.2)."""
 
 
 def robust_std(deviation: FloatArray) -> float:
-    """Return the standard deviation about zero, from the median absolute value; 0 if empty."""
+    """Return `STD_PER_MAD` times the median absolute value of deviations (n,); 0 if empty."""
     if deviation.size == 0:
         return 0.0
     return STD_PER_MAD * float(np.median(np.abs(deviation)))
 
 
 def bisquare(standardised: FloatArray) -> FloatArray:
-    """Return Tukey's bisquare weight of each standardised deviation; 0 beyond `BISQUARE_LIMIT`."""
+    """Return Tukey's bisquare weight of each deviation in standard deviations (n,).
+
+    The weight is (1 - (x / `BISQUARE_LIMIT`)²)², and 0 beyond the limit.
+    """
     rest = np.clip(1.0 - (standardised / BISQUARE_LIMIT) ** 2, 0.0, 1.0)
     return np.asarray(rest**2)
 
 
 def absolute_quantile_std(deviation: FloatArray) -> float:
-    """Return the larger standard deviation about zero from the 50 % and 75 % quantile of |x|."""
+    """Return the standard deviation from the 50 % or the 75 % quantile of absolute deviations (n,).
+
+    Both are scaled for a normal distribution, and the larger is returned; 0 if empty.
+    """
     if deviation.size == 0:
         return 0.0
     half, three_quarters = np.quantile(np.abs(deviation), (0.5, 0.75))
@@ -105,7 +111,7 @@ MEDIAN_READINGS = 5
 
 
 def running_median(deviation: FloatArray) -> FloatArray:
-    """Return the median of each value and those before it, `MEDIAN_READINGS` at most (n,)."""
+    """Return the medians (n,) of each value and up to `MEDIAN_READINGS` - 1 values before it."""
     n = deviation.size
     if n < MEDIAN_READINGS:
         return np.array([np.median(deviation[: i + 1]) for i in range(n)], np.float64)
@@ -115,17 +121,20 @@ def running_median(deviation: FloatArray) -> FloatArray:
 
 
 def ewma_weight(time_scale_h: float, reading_h: float) -> float:
-    """Return the smoothing factor α of an exponentially weighted mean over a time scale."""
+    """Return α = 1 - exp(-reading_h / time_scale_h), the weight of a new reading in `ewma`."""
     return -math.expm1(-reading_h / time_scale_h)
 
 
 def ewma(x: FloatArray, alpha: float) -> FloatArray:
-    """Return the exponentially weighted sum after each value of x (n,), starting from 0."""
+    """Return the moving averages y[i] = (1 - α) y[i-1] + α x[i] of x (n,), starting from y = 0.
+
+    Each is a weighted sum; divided by the same sum of ones, it is an exponentially weighted mean.
+    """
     from scipy.signal import lfilter  # slow import, not needed at start-up
 
     return np.asarray(lfilter([alpha], [1.0, alpha - 1.0], x))
 
 
 def ewma_step(total: float, x: float, alpha: float) -> float:
-    """Return the exponentially weighted sum `total` updated with one more value."""
+    """Return (1 - α) total + α x: the moving average `total` of `ewma` after one more value x."""
     return total * (1.0 - alpha) + alpha * x

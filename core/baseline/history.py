@@ -37,18 +37,18 @@ class StiffnessHistory:
         Natural logarithm of the measured stiffness in N/m.
     u_random
         Relative random standard uncertainty of the stiffness, equal to that of `ln_k`.
-    shaft_um_pk
-        1× amplitude of the shaft relative to the bearing.
-    bearing_um_pk
-        Absolute 1× amplitude of the bearing.
+    u_eccentricity
+        Standard uncertainty of the eccentricity ratio.
+    shaft_um_pk, bearing_um_pk
+        1× amplitudes of the shaft relative to the bearing, and of the bearing itself.
     outcome
         Values of `ReadingOutcome`; by default, a missing `ln_k` is `BAD_QUALITY`.
 
     Raises
     ------
     ValueError
-        If a column has a wrong shape, time does not increase, a value is infinite, an uncertainty
-        is not positive, or `outcome` contradicts `ln_k`. The message states column and row.
+        If a column has a wrong shape, time does not increase, a value is infinite, `u_random` of a
+        measured value is not positive, or `outcome` contradicts `ln_k`.
     """
 
     time_ns: TimeArray
@@ -73,7 +73,7 @@ class StiffnessHistory:
         self._check_shapes()
         steps = np.flatnonzero(np.diff(self.time_ns) <= 0)
         if steps.size:
-            raise ValueError(f"time_ns: row {steps[0] + 1} is not after row {steps[0]}")
+            raise ValueError(f"time_ns: row {steps[0] + 1} must be later than row {steps[0]}")
         self._check_numbers()
 
     def __len__(self) -> int:

@@ -31,7 +31,7 @@ def held_out_deviations(
     """Return the deviation of each `value` (ln k) from a surface fitted without its fold (n,).
 
     A fold of this cross-validation consists of blocks of consecutive days. NaN for readings in
-    cells with too few days in other folds.
+    cells without support or with too few days in other folds.
     """
     n_days = np.unique(groups.day).size
     spell_days = int(np.clip(n_days // (2 * FOLDS), 1, LONGEST_SPELL_DAYS))
@@ -78,7 +78,8 @@ def learn(
 ) -> BearingBaseline:
     """Learn the baseline of a bearing from readings that are mostly from a healthy machine.
 
-    Only the readings selected by `is_settled` (n,) are used.
+    Only the readings selected by `is_settled` (n,) are used. A direction in which they cover fewer
+    than `min_learning_days` gets no baseline.
 
     Raises
     ------
@@ -86,7 +87,7 @@ def learn(
         If the history is empty.
     """
     if not len(history):
-        raise ValueError("there are no readings to learn from")
+        raise ValueError("the history is empty; a baseline needs readings to learn from")
     found = [_learn_direction(history, is_settled, each, settings) for each in DIRECTIONS]
     return BearingBaseline(
         origin,

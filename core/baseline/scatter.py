@@ -34,7 +34,7 @@ def with_scatter(
     day: npt.NDArray[np.int64],
     deviation: FloatArray,
 ) -> CellTable:
-    """Return the table with the estimated `scatter` and `lasting` of every cell.
+    """Return the table with estimated `scatter` and `lasting`; unchanged without deviations.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def time_scatter(
     table: CellTable,
     settings: BaselineSettings,
 ) -> tuple[TimeScatter, ...]:
-    """Return the scatter over each time scale for which the learning period is long enough.
+    """Return the scatter of means over each time scale for which there are enough readings.
 
     The deviations (n,) are cross-validated, oldest first; `place` (n,) holds their table rows.
     """
@@ -124,7 +124,7 @@ def time_scatter(
 
 
 def _weight(scatter: FloatArray) -> FloatArray:
-    """Return the weights of readings with typical noise in `QuantityBaseline.compare`."""
+    """Return the weights that `QuantityBaseline.compare` gives to readings with typical noise."""
     typical = float(np.median(scatter)) if scatter.size else 1.0
     return np.minimum(1.0, (typical / scatter) ** 2)
 

@@ -15,7 +15,10 @@ ATTITUDE_TERMS = 4
 
 @dataclass(frozen=True)
 class KnotAxis:
-    """Uniform spline knots on an axis: `n_intervals` intervals of equal width from `start`."""
+    """Uniform spline knots on an axis: `n_intervals` intervals of equal `width` from `start`.
+
+    Raises `ValueError` if the width is not above 0, or there is no interval.
+    """
 
     start: float
     width: float
@@ -23,7 +26,8 @@ class KnotAxis:
 
     def __post_init__(self) -> None:
         if not (self.width > 0.0 and self.n_intervals >= 1):
-            raise ValueError(f"width = {self.width:g}, n_intervals = {self.n_intervals}")
+            found = f"{self.width:g} and {self.n_intervals}"
+            raise ValueError(f"width must be above 0 and n_intervals at least 1, got {found}")
 
     @property
     def n_splines(self) -> int:
@@ -69,7 +73,7 @@ class SurfaceShape:
         return tensor + (ATTITUDE_TERMS if self.has_attitude else 0)
 
     def terms(self, conditions: FilmConditions) -> tuple[npt.NDArray[np.int64], FloatArray]:
-        """Return the indices (16, n) and values (16, n) of the non-zero products of splines."""
+        """Return indices and values (16, n) of the non-zero products of splines at n conditions."""
         first_e, value_e = self.eccentricity.splines(conditions.eccentricity_ratio)
         first_t, value_t = self.temperature.splines(conditions.oil_temperature_c)
         step = np.arange(4)[:, np.newaxis]
@@ -105,7 +109,10 @@ def attitude_terms(conditions: FilmConditions) -> FloatArray:
 
 @dataclass(frozen=True)
 class Surface:
-    """Fitted surface of ln stiffness: shape, constant offset and spline coefficients."""
+    """Fitted surface of ln stiffness: shape, constant offset, spline and attitude coefficients.
+
+    Raises `ValueError` if the number of coefficients does not fit the shape.
+    """
 
     shape: SurfaceShape
     offset: float
@@ -114,7 +121,8 @@ class Surface:
     def __post_init__(self) -> None:
         if len(self.coefficients) != self.shape.n_coefficients:
             raise ValueError(
-                f"expected {self.shape.n_coefficients} coefficients, got {len(self.coefficients)}"
+                f"a surface of this shape has {self.shape.n_coefficients} coefficients, got"
+                f" {len(self.coefficients)}"
             )
 
     @cached_property
@@ -122,7 +130,7 @@ class Surface:
         return np.array(self.coefficients)
 
     def slope(self, conditions: FilmConditions) -> FloatArray:
-        """Return d ln(stiffness) / d(eccentricity ratio) (n,), from a step of ± 1/4 knot width."""
+        """Return d ln(stiffness) / d(eccentricity ratio) (n,) from steps of ± 1/4 knot width."""
         step = self.shape.eccentricity.width / 4.0
         up, down = (
             self.at(replace(conditions, eccentricity_ratio=conditions.eccentricity_ratio + by))

@@ -1,4 +1,4 @@
-"""Robust fit of a baseline surface. Where it is steep, shaft position errors add scatter."""
+"""Robust fit of a baseline surface, with larger scatter where the surface is steep."""
 
 from dataclasses import dataclass
 
@@ -148,7 +148,10 @@ class _Points:
         return np.asarray((self.y - self.design @ coefficients) * np.sqrt(self.trust))
 
     def solve(self, precision: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the coefficients, and the lower Cholesky factor of their precision matrix."""
+        """Return the coefficients, and the lower Cholesky factor of their precision matrix.
+
+        `precision` (n,) is the inverse variance of each row; `prior` is from `prior_precision`.
+        """
         weighted = self.design * (self.trust * precision)[:, np.newaxis]
         factor, _ = cho_factor(self.design.T @ weighted + prior, lower=True)
         return cho_solve((factor, True), weighted.T @ self.y), factor
@@ -178,7 +181,7 @@ def _std(
 
 
 def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Surface:
-    """Return the surface refitted to the groups with `is_used` = 1, with the weights of `fit`."""
+    """Return the surface refitted to groups with `is_used` (n_groups,) 1, weighted as in `fit`."""
     shape, offset = fit.surface.shape, fit.surface.offset
     points = _Points.of(groups, shape, offset)
     precision = is_used * fit.robust_weight / (fit.group_std**2 * fit.clustering)
@@ -187,7 +190,10 @@ def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Sur
 
 
 def prior_precision(shape: SurfaceShape, bend_std: float) -> FloatArray:
-    """Return the inverse prior covariance of the coefficients (n_coefficients, n_coefficients)."""
+    """Return the inverse prior covariance of the coefficients (n_coefficients, n_coefficients).
+
+    `bend_std` is that of `BaselineSettings`.
+    """
     n_e, n_t = shape.eccentricity.n_splines, shape.temperature.n_splines
     along_e, along_t = _differences(n_e, bend_std), _differences(n_t, bend_std)
     tensor = np.kron(along_e, np.eye(n_t)) + np.kron(np.eye(n_e), along_t)

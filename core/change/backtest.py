@@ -1,4 +1,4 @@
-"""Recomputation of operating states and decisions from stored readings, also after restarts."""
+"""Recomputation of operating states and decisions from stored readings, for tests and restarts."""
 
 import math
 from collections import deque
@@ -56,7 +56,10 @@ def operation_history(
 
 
 def last_operation(history: StiffnessHistory, rules: FilmRules) -> tuple[Operation, OilSettling]:
-    """Return the operation of a unit and the oil settling of a bearing after the last reading."""
+    """Return the operation of a unit and the oil settling of a bearing after the last reading.
+
+    Without readings, the operation is unknown and the unit is not at speed.
+    """
     time_ns = history.time_ns.tolist()
     if time_ns:
         # intervals between stored readings stay unscaled; a time lapse applies only from now on
@@ -114,7 +117,7 @@ def decide_all(
 ) -> DecisionHistory:
     """Return the decision after each stored reading, from the initial decision on.
 
-    Readings that `is_settled` (n,) excludes are not judged.
+    Readings that `is_settled` (n,) excludes are not judged; without a baseline, none is.
     """
     nothing = (np.nan, np.nan, np.nan)
     rows = [
@@ -134,7 +137,7 @@ def last_decision(
     baseline: QuantityBaseline,
     rules: FilmRules,
 ) -> Decision:
-    """Return the decision after the last stored reading, computed as if `baseline` was active."""
+    """Return the decision after the last stored reading as if `baseline` had always been active."""
     watched = (history, is_settled, baseline.direction, baseline)
     found = deque(_decisions(*watched, rules.change, rules.lapsed_ns), maxlen=1)
     return found[0] if found else INITIAL_DECISION

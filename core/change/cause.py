@@ -7,7 +7,7 @@ learned from the healthy machine (`core.change.shaft_response`):
 - film: the shaft moves as with films of the measured stiffness;
 - accelerometer: the shaft motion does not change;
 - shaft probes: the true motion does not change. Each probe reads more by the factor by which its
-  stiffness reads less, corrected for the apparent larger eccentricity;
+  stiffness reads less, corrected for the apparent increase of eccentricity;
 - loose bracket: the shaft moves as with films in series with a softer bracket.
 
 A cause is reported only if the motion agrees with this cause and with no other.
@@ -39,15 +39,15 @@ class Attribution:
 
     Parameters
     ----------
+    cause, reason
+        Cause, and the reason for this conclusion as text.
     film_share
         Fraction of the change due to the film, if the rest is due to a transducer of the bearing; 0
         to 1 within its uncertainty. None if unknown, or if no such mixture agrees with the motion.
     film_share_std
         Standard uncertainty of `film_share`; None if `film_share` is None.
-    shaft_change
-        ln of the shaft's 1× amplitude over the expected amplitude; None if unknown.
-    bearing_change
-        ln of the bearing's 1× amplitude over the expected amplitude; None if unknown.
+    shaft_change, bearing_change
+        ln of the 1× amplitude of shaft and bearing over the expected amplitude; None if unknown.
     """
 
     cause: Cause
@@ -59,7 +59,7 @@ class Attribution:
 
 
 MIN_RELATIVE_CHANGE = 0.4
-"""Change of another film, relative to that of the alarmed film, from which it counts as changed."""
+"""Smallest change of another film, relative to that of the alarmed film, to count as changed."""
 
 MAX_MISFIT = 30.0
 """Largest misfit with which a cause agrees with the shaft motion: the sum, over all films, of the
@@ -102,6 +102,8 @@ class UnitReadings:
         Deviation of `ln_k` from its baseline.
     rise
         Derivative of the baseline's ln k with respect to ln of the eccentricity ratio.
+    attitude_deg
+        Attitude angle of the shaft centre.
     """
 
     ln_k: FloatArray
@@ -111,7 +113,7 @@ class UnitReadings:
     attitude_deg: FloatArray
 
     def columns(self, wanted: npt.NDArray[np.bool_ | np.int64]) -> "UnitReadings":
-        """Return the readings at the times selected by a mask or by column numbers."""
+        """Return the readings at the times selected by a mask (n,) or by column numbers."""
         return UnitReadings(*(getattr(self, f.name)[:, wanted] for f in fields(self)))
 
 
@@ -198,9 +200,9 @@ class _Residuals:
     def bracket_misfit(self, bracket_n_per_m: FloatArray | None) -> float:
         """Return the misfit if brackets, not films, changed by the apparent change.
 
-        NaN without a bracket stiffness.
-        For the rest of the machine, film and bracket in series act as one spring. The film's share
-        of the motion in its own bearing decreases with the bracket stiffness.
+        NaN without a bracket stiffness. For the rest of the machine, film and bracket in series act
+        as one spring. The film's share of the motion in its own bearing decreases with the bracket
+        stiffness.
         """
         if bracket_n_per_m is None:
             return float("nan")
@@ -212,9 +214,9 @@ class _Residuals:
         return self.scaled_misfit(self._residual(np.log(alike), own))
 
     def film_share(self) -> tuple[float, float] | tuple[None, None]:
-        """Return the film's fraction of a change that includes a transducer fault, and its std.
+        """Return the film's fraction of a change that includes a transducer fault.
 
-        None, None if no such mixture agrees with the shaft motion.
+        Also return its standard uncertainty; None, None if no such mixture agrees with the motion.
         """
         step = self.if_unchanged - self.if_film
         size = float(np.sum(step**2))
@@ -227,7 +229,7 @@ class _Residuals:
         return (share, std) if is_possible else (None, None)
 
     def bearings(self, rows: npt.NDArray[np.bool_]) -> frozenset[str]:
-        """Return the ids of the bearings whose films are selected by the mask `rows`."""
+        """Return the ids of the bearings whose films are selected by the mask `rows` (n_films,)."""
         places = zip(self.response.places, rows.tolist(), strict=True)
         return frozenset(bearing for (bearing, _), is_wanted in places if is_wanted)
 
@@ -257,12 +259,15 @@ class _Residuals:
         return np.asarray(np.mean(left, axis=1) / self.std)
 
     def scaled_misfit(self, residual: FloatArray) -> float:
-        """Return the smallest misfit over all `SCALES` of the predicted motion."""
+        """Return the smallest misfit of a residual (n_films,) over all `SCALES` of the motion."""
         step = self.if_unchanged - residual
         return min(self.misfit(self.if_unchanged - a * step, a * step) for a in SCALES)
 
     def misfit(self, residual: FloatArray, predicted: FloatArray | float = 0.0) -> float:
-        """Return the sum of squared residuals, including the uncertainty of the prediction."""
+        """Return the sum of squared residuals (n_films,), with the uncertainty of the prediction.
+
+        The standard uncertainty of the `predicted` motion (n_films,) is `SPREAD` times its rms.
+        """
         spread = SPREAD**2 * np.mean((predicted * self.std) ** 2) / self.std**2
         return float(np.sum(residual**2 / (1.0 + spread)))
 

@@ -56,8 +56,8 @@ def outcomes(
 ) -> Iterator[Outcome]:
     """Yield, for each reading of a film in one direction, its comparison with the baseline.
 
-    Readings that cannot be compared yield a verdict. Columns are (n,): `value` is ln of the
-    stiffness, NaN if missing; `codes` contains values of `ReadingOutcome`.
+    Readings that cannot be compared yield a verdict, as do all readings without a baseline. Columns
+    are (n,): `value` is ln of the stiffness, NaN if missing; `codes` are of `ReadingOutcome`.
     """
     unusable = np.full(value.size, -1)
     columns: tuple[FloatArray, ...] = (np.zeros(value.size),) * 4
@@ -79,18 +79,21 @@ def outcomes(
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """State of the decision on a film in one direction.
+    """State of the decision on a film in one direction; fields that are None have no value yet.
+
+    A reading counts if it was compared with the baseline; see `step`.
 
     Parameters
     ----------
     verdict
         Verdict on the newest reading.
     finding
-        Most significant mean deviation after the newest counted reading; None at first.
-    deviation
-        Deviation of the newest counted reading from its baseline, in ln.
-    deviation_std
-        Standard uncertainty of `deviation`.
+        Most significant mean deviation after the newest counted reading.
+    deviation, deviation_std
+        Deviation of the newest counted reading from its baseline, in ln, and its standard
+        uncertainty.
+    evidence
+        Number of counted readings, and their sums over each time scale.
     alert, danger
         Delay timers of the levels alert and danger.
     last_ns, last_counted_ns
@@ -129,15 +132,16 @@ def step(
     """Return a decision updated with the outcome of one reading.
 
     A reading does not count if it is less than half a reading interval after the previous counted
-    reading, because both share most of their samples.
+    reading, because both share most of their samples. Without a baseline, no reading is judged.
 
     Raises
     ------
     ValueError
-        If the reading is not later than the previous reading.
+        If the reading is not later than the previous reading, or the evidence so far is from a
+        baseline with another number of time scales.
     """
     if decision.last_ns is not None and time_ns <= decision.last_ns:
-        raise ValueError(f"reading at {time_ns} ns is not after {decision.last_ns} ns")
+        raise ValueError(f"reading at {time_ns} ns must be after {decision.last_ns} ns")
     if baseline is None or isinstance(outcome, Verdict):
         verdict = outcome if isinstance(outcome, Verdict) else Verdict.NO_BASELINE
         return replace(decision, verdict=verdict, last_ns=time_ns)

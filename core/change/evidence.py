@@ -29,9 +29,10 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class ScaleSums:
-    """Exponentially weighted sums of deviations and their uncertainties over one time scale.
+    """Exponentially weighted sums over one time scale, as of `core.baseline.grouping.ewma`.
 
-    `fill` is the exponentially weighted sum of ones; it approaches 1 as the time scale elapses.
+    `fill` is the sum of ones, which approaches 1 as the time scale elapses; `weight` is the sum of
+    the weights. The others are sums of weighted deviations and of their uncertainties.
     """
 
     fill: float = 0.0
@@ -41,7 +42,10 @@ class ScaleSums:
     offset: float = 0.0
 
     def step(self, compared: Comparison, middle: float, alpha: float) -> "ScaleSums":
-        """Return the sums with one more reading; `middle` is the running median deviation."""
+        """Return the sums with one more reading; `alpha` is the weight of `ewma_weight`.
+
+        `middle`, the running median deviation, is added instead of the reading's own deviation.
+        """
         weight = compared.weight
         return ScaleSums(
             ewma_step(self.fill, 1.0, alpha),
@@ -52,7 +56,10 @@ class ScaleSums:
         )
 
     def finding(self, time: TimeScatter) -> "Finding":
-        """Return the mean deviation over the time scale `time`, with its standard uncertainty."""
+        """Return the mean deviation over the time scale of `time`, with its standard uncertainty.
+
+        `time.share` scales the scatter, which is larger before the time scale has fully elapsed.
+        """
         offset = self.offset / self.weight
         # means over a partly elapsed time scale have a larger scatter
         own = time.share * (self.scatter / self.weight) / self.fill
@@ -81,7 +88,7 @@ class Finding:
 class GatheredEvidence:
     """Evidence on a film: number of counted readings, and sums over each time scale.
 
-    The running median of the deviations is averaged, so that single spikes have no effect.
+    The median of the deviations in `newest` is averaged, so that single spikes have no effect.
     """
 
     n_counted: int = 0
@@ -99,7 +106,8 @@ class GatheredEvidence:
         times = baseline.time_scatter
         scales = self.scales or (ScaleSums(),) * len(times)
         if len(scales) != len(times):
-            raise ValueError(f"evidence has {len(scales)} time scales, the baseline {len(times)}")
+            found = f"{len(scales)} time scales, but the baseline has {len(times)}"
+            raise ValueError(f"evidence has {found}; discard the evidence of another baseline")
         newest = (*self.newest, compared.deviation)[-MEDIAN_READINGS:]
         middle = median(newest)
         return GatheredEvidence(

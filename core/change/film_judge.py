@@ -27,18 +27,16 @@ class FilmFinding:
     ----------
     level
         Active level, whether or not this reading was judged.
-    change
-        Most significant mean deviation of the stiffness from the baseline, in ln.
-    change_std
-        Standard uncertainty of `change`.
+    change, change_std
+        Most significant mean deviation of the stiffness from the baseline, in ln, and its standard
+        uncertainty.
     time_scale_h
         Averaging time of `change` in running hours.
-    deviation
-        Deviation of this reading from the baseline, in ln; None if it was not compared.
-    deviation_std
-        Standard uncertainty of `deviation`.
+    deviation, deviation_std
+        Deviation of this reading from the baseline, in ln, and its standard uncertainty; None if it
+        was not compared.
     attribution
-        Cause of the change while a level is active.
+        Cause of the change while a level is active, otherwise None.
     """
 
     verdict: Verdict
@@ -84,7 +82,7 @@ class FilmDecision:
 
 @dataclass(frozen=True)
 class FilmMemory:
-    """State of `FilmWatch` for another process: what stored readings do not contain.
+    """State of `FilmWatch`, beyond the stored readings, from which another process continues.
 
     `oil` is the oil settling by bearing id. `slot` is the number of the newest reading interval
     since 1970; the next reading is due in a later interval.
@@ -139,6 +137,7 @@ class FilmJudge:
         """Set the active baseline of a bearing from the next reading on; None removes it.
 
         `decisions` are the decisions in x and y to continue from; by default, initial decisions.
+        Their times are cleared, so that the next reading may have any time.
         """
         if baseline is None:
             self._baselines.pop(bearing, None)
@@ -169,7 +168,8 @@ class FilmJudge:
     def add_recent(self, columns: Iterable[FloatArray]) -> None:
         """Add settled readings of earlier times, to find the causes of changes.
 
-        Each item holds one time: (5, n_films), with the fields of `UnitReadings` as rows.
+        Each item holds one time: (5, n_films), with the fields of `UnitReadings` as rows. Only the
+        newest `MAX_RECENT` times are kept.
         """
         self._recent.extend(columns)
 
@@ -179,6 +179,11 @@ class FilmJudge:
         Returns
         -------
         One item per reading: its findings, and the updated decisions in x and y.
+
+        Raises
+        ------
+        ValueError
+            If a reading is not later than the previous reading of its film.
         """
         found = {
             (reading.bearing, direction): self._decide(reading, direction)

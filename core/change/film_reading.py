@@ -18,14 +18,10 @@ class FilmValue:
 
     Parameters
     ----------
-    ln_k
-        Natural logarithm of the stiffness in N/m.
-    u_random
-        Random standard uncertainty of `ln_k`.
-    shaft_um_pk
-        1× amplitude of the shaft relative to the bearing.
-    bearing_um_pk
-        Absolute 1× amplitude of the bearing.
+    ln_k, u_random
+        Natural logarithm of the stiffness in N/m, and its random standard uncertainty.
+    shaft_um_pk, bearing_um_pk
+        1× amplitudes of the shaft relative to the bearing, and of the bearing itself.
     outcome
         Whether stiffness and film condition were measured.
     reason
@@ -67,7 +63,10 @@ class FilmReading:
 def film_reading(
     assessment: Assessment, condition: BearingCondition, estimator: Estimator
 ) -> FilmReading:
-    """Return the film reading of an assessment; stiffness and conditions need good quality."""
+    """Return the film reading of an assessment.
+
+    Stiffness and film conditions are NaN unless good; other values may be of any quality.
+    """
     readings = assessment.readings
     eccentricity = readings["eccentricity_ratio"]
     x, y = (_value(readings, estimator, direction) for direction in DIRECTIONS)

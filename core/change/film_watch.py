@@ -31,7 +31,7 @@ class FilmWatch:
 
     @property
     def operation(self) -> Operation:
-        """Operating state of the unit at its newest assessment, with its memory."""
+        """Operating state of the unit after its newest assessment, with its start time."""
         return self._operation
 
     @property
@@ -50,7 +50,7 @@ class FilmWatch:
         self.judge.restore(memory.decided)
 
     def take(self, assessments: Sequence[Assessment]) -> tuple[list[Assessment], list[FilmNews]]:
-        """Update the operation, and if a reading is due the films, from new assessments.
+        """Update the operation and, if a reading is due, the films from new assessments.
 
         Returns
         -------

@@ -60,7 +60,10 @@ class ChangeLimits:
         return 1.0 - self.deadband / self.alert_change
 
     def significance_threshold(self, time_scale_h: float) -> float:
-        """Return the required significance of a mean deviation over a time scale."""
+        """Return the required significance of a mean deviation over a time scale.
+
+        It is at least `MIN_SIGNIFICANCE`.
+        """
         fall = self.significance_fall * math.log(time_scale_h / REFERENCE_H, 4.0)
         return max(self.significance - fall, MIN_SIGNIFICANCE)
 

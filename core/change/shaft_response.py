@@ -40,7 +40,8 @@ MIN_STD = 1e-4
 class ShaftResponse:
     """Relative 1× shaft motion at each film as a quadratic function of ln k of all films.
 
-    Each direction of a bearing counts as a film.
+    Each direction of a bearing counts as a film. Raises `ValueError` if the numbers of values do
+    not fit the number of films, or a `std` is not above 0.
 
     Parameters
     ----------
@@ -63,16 +64,22 @@ class ShaftResponse:
         n = len(self.places)
         shape = [len(row) for row in self.coefficients]
         if len(self.centre) != n or len(self.std) != n or shape != [_n_terms(n)] * n:
-            raise ValueError(f"coefficients must be {n} by {_n_terms(n)}, centre and std {n}")
+            raise ValueError(
+                f"{n} films need {n} rows of {_n_terms(n)} coefficients, got {len(shape)} rows,"
+                f" {len(self.centre)} values of centre and {len(self.std)} of std"
+            )
         if not all(std > 0.0 for std in self.std):
-            raise ValueError(f"std must be above 0, got {self.std}")
+            raise ValueError(f"std must be above 0, got {min(self.std):g}")
 
     @cached_property
     def _coefficients(self) -> FloatArray:
         return np.array(self.coefficients)
 
     def expected(self, ln_k: FloatArray) -> FloatArray:
-        """Return ln of the expected motion at each film over the geometric mean (n_films, n)."""
+        """Return ln of the expected motion over its geometric mean (n_films, n).
+
+        `ln_k` (n_films, n) is ln of the stiffness of the films at n times.
+        """
         return self._coefficients @ _terms(ln_k - np.array(self.centre)[:, np.newaxis])
 
 
@@ -83,7 +90,13 @@ def learn_response(
 
     Returns
     -------
-    The response; None with too few settled readings that have stiffness and amplitude of all films.
+    The response; None if fewer than `MIN_MEANS` times `MEAN_READINGS` readings are settled
+    (`is_settled`, (n,)) and have stiffness and amplitude of all films.
+
+    Raises
+    ------
+    ValueError
+        If the histories do not have the same times.
     """
     places = tuple((bearing, direction) for bearing in histories for direction in DIRECTIONS)
     ln_k, ln_shaft = film_columns(histories)
@@ -103,7 +116,7 @@ def learn_response(
 
 
 def film_columns(histories: Mapping[str, StiffnessHistory]) -> tuple[FloatArray, FloatArray]:
-    """Return ln of the stiffness and ln of the 1× shaft amplitude of all films, (n_films, n) each.
+    """Return ln k and ln of the 1× shaft amplitude of all films, (n_films, n) each; NaN if missing.
 
     Raises
     ------
@@ -113,7 +126,7 @@ def film_columns(histories: Mapping[str, StiffnessHistory]) -> tuple[FloatArray,
     first = next(iter(histories.values()))
     for bearing, history in histories.items():
         if not np.array_equal(history.time_ns, first.time_ns):
-            raise ValueError(f"readings of {bearing} are not at the times of the other bearings")
+            raise ValueError(f"readings of {bearing} must be at the times of the other bearings")
     ln_k = np.concatenate([history.ln_k for history in histories.values()])
     shaft = np.concatenate([history.shaft_um_pk for history in histories.values()])
     return ln_k, np.log(np.where(shaft > 0.0, shaft, np.nan))

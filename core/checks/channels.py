@@ -44,7 +44,7 @@ class ChannelLimits:
 
     @classmethod
     def of(cls, channels: Iterable[tuple[float, float, float, float]]) -> "ChannelLimits":
-        """Return limits from one (full scale, unit per volt, lowest, highest OK V) per channel."""
+        """Return limits from (full scale V, unit per V, lowest OK V, highest OK V) per channel."""
         columns = np.array(list(channels), dtype=np.float64).reshape(-1, 4)
         return cls(*(column[:, np.newaxis] for column in columns.T))
 
@@ -96,7 +96,7 @@ def channel_verdicts(
 
 
 def worst_qualities(verdicts: VerdictArray) -> tuple[Quality, ...]:
-    """Return the worst quality of each channel over all cells; the first of equally bad ones."""
+    """Return the worst quality of each channel (n_channels,), the first of equally bad ones."""
     if not verdicts.any():
         return (GOOD,) * len(verdicts)
     first = _LEVELS[verdicts].argmax(axis=1)

@@ -34,8 +34,8 @@ class SensorLimits:
     ----------
     min_counts_rms
         Smallest standard deviation of a live channel over an eighth of a segment while the machine
-        turns, in converter counts. Below it, the channel is dead or stuck. A flickering last count
-        has 0.8.
+        turns, in converter counts. At or below it, the channel is dead or stuck. A constant signal
+        that flickers by ± 1 count has 0.8.
     dead_counts
         Largest absolute mean, in counts, of a dead channel, which delivers no voltage.
     max_backward_share
@@ -118,7 +118,10 @@ def level_quality(
 
 
 def clipped_share(samples: FloatArray, unit_per_count: float) -> float:
-    """Return the fraction of samples (n_samples,) at either end of the converter's range."""
+    """Return the fraction of samples (n_samples,), in the channel's unit, that are clipped.
+
+    `unit_per_count` must not be 0.
+    """
     counts = samples / unit_per_count
     at_end = (counts > HIGHEST_COUNT - 0.5) | (counts < LOWEST_COUNT + 0.5)
     return float(np.mean(at_end))
@@ -129,7 +132,7 @@ def backward_share(power_x: float, power_y: float, cross_xy: complex) -> float:
 
     The orbit z = x + iy is split into forward and backward circles F and B. |F|² and |B|² are
     (S_xx + S_yy ± 2 Im S_xy) / 4, with the means of |X|², |Y|² and X · conj(Y) at a spectral line.
-    The share needs no phase reference, and averages like the spectra.
+    The share needs no phase reference, and averages like the spectra. It is 0.5 without power.
     """
     total = power_x + power_y
     if total <= 0.0:
@@ -156,10 +159,12 @@ def checked_speed(
     limits: SensorLimits,
     u_line: float = 0.0,
 ) -> Reading:
-    """Return the speed reading in r/min after plausibility checks; missing if implausibly high.
+    """Return the speed in r/min after plausibility checks; bad if negative or implausibly high.
 
     Parameters
     ----------
+    measured
+        Reading to check; returned unchanged if it has no value.
     line_rpm
         Speed of the 1× line; None without a distinct line. If it differs from the reading by more
         than the tolerance, the result is uncertain.

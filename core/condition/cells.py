@@ -69,7 +69,7 @@ class CellGrid:
                 raise ValueError(f"{key} = {value:g} must be a number above 0")
         turn = 360.0 / (self.attitude_width_deg or 360.0)
         if abs(turn - round(turn)) > 1e-9:
-            raise ValueError(f"attitude_width_deg = {self.attitude_width_deg:g} must divide 360")
+            raise ValueError(f"attitude_width_deg = {self.attitude_width_deg:g} must divide 360°")
 
     @property
     def has_attitude(self) -> bool:
@@ -111,7 +111,7 @@ NOWHERE_KNOWN = OperatingPoint()
 
 @dataclass(frozen=True)
 class BearingCondition:
-    """Condition of a bearing: operating state, whether it has settled, condition cell (or None).
+    """Condition of a bearing: operating state, whether it has settled, cell (None if unknown).
 
     A state has settled when it has lasted for the settling time after the warm-up. Only then is
     film stiffness compared with its baseline.

@@ -91,7 +91,7 @@ class Operation:
     last_ns
         Time of the newest reading.
     speed_passed, power_passed
-        Whether the lower and the upper limit are exceeded; None if unknown.
+        Whether the lower and the upper limit are reached or exceeded; None if unknown.
     was_at_speed
         While the speed is between both limits: whether the unit was last at rated speed (true) or
         at standstill (false).
@@ -110,7 +110,10 @@ class Operation:
     was_at_speed: bool | None = None
 
     def is_settled(self, limits: OperatingLimits, has_oil_settled: bool = False) -> bool:
-        """Whether the unit is warm, and has been in one state at rated speed for `settling_s`."""
+        """Whether the unit is warm, and has been in one state at rated speed for `settling_s`.
+
+        It is warm if the oil has settled, or after `warm_up_s` at rated speed.
+        """
         now_ns, since_ns, from_ns = self.last_ns, self.since_ns, self.at_speed_from_ns
         if self.state not in STEADY or now_ns is None or since_ns is None or from_ns is None:
             return False
@@ -149,7 +152,7 @@ def step_operation(
     longest_ns = ns_from_s(limits.longest_gap_s)
     if operation.last_ns is not None:
         if time_ns <= operation.last_ns:
-            raise ValueError(f"reading at {time_ns} ns is not after {operation.last_ns} ns")
+            raise ValueError(f"reading at {time_ns} ns must be after {operation.last_ns} ns")
         if time_ns - operation.last_ns > longest_ns:
             operation = UNKNOWN_OPERATION
     speed, power, was_at_speed = None, None, None
@@ -193,7 +196,7 @@ def _passed(
     hysteresis: float,
     rated: float,
 ) -> tuple[bool, bool] | None:
-    """Return whether each of two limits is exceeded, with hysteresis if `before` is known."""
+    """Return whether each of two limits is reached, with hysteresis if `before` is known."""
     if math.isnan(value):
         return None
     lower, upper = (

@@ -22,7 +22,10 @@ NAMES = ("gap x", "opposite gap x", "gap y", "opposite gap y", "thermal growth",
 
 @dataclass(frozen=True)
 class ProbeAxis:
-    """Mean gaps in µm on an axis: of the probe on the positive side (near) and opposite (far)."""
+    """Mean gaps in µm on an axis, of the probe on the positive side (near) and opposite (far).
+
+    The references are the gaps with the shaft centred. `far` is None without an opposite probe.
+    """
 
     near: Reading
     near_reference_um: float
@@ -45,7 +48,7 @@ class ProbeAxis:
 
     @property
     def quality(self) -> Quality:
-        """Quality of the displacement along this axis; at best uncertain if one probe failed."""
+        """Worst quality of the gaps; if one of two is missing, the other's, at best uncertain."""
         if self.far is None:
             return self.near.quality
         if self.near.value is None and self.far.value is None:
@@ -66,6 +69,8 @@ class Growth:
 
 class ProbeAxes:
     """Shaft displacement along x and y, as weighted sums of six input quantities.
+
+    `last` is the last measured thermal growth; None if it was never measured.
 
     Attributes
     ----------
@@ -91,7 +96,7 @@ class ProbeAxes:
         return worst(axis.quality for axis in self._axes if axis.has_both)
 
     def growth_budget(self) -> Budget | None:
-        """Return the thermal growth from axes with both gaps; None if no axis has both."""
+        """Return the budget of the thermal growth; None if no axis has both gaps."""
         both = [axis for axis in (0, 1) if self._axes[axis].has_both]
         if not both:
             return None
@@ -99,7 +104,7 @@ class ProbeAxes:
         return Budget(float(weights @ self.values_um), self.lines(weights))
 
     def lines(self, weights: FloatArray) -> tuple[BudgetLine, ...]:
-        """Return the uncertainty budget lines of a weighted sum of `values_um` (GUM, eq. 10)."""
+        """Return the budget lines of the sum of `values_um` with `weights` (6,) (GUM, eq. 10)."""
         return tuple(
             chain.from_iterable(
                 self._lines(source, float(weight))

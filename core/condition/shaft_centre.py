@@ -28,7 +28,7 @@ def locate_shaft(
 
     One probe cannot separate shaft displacement from thermal growth. An axis with one probe uses
     the present growth of the other axis, else the last measured growth, else zero growth, each with
-    its uncertainty.
+    its uncertainty. `accuracy` is by default `GapAccuracy()`.
 
     Returns
     -------

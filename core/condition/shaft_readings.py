@@ -30,7 +30,8 @@ def position_results(
 ) -> Found:
     """Return gaps, shaft centre, eccentricity and attitude with their budgets, by quantity.
 
-    `segments` has at least one segment, the oldest first.
+    `segments` has at least one segment, the oldest first. `last_growth` is the last measured
+    thermal growth; None if it was never measured.
     """
     measured = {
         "gap_x_um": _gap(unit, segments, bearing.shaft_x, bearing.gap_x),
@@ -74,7 +75,8 @@ def slow_channels(unit: Unit, bearing: Bearing) -> dict[str, str | None]:
 def slow_results(segments: Sequence[Segment], channels: Mapping[str, str | None]) -> Found:
     """Return the means of slow channels over the segments, with their budgets, by quantity.
 
-    The uncertainty is that of the scatter, without the unknown calibration of the transmitters.
+    `channels` is from `slow_channels`; the reading of an absent channel is missing. The uncertainty
+    is that of the scatter, without the unknown calibration of the transmitters.
     """
     found: dict[str, Budgeted] = {}
     for name, channel in channels.items():

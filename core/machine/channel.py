@@ -25,10 +25,8 @@ class SlowRollVector:
     phasor_um_pk
         Displacement phasor along the positive bearing axis. Its phase is that of the signal at the
         moment when the mark on the shaft passes the key-phase pick-up.
-    speed_rpm
-        Speed at which the vector was measured.
-    taken_ns
-        Time of the measurement, UTC nanoseconds since 1970.
+    speed_rpm, taken_ns
+        Speed and time (UTC nanoseconds since 1970) of the measurement.
     """
 
     channel: str

@@ -40,10 +40,7 @@ class HighPass:
 
 @dataclass(frozen=True)
 class Resonance:
-    """Second-order low-pass response, such as the mounted resonance of a transducer.
-
-    `damping` is the fraction of critical damping.
-    """
+    """Second-order low-pass response, such as a resonance; `damping` is a fraction of critical."""
 
     natural_hz: float
     damping: float

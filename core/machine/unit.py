@@ -11,7 +11,7 @@ from core.machine.channel import Channel
 
 
 class Estimator(StrEnum):
-    """Estimators of the oil-film stiffness. The names appear in settings, API and store.
+    """Estimator of the oil-film stiffness. The names appear in settings, API and database.
 
     `dynamic` fits the film to broadband vibration. `transfer` and `ratio` use one spectral line, 1×
     or vortex: `transfer` the H1 transfer function, `ratio` the amplitudes in equation (5) of Brito
@@ -159,8 +159,8 @@ class Bearing:
     opposite_x, opposite_y
         Channel ids of the probes opposite `shaft_x` and `shaft_y`, if installed.
     bracket_mass_kg
-        Effective mass of the bracket; None if unknown, `dynamic` then fits it with the film.
-        Equation (5) neglects it; the other estimators include it.
+        Effective mass of the bracket; None if unknown. `Estimator.DYNAMIC` then fits it with the
+        film. Equation (5) neglects it; the other estimators include it.
     runout_um_pk
         Largest shaft runout at 1× that is not subtracted as a slow-roll vector.
     preference
@@ -250,11 +250,11 @@ def require_same_machine(here: Unit, there: Unit) -> None:
     before, after = _fixed_parts(here), _fixed_parts(there)
     for name, value in before.items():
         if after[name] != value:
-            raise ValueError(f"{name} is {after[name]!r}, expected {value!r}")
+            raise ValueError(f"{name} is {after[name]!r}, expected {value!r}: it must not change")
 
 
 def bearings_with_new_references(here: Unit, there: Unit) -> list[str]:
-    """Return the ids of the bearings whose gap references differ between two descriptions."""
+    """Return the ids of bearings whose gap references differ; both units have the same bearings."""
     pairs = zip(here.bearings, there.bearings, strict=True)
     return [
         b.id

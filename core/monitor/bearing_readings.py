@@ -51,14 +51,8 @@ class BearingReadings:
 
     Parameters
     ----------
-    readings
-        One reading for each quantity of the catalogue.
-    budgets
-        Uncertainty budgets, by quantity; only of readings with known uncertainty.
-    estimators
-        Estimator that `stiffness` was taken from, by axes "xx" and "yy"; None without a value.
-    spectrum
-        Cross-spectrum of the displacements at the Fourier bins, µm²; empty for polls.
+    readings, budgets, estimators, spectrum
+        As in `core.monitor.assessment.Assessment`.
     evidence
         Kind of the input: waveforms, vectors with phase, or amplitudes only.
     """
@@ -73,14 +67,14 @@ class BearingReadings:
 class UnitEvaluation:
     """Readings of the bearings of one unit, averaged over the same segments or polls.
 
-    The films of all bearings are fitted together, when the readings of the first are asked for.
+    The films of all bearings are fitted together, when the readings of one are first requested.
 
     Parameters
     ----------
     kept
         Segments or polls to average, at least one.
     n_expected
-        Number of possible segments.
+        Number of segments that could have been averaged, for the coverage.
     """
 
     def __init__(
@@ -105,10 +99,7 @@ class UnitEvaluation:
     def of(self, bearing: Bearing, position: Found) -> BearingReadings:
         """Return the readings of one bearing.
 
-        Parameters
-        ----------
-        position
-            Readings and budgets from `core.condition.shaft_readings.position_results`.
+        `position` is the result of `core.condition.shaft_readings.position_results`.
         """
         found = self._bearings[bearing.id]
         readings, budgets, film = found.readings(position, self._films.get(bearing.id))
@@ -171,10 +162,7 @@ class _Bearing:
     ) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
         """Return all readings but the preferred stiffness, their budgets, and the film or None.
 
-        Parameters
-        ----------
-        found
-            Result of `dynamic` for `film_spectrum`, if there is such a spectrum.
+        `found` is the result of `dynamic` for `film_spectrum`; None without such a spectrum.
         """
         unit, segments = self._unit, self._segments
         speed = segments[-1].speed
@@ -208,7 +196,8 @@ class _Bearing:
     ) -> dict[str, Reading]:
         """Return the readings that must be marked uncertain, with that quality, by quantity.
 
-        These are stiffnesses and dampings with disagreeing estimators or a channel delay.
+        These are stiffnesses and dampings with disagreeing estimators or a channel delay. `film` is
+        None without a result of the estimator `dynamic`.
         """
         names: dict[str, Reason] = {}
         if readings["dynamic_k_xx_n_per_m"].quality.reason is Reason.CHANNEL_DELAY:
@@ -288,7 +277,10 @@ class _Bearing:
         return with_budgets({**found, "frequency_hz": self._frequency(line)}, prefix)
 
     def film_spectrum(self) -> FilmSpectrum | None:
-        """Return the spectrum over the segments in which all channels are usable, if possible."""
+        """Return the spectrum over the segments in which all channels are usable.
+
+        None for polls, without such segments, or if a channel or the speed is bad.
+        """
         quality = self._line_quality(*range(len(self._rows)))
         if self.spectrum is None or isinstance(quality, Reading) or not self._n_segments:
             return None

@@ -13,7 +13,7 @@ class Quantity:
     Parameters
     ----------
     name
-        Name in the API and in the store; ends with unit and detector.
+        Name in the API and in the database; ends with unit and detector.
     unit
         Displayed unit, with the detector of amplitudes.
     label

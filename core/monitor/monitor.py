@@ -45,15 +45,11 @@ class MonitorState:
 
 
 class UnitMonitor:
-    """Monitor of one unit; it holds the whole state of the unit's analysis.
+    """Monitor of one unit: it computes assessments from sample blocks, and holds their state.
 
     Results depend only on the samples and their indices, not on the boundaries of blocks or their
-    arrival times. The value of a slow channel applies to all samples of its cell.
-
-    Parameters
-    ----------
-    transform
-        Transform of sample windows to segments; by default a `SegmentTransform` for waveforms.
+    arrival times. The value of a slow channel applies to all samples of its cell. `transform`
+    converts sample windows to segments; by default, it is a `SegmentTransform` for waveforms.
     """
 
     def __init__(
@@ -103,20 +99,17 @@ class UnitMonitor:
         self._rewound_to = state.start
 
     def settle(self, state: MonitorState) -> None:
-        """Restore a state after the replay of the samples from index `state.start` on."""
+        """Restore a state after a replay from `state.start` on; discard the gaps found in it."""
         self._growth = dict(state.growth)
         self._ring.account = state.account
         self._gaps.clear()
         self._first_start, self._n_voided = state.first_start, state.n_voided
 
     def replace_description(self, unit: Unit) -> None:
-        """Replace the description of the unit, from the next assessment on.
+        """Replace the description of the unit; the next assessment uses the new one.
 
-        Parameters
-        ----------
-        unit
-            New description. Only the bearings' references, clearances and brackets may differ;
-            the averaged segments depend on all other fields.
+        Only the references, clearances and brackets of the bearings may differ; the averaged
+        segments depend on all other fields.
 
         Raises
         ------
@@ -129,7 +122,7 @@ class UnitMonitor:
         self.unit = unit
 
     def go_on(self, reach: Reach | None) -> None:
-        """Set the end of the stored samples, before the first block; None if nothing is stored.
+        """Set the end of the stored samples (None if there are none) before the first block.
 
         Samples missing between this end and the first block are recorded as gaps.
         """
@@ -141,21 +134,18 @@ class UnitMonitor:
         return gaps
 
     def ingest(self, block: SampleBlock) -> list[Assessment]:
-        """Process a block and return the assessments of all bearings that it completes."""
+        """Process a block as `refreshes` does; return the assessments of all bearings."""
         return list(self.steps(block))
 
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
-        """Process a block and yield the assessments that it completes, one bearing at a time."""
+        """Process a block as `refreshes` does; yield the assessments, one bearing at a time."""
         for refresh in self.refreshes(block):
             yield refresh.assessment()
 
     def refreshes(self, block: SampleBlock) -> Iterator[Refresh]:
         """Process a block and yield the refreshes that it completes, one bearing at a time.
 
-        Parameters
-        ----------
-        block
-            Next block in index order; repeated samples are dropped.
+        `block` is the next block in index order; repeated samples are dropped.
 
         Yields
         ------

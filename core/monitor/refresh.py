@@ -43,9 +43,9 @@ class Refresh:
     newest
         Samples of the newest segment or poll.
     n_voided
-        Number of segments interrupted by gaps or restarts since the service started.
+        As in `AveragingWindow`.
     last_growth
-        Last measured thermal growth of the gaps; None if there is none.
+        Last measured thermal growth of the gaps; None if it was never measured.
     """
 
     evaluation: UnitEvaluation

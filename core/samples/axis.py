@@ -116,11 +116,14 @@ class SampleAxis:
         self.index, self.at_ns = index, at_ns
 
     def forward(self, counter: int, modulus: int) -> int:
-        """Return the samples from the index to a counter value, from 0 to ``modulus - 1``."""
+        """Return the number of samples, below `modulus`, from the index to a counter value."""
         return (counter - (self.index or 0)) % modulus
 
     def jump(self, counter: int, modulus: int, at_ns: int) -> int:
-        """Return the samples from the index to a counter value, adding wraps by elapsed time."""
+        """Return the number of samples from the index to a counter value, reached at `at_ns`.
+
+        It includes the whole turns of the counter that best fit the elapsed time.
+        """
         forward = self.forward(counter, modulus)
         return forward + modulus * max(0, round((self.elapsed(at_ns) - forward) / modulus))
 

@@ -1,5 +1,6 @@
 """Sample blocks: the common data format of all acquisition adapters."""
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
@@ -61,7 +62,7 @@ class DeviceClock:
         Deviation of the sampling rate from nominal by the host's clock, in parts per million; None
         until enough blocks have arrived, and for devices that sample when polled.
     u_drift_ppm
-        Standard uncertainty of `drift_ppm`.
+        Standard uncertainty of `drift_ppm`; None if `drift_ppm` is None.
     n_faults
         Number of blocks with an unused time stamp since the adapter started.
     """
@@ -73,7 +74,7 @@ class DeviceClock:
 
 
 class BlockMisfitError(ValueError):
-    """Sample block does not fit the unit: the rate, the channels or the unit differ."""
+    """Error raised if the unit, rate or number of channels of a block is not the expected one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +156,12 @@ class SampleBlock:
         no device. The age of data is measured from here and so includes delays in the device, the
         link and queues.
     elsewhere
-        Readings of slow channels that are measured by other devices.
+        Readings of slow channels that are measured by other devices, by id.
+
+    Raises
+    ------
+    ValueError
+        If the numbers of channels, slow channels or cells do not match.
     """
 
     calibration: UnitCalibration
@@ -179,8 +185,9 @@ class SampleBlock:
             *side.slow.shape,
         ):
             raise ValueError(
-                f"samples of shape {self.counts.shape} with verdicts of {side.ok.shape} and slow"
-                f" values of {side.slow.shape}, calibrated are {n_channels} channels and {n_slow}"
+                f"samples {self.counts.shape}, OK states {side.ok.shape} and slow values"
+                f" {side.slow.shape} do not fit {n_channels} channels, {n_slow} slow channels"
+                f" and {n_cells} cells"
             )
 
     def __eq__(self, other: object) -> bool:
@@ -266,14 +273,19 @@ class SampleBlock:
         newest = zip(self.calibration.slow, self.side.slow[:, -1].tolist(), strict=True)
         return {c.id: c.reading(value) for c, value in newest} | dict(self.elsewhere)
 
-    def from_sample(self, start: int, stop: int | None = None) -> "SampleBlock":
-        """Return the samples `start` to `stop - 1` as a block; `rejected` is kept if `start` is 0.
+    def cells(self) -> Iterator["SampleBlock"]:
+        """Yield each cell as a block of its own."""
+        for start, stop in itertools.pairwise([*self.side.starts.tolist(), self.n_samples]):
+            yield self.from_sample(start, stop)
 
-        Raises `ValueError` if `start` lies outside the block.
+    def from_sample(self, start: int, stop: int | None = None) -> "SampleBlock":
+        """Return the samples `start` to `stop - 1`, or to the end by default, as a block.
+
+        `rejected` is kept if `start` is 0. Raises `ValueError` if `start` lies outside the block.
         """
         stop = self.n_samples if stop is None else min(stop, self.n_samples)
         if not 0 <= start <= self.n_samples:
-            raise ValueError(f"part begins at sample {start} of {self.n_samples} samples")
+            raise ValueError(f"start {start} must be from 0 to {self.n_samples}, the block's end")
         if (start, stop) == (0, self.n_samples):
             return self
         return replace(
@@ -286,7 +298,11 @@ class SampleBlock:
 
 
 def joined(blocks: Sequence[SampleBlock]) -> SampleBlock:
-    """Return consecutive blocks as one, with the clock of the last and the first stamp fault."""
+    """Return consecutive blocks, at least one, as one block.
+
+    Its clock is that of the last block, `rejected` that of the first, and `stamp_fault` the first
+    fault of any block.
+    """
     first, last = blocks[0], blocks[-1]
     if first is last:
         return first

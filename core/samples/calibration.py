@@ -56,7 +56,7 @@ transducers itself."""
 
 @dataclass(frozen=True)
 class SlowCalibration:
-    """Id of one slow channel, and its plausible range in the unit of its values."""
+    """Calibration of one slow channel: its id, and its plausible range in the channel's unit."""
 
     id: str
     minimum: float
@@ -93,12 +93,9 @@ class SlowCalibration:
 class UnitCalibration:
     """Calibration of one unit's device, with the channels in the order of the device.
 
-    Parameters
-    ----------
-    block_samples
-        Samples per cell; the samples of a cell share one OK state per channel and one set of slow
-        values. Cells begin at multiples of this number, so that quality does not depend on the
-        boundaries of the device's messages.
+    A cell has `block_samples` samples, which share one OK state per channel and one set of slow
+    values. Cells begin at multiples of this number, so that quality does not depend on the
+    boundaries of the messages of the device.
     """
 
     unit: str
@@ -125,11 +122,9 @@ class UnitCalibration:
         return gain[:, np.newaxis]
 
     def to_units(self, counts: RawArray) -> SampleArray:
-        """Convert int16 counts to engineering units; return float32 samples unchanged.
+        """Convert int16 counts (n_channels, n_samples) to engineering units, as float32.
 
-        Parameters
-        ----------
-        counts : (n_channels, n_samples)
+        Samples that are float32 already are in engineering units, and are returned unchanged.
         """
         samples = counts.astype(np.float32, copy=False)
         if samples is counts:

@@ -134,8 +134,8 @@ def outage(reach: Reach, block: SampleBlock) -> list[Gap]:
 def restart(reach: Reach, block: SampleBlock) -> Gap | None:
     """Return the gap between the last received sample and the restart of the sample count.
 
-    None if the times show no gap. Samples missing after the restart are not included.
-    `reach` is the end of the received samples, `block` the first block of the new count.
+    None if the times show no gap. Samples missing after the restart are not included. `reach` is
+    the end of the received samples, `block` the first block of the new count.
     """
     stop_ns = _begin_ns(block) if n_missed(reach.stop_ns, block) else block.start_ns
     lost = _lost(reach, reach.stop_ns, stop_ns, block.rate_hz)
@@ -251,7 +251,7 @@ class Counts:
         self.count: Count | None = None
 
     def restore(self, count: Count | None) -> None:
-        """Restore the current sample count after a restart of padwatch."""
+        """Restore the current sample count after a restart of padwatch; None if there was none."""
         self.count = count
 
     def replayed(self, block: SampleBlock) -> SampleBlock:
@@ -261,7 +261,10 @@ class Counts:
         return _in(block, self.count.epoch)
 
     def placed(self, block: SampleBlock) -> SampleBlock:
-        """Return the next block with the epoch of its count; a restarted count gets a new epoch."""
+        """Return the next block with the epoch of its sample count, and update `count`.
+
+        A restarted sample count gets a new epoch.
+        """
         count = self.count
         epoch, is_new = block.epoch, True
         if count is not None and block.epoch == count.reported:

@@ -91,10 +91,16 @@ class _Part:
 class Ring:
     """Ring buffer of the newest blocks of one epoch; samples are addressed by index.
 
-    Parameters
+    `capacity` is the number of samples held per channel.
+
+    Attributes
     ----------
-    capacity
-        Number of samples held per channel.
+    epoch, stop_index
+        Epoch (None before the first block), and index of the first sample after the newest one.
+    contiguous_from
+        Index of the first sample after the newest gap.
+    account
+        Balance of the samples that the device offered.
     """
 
     def __init__(self, n_channels: int, capacity: int) -> None:
@@ -109,8 +115,8 @@ class Ring:
     def write(self, block: SampleBlock) -> Gap | None:
         """Append a block and return the gap of lost or rejected samples before it, or None.
 
-        Repeated samples are counted in `account` and dropped. At most as many rejected samples are
-        counted as are missing in the index.
+        Repeated samples are counted in `account` and dropped. Not more rejected samples are counted
+        than the index shows to be missing.
 
         Raises
         ------
@@ -160,7 +166,7 @@ class Ring:
             If the ring does not hold all of these samples, or the range is empty.
         """
         if first_index == stop_index or not self.holds(first_index, stop_index):
-            raise LookupError(f"samples {first_index} to {stop_index} are not in the buffer")
+            raise LookupError(f"samples {first_index} to {stop_index - 1} are not in the buffer")
         parts = [
             _Part.of(block, first_index, stop_index)
             for block in self._blocks
@@ -188,8 +194,10 @@ class Ring:
     def _take(self, block: SampleBlock) -> None:
         n_repeated = min(self.stop_index - block.first_index, block.n_samples)
         fresh = block.from_sample(n_repeated)
-        lengths = np.diff(fresh.side.starts, append=fresh.n_samples)
-        n_flagged = int(lengths[fresh.verdicts.any(axis=0)].sum())
+        n_flagged = 0
+        if fresh.verdicts.any():
+            lengths = np.diff(fresh.side.starts, append=fresh.n_samples)
+            n_flagged = int(lengths[fresh.verdicts.any(axis=0)].sum())
         self.account = self.account.with_taken(fresh.n_samples, n_flagged, n_repeated)
         if fresh.n_samples == 0:
             return

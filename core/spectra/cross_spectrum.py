@@ -55,7 +55,10 @@ class CrossSpectrum:
         return root
 
     def coherence(self, first: int, second: int) -> FloatArray:
-        """Return the squared coherence of two channels, (n_lines,); always 1 for one segment."""
+        """Return the squared coherence of two channels, (n_lines,).
+
+        It is always 1 for one segment, and 0 where a channel has no power.
+        """
         product = self.power[:, first, second] * self.power[:, second, first]
         squared = np.abs(self.matrix[:, first, second]) ** 2
         coherence: FloatArray = np.divide(
@@ -64,7 +67,7 @@ class CrossSpectrum:
         return np.minimum(coherence, 1.0)
 
     def coherence_at(self, line: int, first: int, second: int) -> float:
-        """Return the squared coherence of two channels at one line."""
+        """Return the squared coherence of two channels at one line; 0 without power."""
         product = float(self.power[line, first, second]) * float(self.power[line, second, first])
         squared = abs(complex(self.matrix[line, first, second])) ** 2
         return min(squared / product, 1.0) if product > 0.0 else 0.0
@@ -83,9 +86,8 @@ def average(
 
     Parameters
     ----------
-    frequency_hz : (n_lines,)
     phasors_um_pk : (n_segments, n_channels, n_lines)
-        Finite, also where not usable.
+        Phasors of each segment at `frequency_hz` (n_lines,); finite, also where not usable.
     usable : (n_segments, n_channels)
         Whether the channel is usable in the whole segment.
     """
@@ -126,12 +128,8 @@ def phasor_power_per_density(bin_hz: float) -> float:
 def independent_segments(n_segments: int, overlap: float) -> float:
     """Return the number of independent segments equivalent to overlapping ones.
 
-    Welch (1967), equation 12.
-
-    Parameters
-    ----------
-    overlap
-        Overlap of consecutive segments as a fraction of a segment, from 0 to below 1.
+    `overlap` is the overlapping fraction of consecutive segments, from 0 to below 1. The formula is
+    equation 12 of Welch (1967).
     """
     taper = hann(1024)
     excess, lag = 0.0, 1
@@ -196,8 +194,8 @@ def correlated_sum(
 def leakage_kernel(n_lines: int) -> FloatArray:
     """Return the largest fraction of line power that leaks to other lines, (n_lines, n_lines).
 
-    It is zero within Hann's main lobe; the envelope of the side lobes at a distance of d bins is
-    ``1 / (π d (d² - 1))``.
+    It is zero within Hann's main lobe. At a distance of d bins, it is the square of the side lobes'
+    envelope ``1 / (π d (d² - 1))``.
     """
     distance = np.abs(np.subtract.outer(np.arange(n_lines), np.arange(n_lines))).astype(np.float64)
     far = distance > 2.0

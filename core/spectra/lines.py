@@ -84,11 +84,9 @@ def taper_weights(n_samples: int) -> FloatArray:
 
 
 def bin_phasors(tapered_samples: FloatArray, n_lines: int) -> ComplexArray:
-    """Return the phasors at the first `n_lines` bins above zero of the discrete Fourier transform.
+    """Return the phasors (n_channels, n_lines) at the first Fourier bins above zero.
 
-    Returns
-    -------
-    (n_channels, n_lines); line 0 is bin 1.
+    `tapered_samples` (n_channels, n_samples) are multiplied by `taper_weights`; line 0 is bin 1.
     """
     phasors: ComplexArray = fft.rfft(tapered_samples, axis=1)[:, 1 : n_lines + 1]
     return phasors
@@ -111,7 +109,10 @@ def turning_factors(n_samples: int, rate_hz: float, frequency_hz: FloatArray) ->
 
 
 def line_phasors(tapered_samples: FloatArray, factors: ComplexArray) -> ComplexArray:
-    """Return the phasors (n_channels, n_lines) at the frequencies given to `turning_factors`."""
+    """Return the phasors (n_channels, n_lines) at the frequencies given to `turning_factors`.
+
+    `tapered_samples` are as in `bin_phasors`.
+    """
     parts: FloatArray = tapered_samples @ factors.view(np.float64)
     return parts.view(np.complex128)
 
@@ -138,15 +139,15 @@ def peak_frequency_hz(
 
     Parameters
     ----------
-    power : (n_lines,)
-    frequency_hz : (n_lines,)
-        Evenly spaced.
+    power, frequency_hz : (n_lines,)
+        Powers and evenly spaced frequencies of the bins.
     band_hz
         Lowest and highest frequency of the band.
 
     Returns
     -------
-    Frequency in Hz; None if the strongest line of the band is the flank of a line outside the band.
+    Frequency in Hz; None without bins in the band, or if its strongest is the flank of a line
+    outside the band.
     """
     inside = np.flatnonzero((frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1]))
     inside = inside[(inside > 0) & (inside < power.size - 1)]

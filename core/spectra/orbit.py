@@ -97,10 +97,7 @@ def ellipse_of(x: complex, y: complex) -> Ellipse:
 def marks_of(signal: FloatArray) -> FloatArray:
     """Return the positions at which the shaft's mark passes the key-phase pick-up.
 
-    Parameters
-    ----------
-    signal : (n_samples,)
-        Key-phase signal with rising pulses; NaN for missing samples.
+    The pulses of `signal` (n_samples,) rise when the mark passes; missing samples are NaN.
 
     Returns
     -------

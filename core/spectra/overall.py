@@ -56,11 +56,8 @@ class Overall:
 class OverallTransform:
     """Computation of the broad-band vibration of a segment of one unit.
 
-    Parameters
-    ----------
-    settings
-        Settings of the velocity band: from `velocity_low_order` times the rated speed to
-        `velocity_high_hz`, at most half the sampling rate.
+    The velocity band is from `settings.velocity_low_order` times the rated speed to
+    `settings.velocity_high_hz`, at most half the sampling rate.
     """
 
     def __init__(self, unit: Unit, settings: SegmentSettings) -> None:
@@ -142,16 +139,8 @@ def parts_of(
     """Return the first sample of each part of a segment and the first sample after it, (n_parts,).
 
     The parts cover the last hop of the segment. A part has at least `PART_TURNS` turns and may
-    therefore begin earlier.
-
-    Parameters
-    ----------
-    n_samples
-        Samples of the segment.
-    hop_samples
-        Samples between the starts of consecutive segments.
-    turn_samples
-        Samples per turn of the shaft.
+    therefore begin earlier. `n_samples` is the number of samples of the segment, `hop_samples` that
+    from one segment start to the next, and `turn_samples` that of a turn.
     """
     n_parts = int(np.clip(hop_samples / (PART_TURNS * turn_samples), 1, MAX_PARTS))
     stop = n_samples - hop_samples + hop_samples * np.arange(1, n_parts + 1) // n_parts

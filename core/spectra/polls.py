@@ -117,7 +117,7 @@ class PollTransform(KeptSegments):
             if row.channel not in known:
                 raise ValueError(f"row {row.id!r} belongs to no channel of unit {unit.id!r}")
         if len(self._row) < len(rows):
-            raise ValueError("rows must be unique")
+            raise ValueError("rows must be unique: two rows have the same channel and quantity")
         # the phase reference of a rack differs from that of padwatch's slow-roll vectors
         self._runout = {
             c.id: runout_verdict(c.slow_roll, c.probe, unit.rated_speed_rpm, has_key_phase=False)

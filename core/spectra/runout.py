@@ -16,7 +16,7 @@ from core.spectra.speed import KeyPhase, Speed, SpeedSource
 
 
 class RunoutVerdict(StrEnum):
-    """Statement that a slow-roll vector was subtracted (`APPLIED`), or the reason why not."""
+    """Verdict that a slow-roll vector was subtracted (`APPLIED`), or the reason why not."""
 
     APPLIED = "applied"
     NO_VECTOR = "no_vector"
@@ -34,7 +34,7 @@ def take_off_runout(
 ) -> tuple[complex, RunoutVerdict]:
     """Subtract the slow-roll vector from a probe's 1× phasor if the vector is applicable.
 
-    Only for 1×: runout at other orders is not measured, and the vortex has no runout.
+    Only the 1× phasor is corrected: runout at other orders is not measured.
 
     Parameters
     ----------
@@ -89,6 +89,8 @@ def without_runout(
         (n_channels,) phasors at exactly `speed`, with the phases at the segment's first sample.
     rows
         Rows of the shaft channels.
+    key_phase
+        Rotation during the segment; None without a usable key-phase, then nothing is subtracted.
 
     Returns
     -------

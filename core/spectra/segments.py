@@ -62,6 +62,8 @@ class Segment:
 
     Parameters
     ----------
+    stop_index, stop_ns
+        Index and time of the first sample after the segment; for a poll, `stop_ns` is its time.
     channel_quality
         Quality of each channel in the whole segment; for a poll, the quality of the gaps.
     usable : (n_channels,)
@@ -125,17 +127,17 @@ class Segment:
         return bool(few) and self.channel_quality[row] == CLIPPED
 
     def line_quality(self, row: int, line: int) -> Quality:
-        """Return a channel's quality at a line: only uncertain if the channel `is_grazed`."""
+        """Return a channel's quality at `ORDER1` or `VORTEX`: uncertain, not bad, if grazed."""
         return uncertain(Reason.CLIPPED) if self.is_grazed(row) else self.order_quality[line][row]
 
     @cached_property
     def spans_um_pp(self) -> tuple[Reading, ...]:
-        """Broad-band peak-to-peak displacement of each channel in µm; missing for polls."""
+        """Broad-band peak-to-peak displacement, in µm, of each channel; missing if not measured."""
         return self._of_channels(None if self.overall is None else self.overall.peak_to_peak_um)
 
     @cached_property
     def velocities_mm_s_rms(self) -> tuple[Reading, ...]:
-        """Broad-band rms velocity of each channel in mm/s; missing for polls."""
+        """Broad-band rms velocity, in mm/s, of each channel; missing for bad channels and polls."""
         return self._of_channels(None if self.overall is None else self.overall.velocity_mm_s_rms)
 
     def _of_channels(self, values: FloatArray | None) -> tuple[Reading, ...]:
@@ -173,6 +175,8 @@ class KeptSegments:
     ----------
     frequency_hz
         (n_lines,) frequencies of the bins; None for polls.
+    segments
+        Segments or polls of the averaging window, oldest first.
     """
 
     frequency_hz: FloatArray | None = None
@@ -196,7 +200,7 @@ class KeptSegments:
         self.segments.clear()
 
     def snapshot(self) -> "KeptSegments":
-        """Return a copy of the object, which later segments do not change."""
+        """Return a copy of this object, to which later segments are not added."""
         found = copy.copy(self)
         found.segments = self.segments.copy()
         return found
@@ -214,13 +218,7 @@ class KeptSegments:
 
 
 class SegmentTransform(KeptSegments):
-    """Transform of one unit's sample windows to segments, which it keeps for averaging.
-
-    Parameters
-    ----------
-    unit
-        Unit with sampling rate, channels and rated speed.
-    """
+    """Transform of one unit's sample windows to segments, which it keeps for averaging."""
 
     def __init__(self, unit: Unit, settings: SegmentSettings) -> None:
         super().__init__(

@@ -59,13 +59,11 @@ class KeyPhase:
     shaft_angle_rad
         Angle that the shaft has turned, at the first sample, since its mark passed the pick-up;
         0 to 2π.
-    speed_rpm
-        Mean speed over the segment.
+    speed_rpm, n_pulses
+        Mean speed over the segment, and number of pulses in it.
     u_relative
         Relative standard uncertainty of the speed, from the pulses' deviation from uniform
         rotation.
-    n_pulses
-        Number of pulses in the segment.
     """
 
     shaft_angle_rad: float
@@ -218,14 +216,8 @@ def _line(
 def read_key_phase(signal: FloatArray, rate_hz: float) -> KeyPhase | None:
     """Return the uniform rotation fitted to the key-phase pulses of a segment.
 
-    Parameters
-    ----------
-    signal
-        (n_samples,) with rising pulses; the mark passes at the rising edge.
-
-    Returns
-    -------
-    None if there are too few pulses, or a pulse is missing, extra or displaced.
+    The pulses of `signal` (n_samples,) rise when the mark passes. None if there are too few pulses,
+    or a pulse is missing, extra or displaced.
     """
     edges = rising_edges(signal)
     if edges.size < MIN_PULSES or _has_odd_turn(edges, signal.size):
@@ -250,11 +242,7 @@ def read_key_phase(signal: FloatArray, rate_hz: float) -> KeyPhase | None:
 
 
 def rising_edges(signal: FloatArray) -> FloatArray:
-    """Return the positions at which a signal rises through the middle of its range.
-
-    Parameters
-    ----------
-    signal : (n_samples,)
+    """Return the positions at which a signal (n_samples,) rises through the middle of its range.
 
     Returns
     -------

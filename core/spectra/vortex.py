@@ -9,7 +9,7 @@ from core.spectra.lines import peak_frequency_hz
 
 
 def roundness(spectrum: CrossSpectrum, line: int) -> float:
-    """Return the roundness of the shaft orbit at the spectral line with index `line`.
+    """Return the roundness 2 Im(S_xy) / (S_xx + S_yy), -1 to 1, of the shaft orbit at a line.
 
     1 is a forward circle, 0 a straight line or no motion, -1 a backward circle. In forward motion,
     u_y lags u_x by 90°, and the imaginary part of their cross-spectrum is positive.
@@ -26,16 +26,8 @@ def vortex_frequency_hz(
 
     The shaft's power is weighted by its coherence with the bearing's motion, corrected for the bias
     of few segments, and summed over directions and bearings. A line of one probe alone (runout,
-    mains, a loose cable) does not count.
-
-    Parameters
-    ----------
-    spectra
-        Cross-spectra of a unit's bearings, at the same lines.
-
-    Returns
-    -------
-    None if no line of the band is a peak, or if none is coherent.
+    mains, a loose cable) does not count. `spectra` are those of the unit's bearings, at the same
+    lines. None if no line of the band is a peak, or if none is coherent.
     """
     frequency_hz = spectra[0].frequency_hz
     shared = np.zeros(frequency_hz.size)

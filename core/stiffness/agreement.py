@@ -32,7 +32,7 @@ COMMON = frozenset({SHAFT_GAIN, BEARING_GAIN, BRACKET})
 
 
 def disagree(first: Budget, second: Budget) -> bool:
-    """Whether two results of one quantity differ by more than their uncertainties allow."""
+    """Return whether two results of one quantity differ by more than their uncertainties allow."""
     lines = [line for line in (*first.lines, *second.lines) if line.name not in COMMON]
     random = [line for line in lines if line.kind is Kind.RANDOM]
     spread = math.hypot(*(line.contribution for line in random))
@@ -51,15 +51,15 @@ def contradicting(
 ) -> set[str]:
     """Return the names of the quantities whose estimators disagree.
 
-    `transfer` is compared with its expected value from the film of `dynamic`; without a result of
-    `dynamic`, the `transfer` results of the lines are compared with each other.
+    The estimator `transfer` is compared with its expected value for the film that `dynamic` fitted.
+    Without such a film, the results of `transfer` at the lines are compared with each other.
 
     Parameters
     ----------
     budgets
         Uncertainty budgets of all stiffnesses and dampings, by quantity.
     found
-        Result of `dynamic`, or None.
+        Film that the estimator `dynamic` fitted; None if it has no result.
     orders
         Cross-spectrum at the lines of 1× and of the vortex.
     lines

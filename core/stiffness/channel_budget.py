@@ -28,7 +28,11 @@ from core.uncertainty import (
 def amplitude_budget(
     amplitude_um_pk: float, phasors_um_pk: ComplexArray, systematic: tuple[BudgetLine, ...]
 ) -> Budget | None:
-    """Return the uncertainty budget of the rms amplitude of phasors (n,), µm 0-pk; None if zero."""
+    """Return the uncertainty budget of the rms amplitude of phasors (n,), µm 0-pk.
+
+    The `systematic` contributions are added. None if the amplitude is zero, or the phasors have no
+    scatter.
+    """
     if amplitude_um_pk == 0.0:
         return None
     power = np.abs(phasors_um_pk) ** 2
@@ -40,8 +44,8 @@ def phase_budget(
 ) -> Budget | None:
     """Return the uncertainty budget of the phase of a mean vector, deg, not wrapped at 0 or 360°.
 
-    `vectors` are the averaged vectors (n,). The contribution of runout is its largest possible
-    rotation of the mean vector.
+    `vectors` are the averaged vectors (n,), whose mean is not 0. The contribution of runout is its
+    largest possible rotation of the mean vector. Return None if the vectors have no scatter.
     """
     mean = complex(vectors.mean())
     across = (vectors * np.conj(mean)).imag / abs(mean) ** 2
@@ -55,12 +59,8 @@ def amplitude_lines(
 ) -> tuple[BudgetLine, ...]:
     """Return the systematic contributions to an amplitude or another measure of vibration.
 
-    Parameters
-    ----------
-    place
-        Index of the channel among the bearing's four.
-    runout_um_pk
-        Largest shaft runout contained in the value.
+    `place` is the index of the channel among the four of the bearing; `runout_um_pk` is the largest
+    shaft runout contained in `value`.
     """
     if place in (BEARING_X, BEARING_Y):
         return (systematic_line(BEARING_GAIN, bearing.accuracy.bearing_gain, value),)
@@ -73,18 +73,14 @@ def amplitude_lines(
 def coherence_budget(coherence: float, n_segments: float) -> Budget | None:
     """Return the uncertainty budget of a squared coherence.
 
-    Bendat and Piersol, Random Data, 4th ed., table 9.6. The estimate is skewed, especially near 0
-    and 1 and with few segments. ``artanh γ`` is nearly normal with variance and bias
-    ``1 / (2 (n - 1))`` (Enochson and Goodman 1965); its interval is transformed to γ².
-
-    Parameters
-    ----------
-    n_segments
-        Number of independent segments.
+    The variance is that of Bendat and Piersol, Random Data, 4th ed., table 9.6. The estimate is
+    skewed, especially near 0 and 1 and with few segments. ``artanh γ`` is nearly normal with
+    variance and bias ``1 / (2 (n - 1))`` (Enochson and Goodman 1965); its interval is transformed
+    to γ². `n_segments` is the number of independent segments.
 
     Returns
     -------
-    None if the coherence is exactly 0 or 1, or with fewer than two segments.
+    The budget; None if the coherence is exactly 0 or 1, or with fewer than two segments.
     """
     if not (0.0 < coherence < 1.0 and n_segments >= 2.0):
         return None
@@ -98,9 +94,10 @@ def coherence_budget(coherence: float, n_segments: float) -> Budget | None:
 def roundness_budget(
     bearing: Bearing, roundness: float, phasors_um_pk: ComplexArray, runout_um_pk: tuple[float, ...]
 ) -> Budget | None:
-    """Return the uncertainty budget of the roundness of an orbit.
+    """Return the uncertainty budget of the roundness of an orbit (`core.spectra.vortex.roundness`).
 
-    The random part is a first-order jackknife: the influence of each segment on the roundness.
+    The random part is a first-order jackknife: the influence of each segment on the roundness. The
+    interval is limited to -1 to 1. Return None if the shaft does not move or has no scatter.
 
     Parameters
     ----------
@@ -136,7 +133,7 @@ def roundness_budget(
 def frequency_budget(
     frequency_hz: float, each_hz: FloatArray, speed: Speed | None
 ) -> Budget | None:
-    """Return the uncertainty budget of the mean frequency of a line, from scatter and speed error.
+    """Return the uncertainty budget of the mean frequency of a line; None if unknown.
 
     Parameters
     ----------

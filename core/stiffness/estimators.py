@@ -10,7 +10,7 @@ from core.quality import Reading, Reason, missing, worst
 
 @dataclass(frozen=True)
 class EstimatorEntry:
-    """Names of the quantities that an estimator reports for a direction.
+    """Names of an estimator and of the quantities that it reports for a direction.
 
     Parameters
     ----------
@@ -89,16 +89,7 @@ def preferred_stiffness(
 
     Values with few segments are not used: in a single segment, any noise is coherent. If an earlier
     estimator is not good for one of `MODEL_DOUBTS`, the chosen stiffness gets the same quality,
-    because the cause may affect both.
-
-    Parameters
-    ----------
-    readings
-        Readings by quantity.
-    preference
-        Estimators in order of preference.
-    axes
-        "xx" or "yy".
+    because the cause may affect both. `axes` is "xx" or "yy".
 
     Returns
     -------
@@ -122,21 +113,17 @@ def preferred_stiffness(
 
 
 def signs_checked(readings: Mapping[str, Reading]) -> dict[str, Reading]:
-    """Return the readings, with those of wrong sign replaced by missing ones, reason `polarity`.
+    """Return the readings by quantity; those of wrong sign are missing, with reason `polarity`.
 
     Direct stiffness and damping of a film are positive. If one transducer of a direction is
     reversed, the ratio of bearing to shaft motion changes its sign, and both become negative.
     Amplitudes, and therefore equation (5), are not affected.
 
-    A negative direct coefficient of `dynamic` removes all coefficients of its direction, because
-    either the shaft or the bearing transducer may be reversed. A negative stiffness of `transfer`
+    A value counts as negative if its 95 % interval is below zero. A negative direct coefficient of
+    the estimator `dynamic` removes all coefficients of its direction, because either the shaft or
+    the bearing transducer may be reversed. A negative stiffness of the estimator `transfer`
     removes its damping as well. A negative damping does not remove the stiffness: cross-coupling
     alone can make the damping at a single line negative.
-
-    Parameters
-    ----------
-    readings
-        Readings by quantity.
     """
     found, dynamic = dict(readings), ESTIMATORS[Estimator.DYNAMIC]
     for axes, crossed in (("xx", ("xx", "xy", "yx")), ("yy", ("yy", "yx", "xy"))):
@@ -153,20 +140,10 @@ def signs_checked(readings: Mapping[str, Reading]) -> dict[str, Reading]:
 
 
 def is_reversed(readings: Mapping[str, Reading], axes: str) -> bool | None:
-    """Whether a transducer of a direction is reversed, according to the signs of its stiffness.
+    """Return whether a transducer of a direction is reversed, by the signs of its stiffness.
 
-    The first of `dynamic`, `transfer` of the vortex and `transfer` of 1× with a result decides.
-
-    Parameters
-    ----------
-    readings
-        Readings returned by :func:`signs_checked`.
-    axes
-        "xx" or "yy".
-
-    Returns
-    -------
-    None if no estimator has a result.
+    The first estimator with a result decides: `dynamic`, then `transfer` of the vortex, then of 1×.
+    Return None without a result. `readings` are from :func:`signs_checked`; `axes` is "xx" or "yy".
     """
     for estimator in (Estimator.DYNAMIC, Estimator.TRANSFER_VORTEX, Estimator.TRANSFER_ORDER1):
         reading = readings.get(ESTIMATORS[estimator].stiffness.format(axes=axes))
@@ -178,7 +155,7 @@ def is_reversed(readings: Mapping[str, Reading], axes: str) -> bool | None:
 
 
 def _is_negative(reading: Reading) -> bool:
-    """Whether a value and its 95 % interval, if known, are below zero."""
+    """Return whether a value and its 95 % interval, if known, are below zero."""
     if reading.value is None:
         return False
     return (reading.value if reading.interval_95 is None else reading.interval_95[1]) < 0.0

@@ -16,12 +16,8 @@ MAX_RUNOUT_SHARE = 0.25
 def chance_coherence(n_segments: float) -> float:
     """Return the squared coherence that independent noise exceeds in one of a million averages.
 
-    Carter, Knapp and Nuttall (1973): without overlap, P(γ² > c) = (1 - c)^(n - 1).
-
-    Parameters
-    ----------
-    n_segments
-        Number of averaged independent segments, more than 1.
+    Carter, Knapp and Nuttall (1973): without overlap, P(γ² > c) = (1 - c)^(n - 1) for n > 1
+    independent segments.
     """
     return float(1.0 - CHANCE ** (1.0 / (n_segments - 1.0)))
 

@@ -121,11 +121,7 @@ class FilmLines:
         """Return the normal equations of both rows, (n, 2, 4, 4), and the least share of motion.
 
         The share, (n,), is the smallest fraction of motion in the weighted shaft spectra of any
-        direction of motion, for the worse row.
-
-        Parameters
-        ----------
-        weight : (n, 2, n_used)
+        direction of motion, for the worse row. The weights are (n, 2, n_used).
         """
         whole = (weight @ self._gram.swapaxes(1, 2)).reshape(-1, 2, N_UNKNOWNS, N_UNKNOWNS)
         noise = weight @ self._noise.swapaxes(1, 2)
@@ -231,12 +227,7 @@ def line_weights(
 def smoother(lines: tuple[tuple[int, ...], ...]) -> FloatArray:
     """Return matrices of a local linear regression over neighbouring lines, (n, n_used, n_used).
 
-    A row of spectra times the matrix is the smoothed row.
-
-    Parameters
-    ----------
-    lines
-        Bin indices of the lines of each bearing.
+    A row of spectra times the matrix is the smoothed row. `lines` are the bin indices by bearing.
     """
     n_used = max(map(len, lines))
     matrices = np.zeros((len(lines), n_used, n_used))

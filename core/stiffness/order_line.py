@@ -115,7 +115,7 @@ class OrderLine:
         return float(self.orders.frequency_hz[self.at])
 
     def n_segments(self, first: int, last: int) -> int:
-        """Return the number of segments, or changed polls, in which two channels are usable."""
+        """Return the number of segments, or changed polls, with channels `first`, `last` usable."""
         if self.bins is not None:
             return int(self.orders.n_segments[first, last])
         both = self.usable[:, first] & self.usable[:, last]
@@ -133,7 +133,10 @@ class OrderLine:
         return found
 
     def phases(self, quality_of: QualityOf) -> dict[str, Budgeted]:
-        """Return the phases of the mean 1× vectors, deg, positive if leading the shaft's mark."""
+        """Return the phases of the mean 1× vectors, 0° to 360°; missing without a key-phase.
+
+        A phase is the lead of the reading over the shaft's mark.
+        """
         return {
             f"{name}_phase_deg": self._phase(place, quality_of(place))
             for name, place in AMPLITUDES.items()
@@ -142,7 +145,7 @@ class OrderLine:
     def axes_quality(self, rotation_sense: int) -> Quality:
         """Return the quality of the channels' axes: not good if the whirl contradicts the rotation.
 
-        Only motion above the noise floor is checked.
+        Only motion above the noise floor is checked. `rotation_sense` is that of `Unit`.
         """
         return worst(
             self._pair_quality(x, y, rotation_sense)
@@ -335,7 +338,7 @@ class OrderLine:
         return (beside / along) ** 0.5 if along > 0.0 else 1.0
 
     def _stands_out(self, place: int) -> bool:
-        """Whether a channel's line exceeds the noise floor of the bins around it; no for polls."""
+        """Return whether a channel's line exceeds the noise floor around it; False for polls."""
         if self.bins is None:
             return False
         lines_hz = self.orders.frequency_hz
@@ -348,24 +351,18 @@ NOT_MEASURED: Budgeted = (missing(Reason.NOT_MEASURED), None)
 
 
 def marked_hz(readings: Mapping[str, Reading], line: str) -> float | None:
-    """Return the frequency in Hz at which a spectrum shows a line; None without one in its band.
-
-    Parameters
-    ----------
-    line
-        "order1" or "vortex".
-    """
+    """Return the frequency in Hz of the line "order1" or "vortex"; None if its band has none."""
     reading = readings[f"{line}_frequency_hz"]
     return None if reading.quality.reason is Reason.OUTSIDE_BAND else reading.value
 
 
 def floor_power(bins: CrossSpectrum, place: int, line_hz: float, lines_hz: FloatArray) -> float:
-    """Return the median power of a channel's bins around a line, µm².
+    """Return the median power of a channel's bins around the frequency `line_hz`, µm².
 
     Parameters
     ----------
-    bins
-        Cross-spectrum at evenly spaced frequencies.
+    bins, place
+        Cross-spectrum at evenly spaced frequencies, and index of the channel in it.
     lines_hz
         Frequencies of lines whose main lobes are excluded.
     """
@@ -381,18 +378,10 @@ def floor_power(bins: CrossSpectrum, place: int, line_hz: float, lines_hz: Float
 def other_line_hz(
     bins: CrossSpectrum, turn_hz: float, band_hz: tuple[float, float], min_line_to_floor: float
 ) -> float | None:
-    """Return the frequency in Hz of a coherent line below 1× outside the vortex band.
+    """Return the frequency in Hz of a coherent line below 1× (`turn_hz`), outside the vortex band.
 
-    Parameters
-    ----------
-    bins
-        Cross-spectrum at evenly spaced frequencies.
-    band_hz
-        Vortex band, which is left out.
-
-    Returns
-    -------
-    None if no such line exceeds the noise floor.
+    `bins` is the cross-spectrum at evenly spaced frequencies. Return None if no line outside
+    `band_hz` has more than `min_line_to_floor` times the power of the noise floor.
     """
     bin_hz = float(bins.frequency_hz[1] - bins.frequency_hz[0])
     margin_hz = (MAIN_LOBE + 1) * bin_hz

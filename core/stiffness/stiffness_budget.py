@@ -30,7 +30,7 @@ COHERENCE = "coherence not known"
 
 
 def gain_lines(value: float, accuracy: BearingAccuracy) -> tuple[BudgetLine, BudgetLine]:
-    """Return the uncertainty contributions of the gains of shaft and bearing transducers.
+    """Return the uncertainty that the gains of shaft and bearing transducers contribute to `value`.
 
     Stiffness and damping are proportional to bearing motion over shaft motion.
     """
@@ -84,6 +84,8 @@ def ratio_budget(
 
     Parameters
     ----------
+    line, shaft, bearing
+        Indices of the line and of the compared channels in the spectrum.
     n_segments
         Number of independent segments; by default the number of averaged segments.
     runout_um_pk
@@ -91,7 +93,7 @@ def ratio_budget(
 
     Returns
     -------
-    None without shaft motion, coherence or a second segment.
+    The budget; None without shaft motion, coherence or a second segment.
     """
     counted = float(spectrum.n_segments[shaft, bearing]) if n_segments is None else n_segments
     coherence = spectrum.coherence_at(line, shaft, bearing)
@@ -143,7 +145,7 @@ def polls_ratio_budget(
 
     Returns
     -------
-    None with fewer than two independent polls.
+    The budget; None with fewer than two independent polls.
     """
     if n_effective < 2.0:
         return None
@@ -185,7 +187,10 @@ def _ratio_lines(
 
 
 def changed_polls(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return a mask, (n_polls,), of the polls with an amplitude unlike that of the poll before."""
+    """Return a mask (n_polls,) of the polls whose amplitudes differ from the poll before.
+
+    The first poll counts as changed.
+    """
     changed = np.ones(shaft_um_pk.size, dtype=np.bool_)
     changed[1:] = (np.diff(shaft_um_pk) != 0.0) | (np.diff(bearing_um_pk) != 0.0)
     return changed
@@ -200,7 +205,10 @@ def mass_half_width_kg(bracket: BracketDynamics, accuracy: BearingAccuracy) -> f
 def damping_half_width_n_s_per_m(
     bracket: BracketDynamics, mass_kg: float, accuracy: BearingAccuracy
 ) -> float:
-    """Return the half-width of the error of the bracket's damping, for a bracket mass."""
+    """Return the half-width of the error of the bracket's damping.
+
+    It is `accuracy.bracket_damping` times the critical damping 2 √(k m).
+    """
     return 2.0 * accuracy.bracket_damping * math.sqrt(bracket.stiffness_n_per_m * mass_kg)
 
 
@@ -221,12 +229,12 @@ def transfer_budgets(
 
     Parameters
     ----------
-    n_segments, runout_um_pk
+    line, shaft, bearing, n_segments, runout_um_pk
         As in `ratio_budget`. The phase of runout is unknown, so it also contributes to damping.
 
     Returns
     -------
-    None without shaft motion or with fewer than two segments.
+    Both budgets; None without shaft motion or with fewer than two segments.
     """
     shaft_power = float(spectrum.power[line, shaft, bearing])
     counted = float(spectrum.n_segments[shaft, bearing]) if n_segments is None else n_segments

@@ -1,37 +1,61 @@
-"""JSON answers of the API: rendering in threads, entity tags (ETag), caches and headers."""
+"""JSON answers of the API: entity tags (ETag) by revision, cache of encoded answers, headers."""
 
 import asyncio
-import re
-from collections.abc import Callable, Hashable
-from contextvars import Context, copy_context
+import gzip
+import secrets
+from collections import OrderedDict
+from collections.abc import Awaitable, Callable, Hashable, Mapping
+from contextvars import copy_context
+from dataclasses import dataclass, field
 from hashlib import blake2b
-from typing import TypeVar
+from inspect import iscoroutinefunction
+from typing import Any, TypeVar, cast
 
-from fastapi import Response
+import pyarrow as pa
+from fastapi import Request, Response
 from pydantic import BaseModel
+from pydantic_core import to_json
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from acquisition.clock import Clock
-from service.api.values import DatedAnswer
-from service.runtime.asker import ASKER
+from service.runtime.asker import ASKER, Asker
 from service.runtime.times import rfc3339
 
-_AGE = re.compile(rb'("(?:data_)?age_s":)[0-9][0-9.e+-]*')
+T = TypeVar("T")
 
-_DIGEST_BYTES = 12
+Answer = BaseModel | Mapping[str, Any] | bytes
+Make = Callable[[], Answer] | Callable[[], Awaitable[Answer]]
+
+JSON = "application/json"
+
+MIN_ENCODED_BYTES = 1000
+"""Size from which a body is compressed, bytes; a smaller body fits into one packet anyway."""
+
+ZSTD = pa.Codec("zstd", compression_level=1)
+
+ENCODINGS: dict[str, Callable[[bytes], bytes]] = {
+    "zstd": lambda body: ZSTD.compress(body, asbytes=True),
+    "gzip": lambda body: gzip.compress(body, 1, mtime=0),
+}
+"""Content encodings, the preferred one first."""
+
+MAX_CACHE_BYTES = 16_000_000
 
 
-def digest_of(content: bytes) -> bytes:
-    """Return the digest of a JSON text, ignoring the fields ``age_s`` and ``data_age_s``."""
-    if b'age_s":' in content:  # most answers have none
-        content = _AGE.sub(rb"\1", content)
-    return blake2b(content, digest_size=_DIGEST_BYTES).digest()
+async def in_thread(do: Callable[[], T]) -> T:
+    """Call a function in a thread; return its result."""
+    return await asyncio.to_thread(do)
 
 
-def tag_of(*digests: bytes) -> str:
-    """Return the weak entity tag (RFC 9110, 8.8.3) of an answer from the digests of its parts."""
-    return f'W/"{blake2b(b"".join(digests), digest_size=_DIGEST_BYTES).hexdigest()}"'
+def json_of(answer: BaseModel | Mapping[str, Any]) -> bytes:
+    """Return an answer as JSON; NaN and infinity in a mapping become null."""
+    return to_json(answer, inf_nan_mode="null")
+
+
+def tag_of(*parts: bytes) -> str:
+    """Return the weak entity tag (RFC 9110, 8.8.3) of the content that the parts identify."""
+    return f'W/"{blake2b(b" ".join(parts), digest_size=12).hexdigest()}"'
 
 
 def is_known(tag: str, if_none_match: str | None) -> bool:
@@ -48,186 +72,187 @@ def is_known(tag: str, if_none_match: str | None) -> bool:
     return "*" in named or tag.removeprefix("W/") in named
 
 
-T = TypeVar("T")
-
-JSON = "application/json"
-
-
-async def in_thread(do: Callable[[], T]) -> T:
-    """Call a function in a thread; return its result."""
-    return await asyncio.to_thread(do)
-
-
-async def rendered(make: Callable[[], BaseModel]) -> Response:
-    """Build an API model in a thread; return a JSON response with its entity tag.
-
-    Parameters
-    ----------
-    make
-        Function that builds the model; may block.
-    """
-    return await asyncio.to_thread(lambda: _response(*_content(make())))
+def encoding_of(headers: Headers) -> str:
+    """Return the preferred content encoding that a client accepts; empty for none."""
+    accepted = {}
+    for each in headers.get("accept-encoding", "").lower().split(","):
+        name, _, quality = each.replace(" ", "").partition(";q=")
+        accepted[name] = quality.strip("0.") != "" if quality else True
+    return next((name for name in ENCODINGS if accepted.get(name, False)), "")
 
 
-async def rendered_now(make: Callable[[], DatedAnswer]) -> Response:
-    """Build an API model in a thread; return a JSON response whose entity tag ignores `time`.
+def encoded(body: bytes, encoding: str) -> tuple[bytes, dict[str, str]]:
+    """Return a body in a content encoding and its headers; a small body remains as it is."""
+    if not encoding or len(body) < MIN_ENCODED_BYTES:
+        return body, {}
+    return ENCODINGS[encoding](body), {"Content-Encoding": encoding}
+
+
+@dataclass
+class _Making:
+    """Answer that is being made for one or several clients.
 
     Parameters
     ----------
-    make
-        Function that builds the model; may block. Its field `time` must precede nested times.
-    """
-    return await asyncio.to_thread(lambda: _dated(make()))
-
-
-class Renderings:
-    """Cache of large JSON answers that seldom change, with eviction of the least recently used.
-
-    Parameters
-    ----------
-    n_kept
-        Maximum number of cached answers.
+    asker
+        Common client of the store reads, which are cancelled when the last client has gone.
     """
 
-    def __init__(self, n_kept: int = 16) -> None:
-        self._n_kept = n_kept
-        self._kept: dict[Hashable, tuple[object, bytes, str]] = {}
+    task: asyncio.Task[Response]
+    asker: Asker
+    n_clients: int = field(default=0)
 
-    async def of(self, key: Hashable, source: T, make: Callable[[T], BaseModel]) -> Response:
-        """Return the JSON response for a key, rendered again if `source` is a new object.
+
+class Answers:
+    """Cache of encoded answers, by path, query, revision and content encoding.
+
+    If the bodies exceed `max_bytes` together, the least recently used answers are dropped.
+    Concurrent requests for the same answer wait for one computation of it.
+    """
+
+    def __init__(self, max_bytes: int = MAX_CACHE_BYTES) -> None:
+        self.started = secrets.token_hex(4)
+        """Identifier of this start of the process; revisions of other starts are not comparable."""
+        self._max_bytes, self._n_bytes = max_bytes, 0
+        self._kept: OrderedDict[tuple[str, str], Response] = OrderedDict()
+        self._making: dict[tuple[str, str], _Making] = {}
+
+    async def of(
+        self,
+        request: Request,
+        revision: Hashable,
+        make: Make,
+    ) -> Response:
+        """Return the answer to a request; status 304 at once if the client has cached it.
 
         Parameters
         ----------
-        source
-            Object from which the answer is made; compared by identity.
+        revision
+            Value that changes whenever the answer changes; its text identifies it.
         make
-            Function that builds the API model from `source` in a thread; may block.
+            Function that returns the answer; bytes are JSON. It is called in a thread and may
+            block, or is a coroutine function.
         """
-        kept = self._kept.pop(key, None)
-        if kept is None or kept[0] is not source:
-            kept = (source, *await in_thread(lambda: _content(make(source))))
-        self._kept[key] = kept
-        while len(self._kept) > self._n_kept:
-            del self._kept[next(iter(self._kept))]
-        return _response(*kept[1:])
+        url = f"{request.scope['path']}?{request.scope['query_string'].decode('latin-1')}"
+        tag = tag_of(self.started.encode(), url.encode(), repr(revision).encode())
+        if is_known(tag, request.headers.get("if-none-match")):
+            return Response(status_code=304, headers={"ETag": tag})
+        key = (tag, encoding_of(request.headers))
+        if (kept := self._kept.get(key)) is not None:
+            self._kept.move_to_end(key)
+            return kept
+        return await self._made(key, make)
+
+    async def _made(self, key: tuple[str, str], make: Make) -> Response:
+        making = self._making.get(key)
+        if making is None:
+            asker, context = Asker(), copy_context()
+            context.run(ASKER.set, asker)
+            task = asyncio.create_task(self._make(key, make), context=context)
+            making = self._making[key] = _Making(task, asker)
+        making.n_clients += 1
+        try:
+            # a client that disconnects must not cancel the answer of other clients
+            return await asyncio.shield(making.task)
+        finally:
+            making.n_clients -= 1
+            making.asker.has_gone = making.n_clients == 0
+
+    async def _make(self, key: tuple[str, str], make: Make) -> Response:
+        tag, encoding = key
+
+        def answer(made: Answer) -> Response:
+            body, headers = encoded(made if isinstance(made, bytes) else json_of(made), encoding)
+            return Response(body, media_type=JSON, headers={"ETag": tag, **headers})
+
+        try:
+            if iscoroutinefunction(make):
+                response = await asyncio.to_thread(answer, await make())
+            else:
+                response = await asyncio.to_thread(lambda: answer(cast("Answer", make())))
+        finally:
+            del self._making[key]
+        self._keep(key, response)
+        return response
+
+    def _keep(self, key: tuple[str, str], response: Response) -> None:
+        self._kept[key] = response
+        self._n_bytes += len(response.body)
+        while self._n_bytes > self._max_bytes:
+            _, dropped = self._kept.popitem(last=False)
+            self._n_bytes -= len(dropped.body)
 
 
-def _response(content: bytes, tag: str) -> Response:
-    return Response(content, media_type=JSON, headers={"ETag": tag})
-
-
-def _content(model: BaseModel) -> tuple[bytes, str]:
-    content = model.model_dump_json().encode()
-    return content, tag_of(digest_of(content))
-
-
-def _dated(model: DatedAnswer) -> Response:
-    content = model.model_dump_json().encode()
-    undated = content.replace(f'"time":"{model.time}"'.encode(), b"", 1)
-    return _response(content, tag_of(digest_of(undated)))
-
-
-FRESH_S = 1.0
-"""Maximum age of a shared answer, s; some states change with time without a new revision."""
-
-
-class SharedAnswer:
-    """Cached JSON answer of one route, shared by all requests.
-
-    Parameters
-    ----------
-    make
-        Function that builds the API model in a thread; may block.
-    revision
-        Function that returns a number; a new number makes the cached answer outdated.
-    """
-
-    def __init__(
-        self, make: Callable[[], DatedAnswer], revision: Callable[[], int], clock: Clock
-    ) -> None:
-        self._make, self._revision, self._clock = make, revision, clock
-        self._made: tuple[int, float, asyncio.Task[Response]] | None = None
-
-    async def answer(self) -> Response:
-        """Return a response with the cached answer; render the answer first if it is outdated."""
-        revision, now_s = self._revision(), self._clock.monotonic_s()
-        if self._made is None or self._made[0] != revision or now_s - self._made[1] >= FRESH_S:
-            making = asyncio.create_task(rendered_now(self._make), context=_shared_context())
-            self._made = (revision, now_s, making)
-        # a client that disconnects must not cancel the answer of other clients
-        shared = await asyncio.shield(self._made[2])
-        return _response(bytes(shared.body), shared.headers["etag"])
-
-
-def _shared_context() -> Context:
-    """Return a copy of the context variables without the client, which may disconnect."""
-    context = copy_context()
-    context.run(ASKER.set, None)
-    return context
+async def rendered(make: Callable[[], BaseModel]) -> Response:
+    """Return the JSON of a model that `make` builds in a thread; `AnswerHeaders` adds the tag."""
+    return Response(await asyncio.to_thread(lambda: json_of(make())), media_type=JSON)
 
 
 TIME_HEADER = "Padwatch-Time"
-"""Name of the header with the time of the answer, for correcting ages in cached answers."""
+"""Name of the header with the time of the answer, from which clients compute ages."""
 
 CACHE_CONTROL = "private, no-cache"
 """Value of the header Cache-Control: private caches only, revalidation before each use."""
 
 
-class Revalidation:
-    """ASGI middleware that adds missing entity tags, and answers 304 for a cached answer."""
+class AnswerHeaders:
+    """ASGI middleware that adds the time to API answers, and tags and compresses JSON answers.
+
+    An answer without an entity tag is tagged by its content.
+    """
 
     def __init__(self, app: ASGIApp, clock: Clock) -> None:
         self._app, self._clock = app, clock
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request; add caching headers and the entity tag to its answer."""
+        """Forward a request; complete its answer."""
         if scope["type"] != "http" or not scope["path"].startswith("/api/"):
             await self._app(scope, receive, send)
             return
-        answer = _Answer(send, self._clock, scope)
-        await self._app(scope, receive, answer.send)
+        head: Message | None = None
+        asked = Headers(scope=scope)
+
+        async def completed(message: Message) -> None:
+            nonlocal head
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                headers[TIME_HEADER] = rfc3339(self._clock.now_ns())
+                if scope["method"] == "GET" and "etag" in headers:
+                    _add_cache_headers(headers)
+                elif scope["method"] == "GET" and _is_whole_json(message):
+                    head = message  # its tag depends on the body
+                    return
+            elif head is not None:
+                whole, head = head, None
+                message = _tagged(whole, message, asked)
+                await send(whole)
+            await send(message)
+
+        await self._app(scope, receive, completed)
 
 
-class _Answer:
-    """Buffer for the head of an answer, which is sent when the body has determined the tag."""
+def _add_cache_headers(headers: MutableHeaders) -> None:
+    headers["Cache-Control"] = CACHE_CONTROL
+    headers.add_vary_header("Accept, Accept-Encoding")
 
-    def __init__(self, send: Send, clock: Clock, scope: Scope) -> None:
-        self._send, self._clock = send, clock
-        self._is_read = scope["method"] == "GET"
-        self._named = Headers(scope=scope).get("if-none-match")
-        self._head: Message | None = None
 
-    async def send(self, message: Message) -> None:
-        if message["type"] == "http.response.start":
-            MutableHeaders(scope=message)[TIME_HEADER] = rfc3339(self._clock.now_ns())
-            if self._is_read and _is_whole_json(message):
-                self._head = message
-                return
-        elif self._head is not None:
-            head, self._head = self._head, None
-            message = self._judged(head, message)
-            await self._send(head)
-        await self._send(message)
-
-    def _judged(self, head: Message, body: Message) -> Message:
-        """Complete `head`; return the body: empty, with status 304, if the client has cached it."""
-        headers = MutableHeaders(scope=head)
-        if "ETag" not in headers:
-            headers["ETag"] = tag_of(digest_of(body.get("body", b"")))
-        headers["Cache-Control"] = CACHE_CONTROL
-        headers.add_vary_header("Accept")
-        if not is_known(headers["ETag"], self._named):
-            return body
-        head["status"] = 304
-        for name in ("Content-Length", "Content-Type"):
-            del headers[name]
+def _tagged(head: Message, message: Message, asked: Headers) -> Message:
+    """Complete the head of an answer; return its body: encoded, or empty if the client has it."""
+    headers, body = MutableHeaders(scope=head), message.get("body", b"")
+    headers["ETag"] = tag_of(body)
+    _add_cache_headers(headers)
+    if is_known(headers["ETag"], asked.get("if-none-match")):
+        head["status"], body = 304, b""
+        del headers["Content-Length"], headers["Content-Type"]
         return {"type": "http.response.body", "body": b""}
+    body, added = encoded(body, encoding_of(asked))
+    headers.update(added | {"Content-Length": str(len(body))})
+    return {"type": "http.response.body", "body": body}
 
 
 def _is_whole_json(head: Message) -> bool:
     headers = Headers(scope=head)
-    is_json = headers.get("content-type") == "application/json"
-    return head["status"] == 200 and is_json and "content-length" in headers
+    return head["status"] == 200 and headers.get("content-type") == JSON
 
 
 ORIGIN_HEADER, EDITION_HEADER = "Padwatch-Origin", "Padwatch-Edition"

@@ -1,7 +1,5 @@
 """HTTP application of the service: routers, middleware, and the OpenAPI document."""
 
-import asyncio
-import json
 from collections.abc import Mapping
 from importlib.metadata import version
 from threading import Lock
@@ -9,22 +7,22 @@ from typing import Any
 
 from fastapi import Depends, FastAPI, Request, Response
 
-from service.api.answers import ORIGIN_HEADER, Revalidation, digest_of, tag_of
+from service.api.answers import AnswerHeaders, Answers
 from service.api.auth.accounts import account_router, key_router
 from service.api.auth.authenticator import Authenticator
 from service.api.auth.declared import Declared, declared
 from service.api.auth.gate import Gate, require_declared
-from service.api.auth.refusals import AuditTrail, Refusals
+from service.api.auth.refusals import AuditTrail
 from service.api.auth.sessions import session_router
 from service.api.context import Context
 from service.api.health import health_router, metrics_router
-from service.api.http.middleware import AddedHeaders
-from service.api.openapi import describe_access, describe_answers
+from service.api.openapi import describe_access, describe_answers, operation_id
 from service.api.problems import (
     EVERY_OPERATION,
     install_problem_handlers,
     refuse_unknown_parameters,
 )
+from service.api.request_metrics import RequestMetrics, TimedRequests
 from service.api.routes.alarm_rates import alarm_rate_router
 from service.api.routes.alarms import alarm_router, operation_router
 from service.api.routes.audit import audit_router
@@ -39,7 +37,6 @@ from service.api.routes.overview import overview_router
 from service.api.routes.plant import plant_router
 from service.api.routes.recordings import recording_router
 from service.api.routes.references import reference_router
-from service.api.routes.shaft_centre import centre_router
 from service.api.routes.spectra import spectra_router
 from service.api.routes.trends import trend_router
 
@@ -49,15 +46,16 @@ class GuardedApi(FastAPI):
 
     Parameters
     ----------
+    answers
+        Cache of the OpenAPI document.
     options
         Keyword arguments of `FastAPI`.
     """
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, answers: Answers, **options: Any) -> None:
         super().__init__(dependencies=[Depends(require_declared)], **options)
         self._declared: Mapping[str, Declared] = {}
-        self._describing, self._rendering = Lock(), Lock()
-        self._rendered: tuple[bytes, str] | None = None
+        self._answers, self._describing = answers, Lock()
 
     def setup(self) -> None:
         """Add the route of the OpenAPI document, which is rendered once, not for each request."""
@@ -89,32 +87,14 @@ class GuardedApi(FastAPI):
         Concurrent callers wait until the document is complete.
         """
         with self._describing:
-            if self.openapi_schema is not None:
-                return self.openapi_schema
-            document: dict[str, Any] = super().openapi()
-            describe_access(document, self.declared)
-            describe_answers(document)
-            return document
+            if self.openapi_schema is None:
+                document: dict[str, Any] = super().openapi()
+                describe_access(document, self.declared)
+                describe_answers(document)
+            return self.openapi_schema or {}
 
-    def rendered(self) -> tuple[bytes, str]:
-        """Return the OpenAPI document as JSON, and its entity tag; the first call takes 0.3 s."""
-        with self._rendering:
-            if self._rendered is None:
-                document = _json(self.openapi())
-                self._rendered = document, tag_of(digest_of(document))
-            return self._rendered
-
-    async def _published(self, _: Request) -> Response:
-        # render in a thread, not on the event loop
-        rendered = self._rendered
-        if rendered is None:
-            rendered = await asyncio.to_thread(self.rendered)
-        document, tag = rendered
-        return Response(document, media_type="application/json", headers={"ETag": tag})
-
-
-def _json(document: dict[str, Any]) -> bytes:
-    return json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()
+    async def _published(self, request: Request) -> Response:
+        return await self._answers.of(request, 0, self.openapi)
 
 
 DESCRIPTION = """
@@ -128,6 +108,7 @@ Times are UTC, RFC 3339. Errors are problem documents (RFC 9457).
 def create_app(context: Context) -> GuardedApi:
     """Return the application with all routes except those of dashboard and evidence reports."""
     app = GuardedApi(
+        context.answers,
         title="padwatch",
         version=version("padwatch"),
         description=DESCRIPTION,
@@ -135,41 +116,43 @@ def create_app(context: Context) -> GuardedApi:
         docs_url=None,  # FastAPI's pages load scripts from other sites
         redoc_url=None,
         responses=EVERY_OPERATION,
+        generate_unique_id_function=operation_id,
     )
-    app.add_middleware(Revalidation, clock=context.clock)
-    authenticator = context.access or Authenticator(context.store.access, context.clock)
+    app.state.clock = context.clock
+    app.add_middleware(AnswerHeaders, clock=context.clock)
+    authenticator = context.access
     app.add_gate(authenticator)
-    app.add_middleware(AddedHeaders, headers=[(ORIGIN_HEADER, context.origin.value)])
-    refusals = context.refusals or Refusals(context.store.audit, context.clock)
-    app.add_middleware(AuditTrail, refusals=refusals, clock=context.clock)
+    app.add_middleware(AuditTrail, refusals=authenticator.refusals, clock=context.clock)
     install_problem_handlers(app)
     for router in (
-        health_router(context),
+        # routes are tried in this order: first those that every open page polls
         overview_router(context),
-        plant_router(context),
-        channel_router(context),
+        alarm_rate_router(context),
+        alarm_router(context),
         bearing_router(context),
         trend_router(context),
+        health_router(context),
+        plant_router(context),
+        channel_router(context),
         spectra_router(context),
         motion_router(context),
-        centre_router(context),
         reference_router(context),
         film_router(context),
         film_history_router(context),
         baseline_router(context),
         baseline_action_router(context),
-        alarm_rate_router(context),
-        alarm_router(context),
         operation_router(context),
         recording_router(context),
         recorded_motion_router(context),
         delivery_router(context),
         audit_router(context),
-        session_router(context, authenticator),
+        session_router(authenticator),
         account_router(authenticator),
         key_router(context, authenticator),
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
     if context.metrics is not None:
-        app.include_router(metrics_router(context.metrics))
+        own = RequestMetrics()
+        app.include_router(metrics_router(context.metrics, own))
+        app.add_middleware(TimedRequests, metrics=own)
     return app

@@ -8,22 +8,22 @@ from typing import TextIO
 from service.runtime.times import rfc3339
 from service.store.access.audit_entries import AuditEntry
 
-HEADER = ("time", *(field.name for field in fields(AuditEntry)))
+HEADER = ("time", "chain", *(field.name for field in fields(AuditEntry)))
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "|", "%", "'", "＝", "＋", "－", "＠")
 """First characters of spreadsheet formulas, and the single quote to make escaping reversible."""
 
 
-def write_csv(file: TextIO, entries: Iterable[AuditEntry]) -> int:
-    """Write audit entries to a CSV file, one row per entry; return the number of entries.
+def write_csv(file: TextIO, entries: Iterable[tuple[str, AuditEntry]]) -> int:
+    """Write audit entries with the names of their chains to an open CSV file; return their number.
 
     Text that a spreadsheet could interpret as a formula is prefixed with a single quote.
     """
     rows = csv.writer(file, quoting=csv.QUOTE_ALL, lineterminator="\r\n")
     rows.writerow(HEADER)
     n_entries = 0
-    for entry in entries:
-        rows.writerow([rfc3339(entry.time_ns), *map(_cell, astuple(entry))])
+    for chain, entry in entries:
+        rows.writerow([rfc3339(entry.time_ns), chain, *map(_cell, astuple(entry))])
         n_entries += 1
     return n_entries
 

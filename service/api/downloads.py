@@ -30,7 +30,7 @@ class Downloads:
             return await asyncio.to_thread(do)
 
     def require_room(self) -> None:
-        """Check that a further download is allowed.
+        """Check that fewer than `MAX_DOWNLOADS` downloads are in progress; reserve no place.
 
         Raises
         ------
@@ -38,7 +38,7 @@ class Downloads:
             If `MAX_DOWNLOADS` downloads are in progress.
         """
         if self._n >= MAX_DOWNLOADS:
-            raise TooManyDownloadsError(f"{MAX_DOWNLOADS} downloads are in progress")
+            raise TooManyDownloadsError(f"the maximum of {MAX_DOWNLOADS} downloads is reached")
 
     async def download(self, pieces: Generator[bytes, None, None]) -> AsyncIterator[bytes]:
         """Return an iterator over the pieces of a download; the first piece is produced at once.

@@ -1,15 +1,15 @@
 """Routes for liveness, readiness and metrics of the service."""
 
 from collections.abc import Awaitable, Callable
-from typing import Annotated, Literal
+from typing import Literal
 
-from fastapi import APIRouter, Header, Response
-from prometheus_client.registry import Collector
+from fastapi import APIRouter, Response
 
 from service.api.auth.declared import OPEN, needs
 from service.api.context import Context
+from service.api.request_metrics import RequestMetrics
 from service.api.values import ApiModel
-from service.runtime.metrics import OPEN_METRICS, rendered
+from service.runtime.metrics import TEXT
 from service.store.access.identities import Permission
 
 
@@ -45,11 +45,9 @@ def health_router(context: Context) -> APIRouter:
         checks = {f"unit {unit}": context.live.status(unit).state.value for unit in context.units}
         checks["store"] = context.live.store_error or "ok"
         checks["database"] = context.store.kind
-        if context.space is not None:
-            checks["disk"] = str(context.space)
-        checks["stored data"] = context.stored_trouble() or "ok"
-        checks |= context.checks()
-        loops = context.loops()
+        plant = context.plant()
+        checks |= {**plant.checks, **context.checks()}
+        loops = {**plant.loops, **context.loops()}
         checks |= {f"loop {name}": trouble or "alive" for name, trouble in loops.items()}
         ready = context.live.store_error is None and not any(loops.values())
         response.status_code = 200 if ready else 503
@@ -59,27 +57,26 @@ def health_router(context: Context) -> APIRouter:
 
 
 EXAMPLE = """\
-# HELP padwatch_link_connected 1 while the device is connected.
+# HELP padwatch_link_connected This is 1 while the device of the unit is connected.
 # TYPE padwatch_link_connected gauge
 padwatch_link_connected{unit="U1"} 1.0
 """
 
 ANSWER = {
-    "description": "Metrics in Prometheus' text format, or in OpenMetrics' where that is accepted",
-    "content": {
-        kind: {"schema": {"type": "string"}, "example": EXAMPLE}
-        for kind in ("text/plain", OPEN_METRICS.partition(";")[0])
-    },
+    "description": "Metrics in the Prometheus text format",
+    "content": {"text/plain": {"schema": {"type": "string"}, "example": EXAMPLE}},
 }
 
 
-def metrics_router(look: Callable[[], Awaitable[Collector]]) -> APIRouter:
+def metrics_router(look: Callable[[], Awaitable[bytes]], own: RequestMetrics) -> APIRouter:
     """Return the router for Prometheus metrics.
 
     Parameters
     ----------
     look
-        Function that collects all metrics.
+        Function that returns the metrics of measuring in the Prometheus text format.
+    own
+        Metrics of this process, which are appended.
     """
     router = APIRouter(tags=["health"], dependencies=[needs(Permission.READ)])
 
@@ -89,13 +86,9 @@ def metrics_router(look: Callable[[], Awaitable[Collector]]) -> APIRouter:
         response_class=Response,
         responses={200: ANSWER},
     )
-    async def metrics(
-        accept: Annotated[
-            str, Header(description="Accepted formats.", examples=["text/plain"])
-        ] = "text/plain",
-    ) -> Response:
-        """Return metrics of samples, links, results, alarms, store and deliveries."""
-        body, kind = rendered(await look(), accept)
-        return Response(body, headers={"content-type": kind, "cache-control": "no-store"})
+    async def metrics() -> Response:
+        """Return metrics of samples, links, results, films, alarms, store, deliveries, requests."""
+        headers = {"content-type": TEXT, "cache-control": "no-store"}
+        return Response(await look() + own.text, headers=headers)
 
     return router

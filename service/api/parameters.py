@@ -3,7 +3,7 @@
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
-from fastapi import Depends, Query
+from fastapi import Depends, Query, Request
 from pydantic import BeforeValidator
 
 from core.units import NS_PER_S
@@ -16,7 +16,7 @@ FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
 
 
 def written_as_date(text: object) -> object:
-    """Return the argument unchanged; reject a bare number, which is ambiguous as a time.
+    """Return the written time unchanged; a bare number is rejected, since its unit is unknown.
 
     Raises
     ------
@@ -82,11 +82,43 @@ def duration(longest_s: float, description: str, **options: Any) -> Any:
     return Query(gt=0.0, le=longest_s, allow_inf_nan=False, description=description, **options)
 
 
+SECONDS = {"min": 60, "h": 3600, "d": 86_400}
+MINUTE_NS = 60 * NS_PER_S
+
+
 async def time_range(
-    start: Annotated[Moment, _START], end: Annotated[Moment, _END]
+    request: Request,
+    start: Annotated[Moment | None, _START] = None,
+    end: Annotated[Moment | None, _END] = None,
+    last: Annotated[
+        str | None,
+        Query(
+            pattern=r"^[1-9][0-9]{0,4}(min|h|d)$",
+            description="Length of the range in place of start: minutes, hours or days.",
+            examples=["24h"],
+        ),
+    ] = None,
 ) -> tuple[int, int]:
-    """Return start and end of the requested time range, nanoseconds since 1970 UTC."""
-    start_ns, end_ns = ns_from_datetime(start, "start"), ns_from_datetime(end, "end")
+    """Return start and end of the requested time range, nanoseconds since 1970 UTC.
+
+    Without an end, the range ends at the next whole minute, so that answers can be cached.
+
+    Raises
+    ------
+    ProblemError
+        Unless exactly one of `start` and `last` is given, or if the start is not before the end.
+    """
+    if (start is None) == (last is None):
+        detail = "one of start and last, such as last=24h, is required"
+        raise ProblemError(422, "Wrong parameter", detail, "start")
+    now_ns = request.app.state.clock.now_ns()
+    end_ns = ns_from_datetime(end, "end") if end else (now_ns // MINUTE_NS + 1) * MINUTE_NS
+    if start is not None:
+        start_ns = ns_from_datetime(start, "start")
+    else:
+        text = str(last)
+        number = text.rstrip("minhd")
+        start_ns = end_ns - int(number) * SECONDS[text.removeprefix(number)] * NS_PER_S
     require_order(start_ns, end_ns)
     return start_ns, end_ns
 
@@ -94,7 +126,7 @@ async def time_range(
 async def optional_time_range(
     start: Annotated[Moment | None, _START] = None, end: Annotated[Moment | None, _END] = None
 ) -> tuple[int, int]:
-    """Return start and end of the requested time range, ns since 1970 UTC; unlimited by default."""
+    """Check and return start and end of a time range, ns since 1970 UTC; unlimited by default."""
     start_ns = ns_from_datetime(start, "start") if start else -(2**63)
     end_ns = ns_from_datetime(end, "end") if end else 2**63 - 1
     require_order(start_ns, end_ns)
@@ -105,23 +137,23 @@ async def eccentricity_range(
     eccentricity_min: Annotated[float | None, _bound("Minimum eccentricity ratio.", 0.2)] = None,
     eccentricity_max: Annotated[float | None, _bound("Maximum eccentricity ratio.", 0.4)] = None,
 ) -> ValueRange:
-    """Return the requested range of eccentricity ratios; unlimited by default."""
+    """Check and return the requested range of eccentricity ratios; unlimited by default."""
     return _ordered(eccentricity_min, eccentricity_max, "eccentricity_min")
 
 
 async def oil_temperature_range(
-    oil_temperature_min: Annotated[float | None, _bound("Lowest, °C.", 40.0)] = None,
-    oil_temperature_max: Annotated[float | None, _bound("Highest, °C.", 50.0)] = None,
+    oil_temperature_min: Annotated[float | None, _bound("Minimum temperature, °C.", 40.0)] = None,
+    oil_temperature_max: Annotated[float | None, _bound("Maximum temperature, °C.", 50.0)] = None,
 ) -> ValueRange:
-    """Return the requested range of oil temperatures, °C; unlimited by default."""
+    """Check and return the requested range of oil temperatures, °C; unlimited by default."""
     return _ordered(oil_temperature_min, oil_temperature_max, "oil_temperature_min")
 
 
 async def attitude_range(
-    attitude_min: Annotated[float | None, _bound("Lowest attitude angle, degrees.", 40.0)] = None,
-    attitude_max: Annotated[float | None, _bound("Highest, degrees.", 50.0)] = None,
+    attitude_min: Annotated[float | None, _bound("Minimum attitude angle, degrees.", 40.0)] = None,
+    attitude_max: Annotated[float | None, _bound("Maximum, degrees.", 50.0)] = None,
 ) -> ValueRange:
-    """Return the requested range of attitude angles, degrees; unlimited by default."""
+    """Check and return the requested range of attitude angles, degrees; unlimited by default."""
     return _ordered(attitude_min, attitude_max, "attitude_min")
 
 
@@ -134,7 +166,7 @@ Attitude = Annotated[ValueRange, Depends(attitude_range)]
 
 def _ordered(low: float | None, high: float | None, parameter: str) -> ValueRange:
     if low is not None and high is not None and low > high:
-        detail = f"{parameter} {low:g} must not be above its maximum {high:g}"
+        detail = f"{parameter} must be at most {high:g}, the requested maximum, got {low:g}"
         raise ProblemError(422, "Wrong parameter", detail, parameter)
     return ValueRange(low, high)
 
@@ -150,7 +182,7 @@ OnlyUnit = Annotated[
 
 
 def only(description: str, example: str, max_length: int | None = None) -> Any:
-    """Return the declaration of a query parameter that selects entries with a given text."""
+    """Return the declaration of a query parameter that limits the answer to one `description`."""
     return Query(max_length=max_length, description=f"Only this {description}.", examples=[example])
 
 

@@ -15,6 +15,9 @@ from service.api.auth.declared import allowed_methods
 from service.live.commands import CommandFailedError, NotAvailableError
 from service.store.port import QueryTooLargeError, StoreError
 
+DETAIL = "detail"
+"""Key under which the ``state`` of an ASGI scope contains the detail of a problem document."""
+
 MEDIA_TYPE = "application/problem+json"
 
 MAX_BYTES = 2048
@@ -24,6 +27,8 @@ MAX_MISTAKES = 8
 """Maximum number of wrong parameters in a problem document."""
 
 SCHEMAS = "#/components/schemas/"
+
+STORE_FAILS = "the store cannot be read now; try again, or see the log of the service"
 
 WORDS = {
     403: "Not allowed, or requested by a page of another site",
@@ -76,8 +81,8 @@ class ProblemError(Exception):
 
     Parameters
     ----------
-    status
-        HTTP status of the answer.
+    title, detail
+        Kind of the problem, and description of this problem.
     parameter
         Name of the wrong parameter; None if no single parameter is wrong.
     headers
@@ -126,19 +131,27 @@ def problem_responses(
 
 
 async def refuse_unknown_parameters(request: Request) -> None:
-    """Reject a request with an unknown query parameter, which FastAPI would ignore.
+    """Reject a body or query parameter that the route does not take, and FastAPI would ignore.
 
     Raises
     ------
     ProblemError
-        For the first unknown parameter; the message lists the known parameters.
+        For a body, or for the first unknown parameter; the message lists the known parameters.
     """
-    operation = f"{request.method} {request.scope['route'].path}"
+    route = request.scope["route"]
+    if route.body_field is None and _has_body(request):
+        raise ProblemError(400, "Unexpected body", "this request takes no body")
+    operation = f"{request.method} {route.path}"
     known = request.app.declared[operation].query_parameters
     for name in request.query_params:
         if name not in known:
             detail = f"unknown parameter {name!r}; known parameters: {', '.join(known) or 'none'}"
             raise ProblemError(422, "Wrong parameter", detail, name)
+
+
+def _has_body(request: Request) -> bool:
+    headers = request.headers
+    return headers.get("content-length", "0") != "0" or "transfer-encoding" in headers
 
 
 def problem_schemas() -> dict[str, Any]:
@@ -186,7 +199,7 @@ def install_problem_handlers(app: FastAPI) -> None:
     @app.exception_handler(StoreError)
     async def _store(request: Request, error: StoreError) -> Response:
         log.error("database query failed", path=request.url.path, reason=str(error))
-        return _render(request, 503, "Store not available", "the store cannot be read now")
+        return _render(request, 503, "Store not available", STORE_FAILS)
 
     @app.exception_handler(NotAvailableError)
     async def _not_here(request: Request, error: NotAvailableError) -> Response:
@@ -199,7 +212,9 @@ def install_problem_handlers(app: FastAPI) -> None:
     @app.exception_handler(Exception)
     async def _bug(request: Request, _: Exception) -> Response:
         """Return a problem of status 500 without details; the server logs the traceback."""
-        return _render(request, 500, "Internal error", "padwatch has failed; see the log")
+        return _render(
+            request, 500, "Internal error", "padwatch has failed; see the log of the service"
+        )
 
 
 def problem_answer(request: Request, error: ProblemError) -> Response:
@@ -226,11 +241,12 @@ def _render(
     errors: Sequence[Mistake] = (),
     headers: Mapping[str, str] | None = None,
 ) -> Response:
+    request.scope.setdefault("state", {})[DETAIL] = detail  # for the audit entry of a refusal
     problem = Problem(
         title=title,
         status=status,
         detail=detail,
-        instance=request.url.path,
+        instance=request.scope["path"],
         errors=list(errors),
     )
     return Response(_bounded(problem), status, headers, media_type=MEDIA_TYPE)

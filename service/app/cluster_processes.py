@@ -2,38 +2,38 @@
 
 import asyncio
 import socket
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 
-from prometheus_client.metrics_core import Metric
 from prometheus_client.process_collector import ProcessCollector
 
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from core.monitor.monitor import UnitMonitor
-from service.app.health_page import Health, health_server
-from service.app.measuring_process import Analysis, analysis_on, reporting_loops
+from service.app.health_page import Health, HealthServer
+from service.app.measuring_process import Analysis, ProcessContext, analysis_on, reporting_loops
 from service.app.notifications import router_of
-from service.app.process import ProcessContext, Supervision, live_view, start_loops
+from service.app.process import Supervision, run_until_stopped, start_loops
 from service.app.service_health import recording_error
 from service.app.storage import database_path, open_store
-from service.cluster.consumer import Consumer, consumer_metrics
+from service.cluster.consumer import Consumer, add_consumer
 from service.cluster.ownership import Holds, Leadership, Partition
 from service.cluster.progress import UnitProgress, memories_of, usable
-from service.cluster.publisher import Publisher, publisher_metrics
+from service.cluster.publisher import Publisher, add_publisher
 from service.cluster.session import identity_of
 from service.cluster.silent_units import SilenceWatch, SilentUnits, silences_s
-from service.live.live_view import LiveView
+from service.live.alarm_list import SHARED
 from service.measuring.acquirer import Acquirer, Bus
 from service.measuring.analyser import BUS_CAPACITY
-from service.measuring.metrics import store_info
-from service.measuring.reported_alarms import SHARED
+from service.measuring.live_view import LiveView
 from service.measuring.service_alarms import StreamStatus
 from service.measuring.sources import WatchedUnit
-from service.measuring.timings import TimedMonitor, Timings
 from service.notifications.message import LiveContext
 from service.runtime.heartbeats import Heartbeats, Pulse
+from service.runtime.listening import url_of
+from service.runtime.metrics import MEASURED, Families
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
+from service.settings.core_values import stale_after_s
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
 from service.settings.storage import Origin
@@ -59,9 +59,12 @@ async def run_acquire(
     units
         Units whose devices are read; their monitors are not used.
     listener, announce
-        As in `ProcessServer`, for the health page.
+        Listening socket of the health page, and the function that is called with its URL.
     """
-    beats, live = Heartbeats(clock), live_view(plant, clock)
+    beats, live = (
+        Heartbeats(clock),
+        LiveView([unit.id for unit in plant.unit], clock, stale_after_s(plant)),
+    )
     identities = {unit.id: identity_of(plant, unit) for unit in plant.unit if unit.id in units}
     publisher = Publisher(plant, settings, identities, clock)
     acquirer = Acquirer(units, live, clock, publisher.publish, publisher.publish_link, beats)
@@ -70,7 +73,8 @@ async def run_acquire(
 
     def begin(tasks: asyncio.TaskGroup, _: asyncio.Event) -> list[asyncio.Task[None]]:
         acquiring.append(tasks.create_task(acquirer.run(), name="acquire"))
-        return [*acquiring, *start_loops({"publish": publisher.run}, beats, tasks)]
+        loops = {"publish": publisher.run, "health": health.run}
+        return [*acquiring, *start_loops(loops, beats, tasks)]
 
     async def drain() -> None:
         for task in acquiring:
@@ -78,9 +82,10 @@ async def run_acquire(
         with suppress(TimeoutError):  # the rings of the devices may still contain the samples
             await asyncio.wait_for(publisher.waiting.drained(), DRAIN_S)
 
-    health = _health(publisher, live, beats, list(units))
-    server = health_server(health, listener, clock, announce)
-    await server.run(supervision, beats, begin, drain)
+    health = HealthServer(_health(publisher, live, beats, list(units)), listener)
+    supervision.ready()
+    announce(url_of(listener))
+    await run_until_stopped(supervision, begin, drain)
 
 
 def _health(publisher: Publisher, live: LiveView, beats: Heartbeats, units: list[str]) -> Health:
@@ -91,9 +96,11 @@ def _health(publisher: Publisher, live: LiveView, beats: Heartbeats, units: list
     def shown() -> dict[str, str]:
         return {f"unit {unit}": live.status(unit).state.value for unit in units}
 
-    def metrics() -> Iterator[Metric]:
-        yield from publisher_metrics(publisher)
-        yield from ProcessCollector(registry=None).collect()
+    def metrics() -> bytes:
+        families = Families()
+        add_publisher(families, publisher)
+        families.include(ProcessCollector(registry=None))
+        return families.text
 
     return Health(checks, shown, metrics)
 
@@ -120,35 +127,36 @@ async def run_analyse(
     monitors
         Monitors of the units of the partition.
     listener, announce
-        As in `ProcessServer`, for the health page.
+        Listening socket of the health page, and the function that is called with its URL.
 
     Raises
     ------
     StoreError
-        If the database cannot be used, or the process may no longer hold its units.
+        If the database cannot be used, or the locks of the units were lost.
     StreamAnewError
-        If the stream has been replaced since the start.
+        If the stream was replaced, or lost confirmed messages, while it was read.
     """
     part = partition.part_of(plant)
-    live = live_view(part, clock)
-    alarm_context = LiveContext(live)
+    live = LiveView([unit.id for unit in part.unit], clock, stale_after_s(part))
+    alarm_context = LiveContext(live.assessment)
     with ExitStack() as stack:
         if plant.store.postgresql is None:
             stack.enter_context(exclusive_use(database_path(plant)))
         store = open_store(part, Origin.LIVE, router_of(part, Origin.LIVE, alarm_context, clock))
         stack.callback(store.close)
-        process = ProcessContext(
-            part, Origin.LIVE, clock, store, live, Heartbeats(clock), Timings(monitors, clock)
-        )
+        process = ProcessContext(part, Origin.LIVE, clock, store, live, Heartbeats(clock))
         analysing = Analysing(plant, partition, settings, monitors, process, alarm_context)
-        server = health_server(analysing.health(), listener, clock, announce)
+        health = HealthServer(analysing.health(), listener)
         supervision = Supervision(manager, process.beats, live, monitors, clock)
+
+        def begin(tasks: asyncio.TaskGroup, _: asyncio.Event) -> list[asyncio.Task[None]]:
+            analyse = tasks.create_task(analysing.run(), name="analyse")
+            return [analyse, *start_loops({"health": health.run}, process.beats, tasks)]
+
+        supervision.ready()
+        announce(url_of(listener))
         try:
-            await server.run(
-                supervision,
-                process.beats,
-                lambda tasks, _: [tasks.create_task(analysing.run(), name="analyse")],
-            )
+            await run_until_stopped(supervision, begin)
         finally:
             await analysing.close()
 
@@ -179,13 +187,12 @@ class Analysing:
         self._holds.release()
 
     async def run(self) -> None:
-        """Wait for the units of this process, then analyse until cancelled."""
+        """Wait for the locks of the units of this process, then analyse until cancelled."""
         process = self._process
         store, clock = process.store, process.clock
         await self._holds.take()
         bus = Bus(BUS_CAPACITY, clock)  # always empty: blocks wait in the stream
-        timings, untimed = process.timings, self._monitors.items()
-        monitors = {unit: TimedMonitor(monitor, timings) for unit, monitor in untimed}
+        monitors = self._monitors
         stored = {
             unit: found
             for unit in monitors
@@ -248,7 +255,7 @@ class Analysing:
             start_loops(loops, process.beats, tasks)
 
     def _trouble(self) -> str | None:
-        """Return the reason for which the stream delivers no blocks; None if it delivers."""
+        """Return the reason why the stream delivers no blocks; None while it delivers blocks."""
         return None if self._consumer is None else self._consumer.trouble
 
     def _behind_s(self) -> float:
@@ -284,10 +291,13 @@ class Analysing:
                 }
             return shown
 
-        def metrics() -> Iterator[Metric]:
+        def metrics() -> bytes:
+            families = Families()
+            families.add_program(self._process.store.kind)
             if self._consumer is not None:
-                yield from consumer_metrics(self._consumer)
-            yield store_info(self._process.store.kind)
-            yield from ProcessCollector(registry=None).collect()
+                add_consumer(families, self._consumer)
+            families.include(MEASURED)
+            families.include(ProcessCollector(registry=None))
+            return families.text
 
         return Health(checks, shown, metrics)

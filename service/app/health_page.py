@@ -1,22 +1,21 @@
 """Health page of a process without an API: /livez, /readyz and /metrics."""
 
+import asyncio
+import json
 import socket
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import SimpleNamespace
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
-from fastapi import FastAPI, Response
-from fastapi.responses import JSONResponse
-from prometheus_client import exposition
-from prometheus_client.metrics_core import Metric
+from service.runtime.heartbeats import Pulse
+from service.runtime.metrics import TEXT
 
-from acquisition.clock import Clock
-from service.api.http.protocol import GuardedConfig
-from service.api.http.server import GuardedServer
-from service.app.process import ProcessServer
-from service.settings.processes import HttpLimitSettings
+HOST = "127.0.0.1"
+"""Host of the health page: loopback only; other hosts need a proxy or an agent on this host."""
 
-TEXT = exposition.CONTENT_TYPE_PLAIN_0_0_4
+ANSWERS_WITHIN_S = 5.0
+"""Maximum time for a request, and for an answer of the event loop, s."""
 
 
 @dataclass(frozen=True)
@@ -26,55 +25,79 @@ class Health:
     Parameters
     ----------
     checks
-        Fault of each required part by name; None for a working part.
+        Function that returns the fault of each required part by name; None for a working part.
     shown
-        Status texts by name that do not affect readiness, such as a disconnected device.
+        Function that returns status texts by name, such as link states; readiness ignores them.
     metrics
-        Returns the metric families for Prometheus.
+        Function that returns the metrics in the Prometheus text format.
     """
 
     checks: Callable[[], Mapping[str, str | None]]
     shown: Callable[[], Mapping[str, str]]
-    metrics: Callable[[], Iterable[Metric]]
+    metrics: Callable[[], bytes]
 
-
-def health_app(health: Health) -> FastAPI:
-    """Return the ASGI application of the health page; no login, no secrets."""
-    app = FastAPI(title="padwatch", docs_url=None, redoc_url=None, openapi_url=None)
-
-    @app.get("/livez")
-    async def livez() -> JSONResponse:
-        """Return 200 while the event loop runs."""
-        return JSONResponse({"status": "ok", "checks": {"event_loop": "turning"}})
-
-    @app.get("/readyz")
-    async def readyz() -> JSONResponse:
-        """Return 200 if all required parts work, 503 otherwise."""
-        checks = health.checks()
-        is_ready = not any(checks.values())
+    async def page(self, path: str) -> tuple[int, str, bytes]:
+        """Return status, content type and content of a page."""
+        if path == "/metrics":
+            return 200, TEXT, self.metrics()
+        if path == "/livez":
+            return _document(200, {"event_loop": "turning"})
+        if path != "/readyz":
+            return 404, "text/plain", b"pages: /livez, /readyz, /metrics\n"
+        checks = self.checks()
         words = {name: trouble or "ok" for name, trouble in checks.items()}
-        body = {
-            "status": "ok" if is_ready else "not ready",
-            "checks": {**health.shown(), **words},
-        }
-        return JSONResponse(body, 200 if is_ready else 503)
-
-    @app.get("/metrics")
-    async def metrics() -> Response:
-        """Return the metrics in the text format of Prometheus."""
-        families = SimpleNamespace(collect=health.metrics)  # instead of a registry
-        return Response(exposition.generate_latest(families), headers={"content-type": TEXT})
-
-    return app
+        return _document(503 if any(checks.values()) else 200, {**self.shown(), **words})
 
 
-HOST = "127.0.0.1"
-"""Host of the health page: loopback only; other hosts need a proxy or an agent on this host."""
+def _document(status: int, checks: Mapping[str, str]) -> tuple[int, str, bytes]:
+    body = {"status": "ok" if status == 200 else "not ready", "checks": checks}
+    return status, "application/json", json.dumps(body).encode()
 
 
-def health_server(
-    health: Health, listener: socket.socket, clock: Clock, announce: Callable[[str], None]
-) -> ProcessServer:
-    """Return the server of the health page on a socket."""
-    config = GuardedConfig(health_app(health), HttpLimitSettings(), [HOST], clock.monotonic_s)
-    return ProcessServer("health", GuardedServer(config), listener, announce)
+class HealthServer:
+    """HTTP server of the health page in separate threads; the event loop makes the pages."""
+
+    def __init__(self, health: Health, listener: socket.socket) -> None:
+        self._health, self._listener = health, listener
+
+    async def run(self, pulse: Pulse) -> None:
+        """Serve until cancelled."""
+        pulse.rest()
+        loop = asyncio.get_running_loop()
+
+        def page(path: str) -> tuple[int, str, bytes]:
+            making = asyncio.run_coroutine_threadsafe(self._health.page(path), loop)
+            return making.result(ANSWERS_WITHIN_S)
+
+        with ThreadingHTTPServer((HOST, 0), handler_of(page), bind_and_activate=False) as server:
+            server.socket.close()
+            server.socket = self._listener
+            serving = asyncio.create_task(asyncio.to_thread(server.serve_forever, 0.1))
+            try:
+                await asyncio.shield(serving)
+            finally:
+                await asyncio.to_thread(server.shutdown)
+
+
+def handler_of(page: Callable[[str], tuple[int, str, bytes]]) -> type[BaseHTTPRequestHandler]:
+    """Return the request handler of a server whose pages come from a function of the path."""
+
+    class Handler(BaseHTTPRequestHandler):
+        timeout = ANSWERS_WITHIN_S
+        server_version, sys_version = "padwatch", ""
+
+        def do_GET(self) -> None:
+            try:
+                status, kind, content = page(self.path.partition("?")[0])
+            except TimeoutError:
+                status, kind, content = 503, "text/plain", b"the event loop does not answer\n"
+            self.send_response(HTTPStatus(status))
+            self.send_header("content-type", kind)
+            self.send_header("content-length", str(len(content)))
+            self.end_headers()
+            self.wfile.write(content)
+
+        def log_message(self, format: str, *args: object) -> None:  # noqa: A002
+            """Log nothing: probes ask every few seconds."""
+
+    return Handler

@@ -1,18 +1,15 @@
-"""Analysis part of a process: results, alarms, evidence and messages from sample blocks."""
+"""Analysis part of a process, which makes results, alarms, evidence and messages from blocks."""
 
 import asyncio
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from acquisition.clock import Clock
 from core.alarms.alarm import AlarmNews
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
-from service.api.load import LoadWatch
-from service.app.notifications import receivers_of
-from service.app.process import ProcessContext, start_loops
-from service.app.service_health import Pressure, health_of
-from service.app.storage import (
+from service.app.kept_files import (
     captures_of,
     evidence_of,
     space_watch,
@@ -20,16 +17,22 @@ from service.app.storage import (
     watch,
     waveform_keeper,
 )
-from service.cluster.reported_commands import CommandWorker
-from service.cluster.reported_state import Reporter, process_name
+from service.app.notifications import receivers_of
+from service.app.process import start_loops
+from service.app.service_health import Pressure, health_of
+from service.cluster.measuring_side import CommandWorker, Reporter, process_name
+from service.live.references import ReferencesInForce
+from service.live.snapshot import CaptureStatus, PlantSnapshot, SourceCounts
 from service.measuring.acquirer import Bus
 from service.measuring.alarm_engine import WHOLE, AlarmEngine, PlantPart, alarm_engine
 from service.measuring.analyser import NO_MEMORIES, Analyser, UnitMemory
+from service.measuring.commands import CommandExecutor
 from service.measuring.films import FilmMonitor, film_monitor
 from service.measuring.integrity import IntegrityMonitor
+from service.measuring.live_view import LiveView
 from service.measuring.recorder import FILE, ParkedRows, Recorder
-from service.measuring.references import ReferencesInForce
 from service.measuring.service_alarms import StreamStatus
+from service.measuring.snapshots import SnapshotBuilder
 from service.measuring.sources import vector_rows
 from service.notifications.message import LiveContext
 from service.notifications.sender import Deliveries
@@ -38,10 +41,33 @@ from service.recordings.continuous_recorder import ContinuousRecorder
 from service.recordings.keeper import RecordingIndexer
 from service.reports.collector import EvidenceCollector
 from service.runtime.disk import SpaceWatch
-from service.runtime.heartbeats import Loop
+from service.runtime.heartbeats import Heartbeats, Loop
+from service.runtime.polls import TimedSource
+from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.loops import RetentionLoop, RollupLoop, ScrubLoop
 from service.store.retention import ages_of
+from service.store.store import Store
+
+
+@dataclass(frozen=True)
+class ProcessContext:
+    """Context of one process: plant, store, live view and heartbeats.
+
+    Parameters
+    ----------
+    origin
+        Origin of the data in the store and in all API responses.
+    beats
+        Heartbeats of all loops of the process.
+    """
+
+    plant: PlantFile
+    origin: Origin
+    clock: Clock
+    store: Store
+    live: LiveView
+    beats: Heartbeats
 
 
 @dataclass(frozen=True)
@@ -63,7 +89,6 @@ class Analysis:
     rolling: RollupLoop
     retaining: RetentionLoop
     space: SpaceWatch
-    load: LoadWatch
     soundness: IntegrityMonitor
 
     def start(self, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
@@ -85,7 +110,6 @@ class Analysis:
             "tape": self.tape.run,
             "evidence": self.evidence.run,
             "space": self.space.run,
-            "load": self.load.run,
             "soundness": self.soundness.run,
         }
         if self.process.origin is Origin.LIVE:  # replayed data are not part of the machine history
@@ -94,7 +118,7 @@ class Analysis:
 
     @property
     def shared_loops(self) -> dict[str, Loop]:
-        """Loops that only one process runs for the plant, without the delivery of messages."""
+        """Plant-wide loops, which only one process runs; without the delivery of messages."""
         loops: dict[str, Loop] = {"gather": self.rolling.run}
         if self.process.origin is Origin.LIVE:
             loops["retain"] = self.retaining.run
@@ -119,14 +143,14 @@ async def analysis_on(
     memories: Mapping[str, UnitMemory] = NO_MEMORIES,
     stream: StreamStatus | None = None,
 ) -> Analysis:
-    """Build the parts of the analysis; resume from the stored state.
+    """Build the parts of the analysis, and restore their stored state.
 
     Parameters
     ----------
     bus
         Queue of blocks to the analysis.
     alarm_context
-        Source of the values in alarm messages; receives the newest films.
+        Context from which alarm messages take values; it is given access to the newest films.
     part
         Part of the plant for which this process is responsible.
     memories
@@ -147,24 +171,21 @@ async def analysis_on(
         for unit, monitor in monitors.items():
             monitor.go_on(await asyncio.to_thread(store.reach, unit))
     deliveries = Deliveries(receivers_of(plant, origin, clock), store.outbox, clock)
-    commits = process.timings.commits
     recorder = Recorder(
         store,
         live,
         clock,
         ParkedRows(Path(plant.service.data_folder) / FILE),
         on_stored=deliveries.wake,
-        timed=commits.timed,
         finds_again=stream is not None,
     )
     captures = captures_of(plant, origin, clock)
     recordings = waveform_keeper(plant, store, clock)
-    load = LoadWatch(bus, clock)
-    pressure = Pressure(bus, recordings.is_full, lambda: bool(load.refused))
+    pressure = Pressure(bus, recordings.is_full)
     tape = tape_of(plant, origin, clock, pressure.look)
     space = space_watch(plant, clock)
     look = health_of(
-        monitors, live, recorder, captures, bus, space, load, tape, recordings, soundness, stream
+        monitors, live, recorder, captures, bus, space, tape, recordings, soundness, stream
     )
 
     def listen(block: SampleBlock, news: Sequence[AlarmNews]) -> None:
@@ -208,9 +229,52 @@ async def analysis_on(
         rolling=RollupLoop(store.rollups, clock),
         retaining=RetentionLoop(store.retention, ages_of(plant.retention), clock),
         space=space,
-        load=load,
         soundness=soundness,
     )
+
+
+def executor_of(analysis: Analysis) -> CommandExecutor:
+    """Return the executor of operators' commands in this process."""
+    process = analysis.process
+    parts = (analysis.alarms, analysis.films, process.live, analysis.recorder, process.store)
+    return CommandExecutor(*parts, process.clock)
+
+
+def builder_of(analysis: Analysis) -> SnapshotBuilder:
+    """Return the builder of the snapshots of all units of this process."""
+    process = analysis.process
+    parts = (process.live, analysis.alarms, analysis.films)
+    return SnapshotBuilder(process.plant.unit, *parts, process.clock)
+
+
+def plant_snapshot(analysis: Analysis, sources: Mapping[str, TimedSource]) -> PlantSnapshot:
+    """Return the present state of the measuring process."""
+    captures, deliveries = analysis.captures, analysis.deliveries
+    return PlantSnapshot(
+        loops=dict(analysis.process.beats.look()),
+        checks={
+            "disk": str(analysis.space),
+            "stored data": analysis.soundness.trouble or "ok",
+        },
+        audit_error=analysis.process.store.audit.head_error,
+        captures=CaptureStatus(
+            captures.trouble, captures.error, captures.n_written, captures.being_made
+        ),
+        evidence=analysis.evidence.status,
+        continuous=tuple(analysis.tape.units),
+        continuous_trouble=analysis.tape.trouble,
+        faults=dict(analysis.recordings.faults),
+        receivers=deliveries.statuses,
+        sources={unit: counts_of(source) for unit, source in sources.items()},
+    )
+
+
+def counts_of(source: TimedSource) -> SourceCounts:
+    """Return the counts of a data source."""
+    found, refused = source.statistics, dict(source.refused_frames)
+    if found is None:
+        return SourceCounts(0, None, None, refused)
+    return SourceCounts(found.n, found.newest_s, found.mean_s, refused)
 
 
 def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> Mapping[str, Loop]:
@@ -219,13 +283,11 @@ def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> 
     Parameters
     ----------
     held
-        Returns the units of this process; `PLANT` if it also publishes alarms without a unit, and
-        `SHARED` if it does the shared work.
+        Function that returns the units of this process; also `PLANT` if it publishes alarms without
+        a unit, and `SHARED` if it runs the plant-wide tasks.
     """
     process, name = analysis.process, process_name()
-    store, parts = process.store, (analysis.alarms, analysis.films)
-    reporter = Reporter(
-        name, process.plant.unit, held, process.live, *parts, store.unit_states, process.clock
-    )
-    carrying_out = CommandWorker(name, held, *parts, analysis.recorder, store, process.clock)
+    store, clock = process.store, process.clock
+    reporter = Reporter(name, held, builder_of(analysis), store.unit_states, clock)
+    carrying_out = CommandWorker(name, held, executor_of(analysis), store, clock)
     return {"report": reporter.run, "commands": carrying_out.run}

@@ -35,7 +35,7 @@ def receivers_of(plant: PlantFile, origin: Origin, clock: Clock) -> list[Receive
 
 
 def router_of(plant: PlantFile, origin: Origin, context: FindContext, clock: Clock) -> Address:
-    """Return the router of messages about stored events; a replay queues no messages."""
+    """Return the router of messages about stored events; in a replay it queues no messages."""
     if origin is not Origin.LIVE or not plant.delivery.receiver:
         return no_recipients
     return Router(plant.delivery.receiver, composer_of(plant, context), clock.now_ns)

@@ -1,66 +1,16 @@
-"""Common parts of all processes of a plant: context, live view, supervision, server."""
+"""Supervision of the background loops of a process, and its run until a signal."""
 
 import asyncio
-import socket
 from collections.abc import Awaitable, Callable, Iterable, Mapping
-from dataclasses import dataclass
-from functools import partial
 from typing import Protocol
 
 import structlog
 
 from acquisition.clock import Clock
-from service.api.http.listening import url_of
-from service.api.http.server import GuardedServer
-from service.live.live_view import LinkState, LiveView, UnitStatus
-from service.measuring.timings import Timings
+from service.live.status import LinkState, UnitStatus
 from service.runtime.heartbeats import Heartbeats, Loop
 from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import ServiceManager
-from service.settings.core_values import analysis_of
-from service.settings.plant import PlantFile
-from service.settings.sources.devices import ModbusVectorSettings
-from service.settings.storage import Origin
-from service.store.store import Store
-
-STALE_HOPS = 2.5
-"""Age of a result in refresh periods above which the result is stale."""
-
-
-@dataclass(frozen=True)
-class ProcessContext:
-    """Context of one process: plant, store, live view, heartbeats and timings.
-
-    Parameters
-    ----------
-    origin
-        Origin of the data in the store and in all API responses.
-    beats
-        Heartbeats of all loops of the process.
-    """
-
-    plant: PlantFile
-    origin: Origin
-    clock: Clock
-    store: Store
-    live: LiveView
-    beats: Heartbeats
-    timings: Timings
-
-
-def live_view(plant: PlantFile, clock: Clock) -> LiveView:
-    """Return an empty live view of the units of a plant."""
-    return LiveView([unit.id for unit in plant.unit], clock, STALE_HOPS * refresh_s(plant))
-
-
-def refresh_s(plant: PlantFile) -> float:
-    """Return the result period of the slowest unit of a plant, s."""
-    hop_samples = analysis_of(plant.analysis).hop_samples
-    return max(
-        (unit.source.hop_polls if isinstance(unit.source, ModbusVectorSettings) else hop_samples)
-        / unit.sampling_hz
-        for unit in plant.unit
-    )
 
 
 def start_loops(
@@ -84,9 +34,9 @@ class Links(Protocol):
 
 
 class Supervision:
-    """Supervision of loops: notifies the watchdog while all loops are alive, logs dead loops.
+    """Supervisor of loops, which notifies the watchdog while all are alive and logs dead loops.
 
-    Supervision runs on the event loop, so that a blocked event loop stops the notifications.
+    The supervisor runs on the event loop, so that a blocked event loop stops the notifications.
     """
 
     def __init__(
@@ -145,61 +95,27 @@ async def _nothing() -> None:
     """Do nothing."""
 
 
-@dataclass(frozen=True)
-class ProcessServer:
-    """HTTP server of a process; the tasks of the process run while it serves.
+async def run_until_stopped(
+    supervision: Supervision,
+    begin: Begin,
+    drain: Callable[[], Awaitable[None]] = _nothing,
+) -> None:
+    """Run the tasks of a process until SIGINT or SIGTERM.
 
     Parameters
     ----------
-    name
-        Name of the server's heartbeat.
-    announce
-        Called with the URL when the server accepts requests.
-    prepare
-        Awaited after `announce`; for preparation that may follow the first requests.
+    begin
+        Function that starts the tasks of the process, which are cancelled at its end.
+    drain
+        Coroutine function that is called before the tasks are cancelled.
     """
-
-    name: str
-    server: GuardedServer
-    listener: socket.socket
-    announce: Callable[[str], None]
-    prepare: Callable[[], Awaitable[None]] = _nothing
-
-    async def run(
-        self,
-        supervision: Supervision,
-        beats: Heartbeats,
-        begin: Begin,
-        drain: Callable[[], Awaitable[None]] = _nothing,
-    ) -> None:
-        """Serve, and run the tasks of the process, until SIGINT or SIGTERM.
-
-        Parameters
-        ----------
-        begin
-            Starts the tasks of the process, which are cancelled at its end.
-        drain
-            Awaited before the tasks are cancelled.
-        """
-        stopped = stop_on_signals()
-        async with asyncio.TaskGroup() as tasks:
-            begun = begin(tasks, stopped)
-            serve: Loop = partial(self.server.run_on, self.listener)
-            [serving] = start_loops({self.name: serve}, beats, tasks)
-            begun.append(tasks.create_task(self._announce(supervision), name="announce"))
-            supervising = tasks.create_task(supervision.run(), name="supervise")
-            await stopped.wait()
-            supervision.stopping()
-            supervising.cancel()
-            self.server.should_exit = True
-            await drain()
-            for task in begun:
-                task.cancel()
-            await asyncio.wait([serving])
-
-    async def _announce(self, supervision: Supervision) -> None:
-        while not self.server.started:
-            await asyncio.sleep(0.01)
-        supervision.ready()
-        self.announce(url_of(self.listener, has_tls=self.server.config.is_ssl))
-        await self.prepare()
+    stopped = stop_on_signals()
+    async with asyncio.TaskGroup() as tasks:
+        begun = begin(tasks, stopped)
+        supervising = tasks.create_task(supervision.run(), name="supervise")
+        await stopped.wait()
+        supervision.stopping()
+        supervising.cancel()
+        await drain()
+        for task in begun:
+            task.cancel()

@@ -1,4 +1,4 @@
-"""Recordings of a plant's units: writers, channel selection and replay."""
+"""Writers of recordings of a plant's units, and sources that replay recordings."""
 
 import threading
 from collections.abc import AsyncGenerator, AsyncIterator, Iterable
@@ -24,14 +24,14 @@ from service.settings.units import UnitSettings
 
 
 def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> RecordingWriter:
-    """Return the writer of a unit's recording; the first block determines counts or values.
+    """Return the writer of a unit's recording; the first block determines the type of samples.
 
     Raises
     ------
     ConfigError
         If the folder exists or cannot be created.
     """
-    return RecordingWriter(folder, recorded_unit(unit), made_by, first_decides=True)
+    return RecordingWriter(folder, recorded_unit(unit), made_by)
 
 
 def recordings_by_unit(folders: Iterable[Path], plant: PlantFile) -> dict[str, Path]:
@@ -92,7 +92,7 @@ REPLAYS = "replays"
 
 
 def replayed_plant(plant: PlantFile, units: Iterable[str], folder: Path) -> PlantFile:
-    """Return a plant of the replayed units with own data folder, SQLite and loopback host."""
+    """Return the plant with only the given units, a data folder, SQLite, and a loopback host."""
     closed = {"host": "127.0.0.1", "socket": None, "tls": None}
     service = plant.service.model_copy(update={"data_folder": str(folder), **closed})
     chosen = tuple(unit for unit in plant.unit if unit.id in set(units))
@@ -108,7 +108,7 @@ def replay_folder(plant: PlantFile, recordings: Iterable[Path], now_ns: int) -> 
 
 
 class PlayedOut:
-    """Source on a simulated DAQ that plays a recording; ends at the end of the recording.
+    """Source that reads a simulated DAQ, and ends when the recording that the DAQ plays ends.
 
     After the end, the DAQ still replies like a device whose converter has stopped. The wrapped
     source then raises LinkError, which ends the blocks of this source.

@@ -1,27 +1,41 @@
-"""Complete service in one process: acquisition, analysis and API."""
+"""`padwatch run` and `replay`: the measuring process, with the serving process as its child."""
 
 import asyncio
 import socket
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
-from service.app.measuring_process import analysis_on, reporting_loops
+from service.app.listener import require_protected
+from service.app.measuring_process import (
+    ProcessContext,
+    analysis_on,
+    builder_of,
+    executor_of,
+    plant_snapshot,
+    reporting_loops,
+)
+from service.app.metrics import measuring_metrics
 from service.app.notifications import router_of
-from service.app.process import ProcessContext, Supervision, live_view, start_loops
+from service.app.process import Supervision, run_until_stopped, start_loops
 from service.app.service_audit import ServiceTrail
-from service.app.serving_process import context_of, serving_of
-from service.app.storage import database_path, evidence_desk, open_store
-from service.app.web import access_desk
+from service.app.storage import database_path, open_access, open_store
+from service.app.supervisor import ServingChild, Start
+from service.live.alarm_list import SHARED
 from service.measuring.acquirer import Bus
 from service.measuring.analyser import BUS_CAPACITY, Runner
-from service.measuring.sources import WatchedUnit
-from service.measuring.timings import Timings, timed, timed_sources
+from service.measuring.commands import Questions
+from service.measuring.live_view import LiveView
+from service.measuring.snapshots import SocketReports
+from service.measuring.sources import WatchedUnit, timed_sources
 from service.notifications.message import LiveContext
+from service.runtime.child import Child
 from service.runtime.heartbeats import Heartbeats, Loop
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
+from service.settings.core_values import stale_after_s
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.holds import exclusive_use
@@ -41,6 +55,10 @@ class ServiceRun:
         Whether the service stops when all sources have ended.
     is_demo
         Whether local clients have the admin role without a login.
+    child
+        Serving process that has been started already, or None.
+    at_end
+        Called with the newest results when all sources have ended; or None.
     """
 
     plant: PlantFile
@@ -48,6 +66,8 @@ class ServiceRun:
     origin: Origin = Origin.LIVE
     ends: bool = False
     is_demo: bool = False
+    child: Child | None = None
+    at_end: Callable[[LiveView], None] | None = None
 
 
 async def run_service(
@@ -61,11 +81,13 @@ async def run_service(
 
     Parameters
     ----------
-    listener, announce
-        As in `ProcessServer`; `announce` is also called with the set-up token if there is no
-        account.
+    listener
+        Listening socket, which the serving process inherits.
+    announce
+        Function that is called with the URL when requests are served, and with the set-up token if
+        there is no account.
     manager
-        Notified when the service is ready, alive and stopping.
+        Service manager, notified when the service is ready, alive and stopping.
 
     Raises
     ------
@@ -75,17 +97,15 @@ async def run_service(
         If the service would be reachable from other hosts without TLS or accounts.
     """
     plant, origin = service_run.plant, service_run.origin
-    live, beats, timings = (
-        live_view(plant, clock),
-        Heartbeats(clock),
-        Timings(service_run.units, clock),
-    )
-    alarm_context = LiveContext(live)
+    live = LiveView([unit.id for unit in plant.unit], clock, stale_after_s(plant))
+    beats = Heartbeats(clock)
+    alarm_context = LiveContext(live.assessment)
     router = router_of(plant, origin, alarm_context, clock)
     with exclusive_use(database_path(plant)), closing(open_store(plant, origin, router)) as store:
-        process = ProcessContext(plant, origin, clock, store, live, beats, timings)
-        desk = access_desk(plant, store.access, clock, service_run.is_demo)
-        units = timed(service_run.units, timings)
+        with closing(open_access(plant, origin)) as access:
+            require_protected(plant, access)
+        process = ProcessContext(plant, origin, clock, store, live, beats)
+        units = service_run.units
         bus = Bus(BUS_CAPACITY, clock)
         monitors = {unit: watched.monitor for unit, watched in units.items()}
         analysis = await analysis_on(process, monitors, bus, alarm_context)
@@ -93,23 +113,40 @@ async def run_service(
         runner = Runner(units, live, analysis.recorder, clock, *parts)
         audit = ServiceTrail(plant, origin, store.audit, clock)
         await audit.begin()
-        context = context_of(analysis, desk, audit.refusals, bus, timed_sources(units))
-        evidence = evidence_desk(plant, store, analysis.evidence, clock, context.downloads)
-        server = serving_of(context, process, listener, desk, announce, evidence)
+        sources, held = timed_sources(units), [*(unit.id for unit in plant.unit), PLANT]
+        supervision = Supervision(manager, beats, live, units, clock)
+
+        def ready(url: str, token: str | None) -> None:
+            supervision.ready()
+            announce(url)
+            if token is not None:
+                announce(f"token to create the first account, valid once within one hour: {token}")
+
+        now = partial(plant_snapshot, analysis, sources)
+        reports = SocketReports([*held, SHARED], builder_of(analysis), now, clock)
+        metrics = partial(measuring_metrics, analysis, bus, sources)
+        questions = Questions(executor_of(analysis), live, analysis.soundness, metrics)
+        start = Start(plant, origin, service_run.is_demo)
+        serving = ServingChild(
+            *(start, listener, reports.report, questions.answer, ready, clock, service_run.child)
+        )
+
+        async def run() -> None:
+            await runner.run()
+            if service_run.at_end is not None:
+                service_run.at_end(live)
 
         def begin(tasks: asyncio.TaskGroup, stopped: asyncio.Event) -> list[asyncio.Task[None]]:
-            running = tasks.create_task(runner.run(), name="run")
+            running = tasks.create_task(run(), name="run")
             if service_run.ends:
                 running.add_done_callback(lambda _: stopped.set())
-            loops: dict[str, Loop] = {"clock": audit.watch_clock}
+            loops: dict[str, Loop] = {"clock": audit.watch_clock, "serve": serving.run}
             if plant.store.postgresql is not None and origin is Origin.LIVE:  # may have replicas
-                held = [*(unit.id for unit in plant.unit), PLANT]
                 loops |= reporting_loops(analysis, lambda: held)
             return [running, *analysis.start(tasks), *start_loops(loops, beats, tasks)]
 
         try:
-            await server.run(Supervision(manager, beats, live, units, clock), beats, begin)
+            await run_until_stopped(supervision, begin, serving.stop)
         finally:
-            desk.close()
             await analysis.close()
             await audit.end()

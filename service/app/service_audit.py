@@ -9,10 +9,9 @@ import structlog
 
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival
-from service.api.auth.refusals import Refusals
 from service.app.storage import built_configuration
-from service.measuring.service_alarms import STEP_S
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.times import CLOCK_STEP_S
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.access.audit_entries import AuditAction, AuditEntry
@@ -44,18 +43,6 @@ def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) ->
     return [AuditAction(now_ns, PADWATCH, CHANGED, CONFIGURATION, *versions), started]
 
 
-def stop_deed(release: Release, refusals: int, now_ns: int) -> AuditAction:
-    """Return the audit entry of a stop.
-
-    Parameters
-    ----------
-    refusals
-        Number of refused requests without an audit entry since the last refusal with one.
-    """
-    after = {"n_refused_more": refusals} if refusals else None
-    return AuditAction(now_ns, PADWATCH, STOPPED, SERVICE, before=release, after=after)
-
-
 def _configuration_of(start: AuditEntry | None) -> str | None:
     document = json.loads(start.after) if start and start.after else None
     return document.get(CONFIGURATION) if isinstance(document, dict) else None
@@ -67,7 +54,7 @@ LOOK_S = 1.0
 
 
 class ServiceTrail:
-    """Recorder of the service's audit entries; a failed write does not stop the service."""
+    """Recorder of the service's audit entries; a failed write is logged and not repeated."""
 
     def __init__(self, plant: PlantFile, origin: Origin, audit: AuditStore, clock: Clock) -> None:
         configuration = built_configuration(plant).version
@@ -77,7 +64,6 @@ class ServiceTrail:
             "origin": origin.value,
         }
         self._audit, self._clock = audit, clock
-        self.refusals = Refusals(audit, clock)
 
     async def begin(self) -> None:
         """Record the start, and the configuration if it has changed."""
@@ -85,18 +71,19 @@ class ServiceTrail:
 
     async def end(self) -> None:
         """Record the stop."""
-        deed = stop_deed(self._release, self.refusals.n_more, self._clock.now_ns())
+        now_ns = self._clock.now_ns()
+        deed = AuditAction(now_ns, PADWATCH, STOPPED, SERVICE, before=self._release)
         await self._attempt(self._audit.record, [deed])
 
     async def watch_clock(self, pulse: Pulse = UNHEARD) -> None:
-        """Record steps of the host's UTC clock until cancelled."""
+        """Record steps of the host's clock that exceed `CLOCK_STEP_S`, until cancelled."""
         seen = Arrival.now(self._clock)
         while True:
             pulse.beat(LOOK_S)
             await self._clock.sleep(LOOK_S)
             before, seen = seen, Arrival.now(self._clock)
             step_s = seen.step_s_since(before)
-            if abs(step_s) > STEP_S:
+            if abs(step_s) > CLOCK_STEP_S:
                 step = {"by_s": round(step_s, 3)}
                 deed = AuditAction(seen.host_ns, PADWATCH, STEPPED, CLOCK, after=step)
                 await self._attempt(self._audit.record, [deed])

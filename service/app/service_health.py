@@ -1,11 +1,10 @@
-"""Health of the service for its alarms, and pauses of recording under load."""
+"""Health of the service for its alarms, and backpressure on continuous recording."""
 
 from collections.abc import Callable, Iterable
 
-from service.api.load import LoadWatch
-from service.live.live_view import LiveView
 from service.measuring.acquirer import Bus
 from service.measuring.integrity import IntegrityMonitor
+from service.measuring.live_view import LiveView
 from service.measuring.recorder import Recorder
 from service.measuring.service_alarms import HealthProbe, ServiceHealth, StreamStatus
 from service.recordings.around_alarms import Captures
@@ -21,7 +20,6 @@ def health_of(
     captures: Captures,
     bus: Bus,
     space: SpaceWatch,
-    load: LoadWatch,
     tape: ContinuousRecorder,
     recordings: RecordingIndexer,
     soundness: IntegrityMonitor,
@@ -42,7 +40,6 @@ def health_of(
                 "analysis_delay_s": max(bus.oldest_wait_s, stream.behind_s() if stream else 0.0),
                 "captures_error": captures.trouble,
                 "recording_error": recording_error(tape, recordings),
-                "refused": load.words,
                 "stored_trouble": soundness.trouble,
                 "stream_trouble": stream.trouble() if stream else None,
             },
@@ -78,23 +75,20 @@ class Pressure:
     Parameters
     ----------
     is_full
-        Returns whether the disk is nearly full.
-    has_shed
-        Returns whether API requests are being shed; recording pauses only after that.
+        Function that returns whether the disk is nearly full.
     """
 
-    def __init__(self, bus: Bus, is_full: Callable[[], bool], has_shed: Callable[[], bool]) -> None:
-        self._bus, self._is_full, self._has_shed = bus, is_full, has_shed
+    def __init__(self, bus: Bus, is_full: Callable[[], bool]) -> None:
+        self._bus, self._is_full = bus, is_full
         self._is_behind = False
 
     def look(self) -> DropReason | None:
-        """Return the reason for which recording pauses now; None if it does not pause."""
+        """Return the reason why recording must pause now; None if it may continue."""
         share = CAUGHT_UP if self._is_behind else 1.0
-        is_behind = (
+        self._is_behind = (
             self._bus.oldest_wait_s > share * BEHIND_S
             or self._bus.depth > share * BEHIND_SHARE * self._bus.capacity
         )
-        self._is_behind = is_behind and (self._is_behind or self._has_shed())
         if self._is_behind:
             return DropReason.ANALYSIS_BEHIND
         return DropReason.DISK_FULL if self._is_full() else None

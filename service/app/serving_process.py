@@ -1,228 +1,242 @@
-"""API server of a process, and `padwatch serve`, an API process that reads the database."""
+"""Serving process: API, dashboard, login and metrics, from reports of the measuring process."""
 
 import asyncio
 import gc
+import json
 import socket
-from collections.abc import Callable, Mapping
-from contextlib import closing
+import sys
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import closing, suppress
 from functools import partial
 
-from acquisition.clock import Clock
+import structlog
+
+from acquisition.clock import Clock, SystemClock
+from service.api.app import GuardedApi
 from service.api.auth.authenticator import Authenticator
-from service.api.auth.refusals import Refusals
 from service.api.context import Context
-from service.api.load import LoadShedder
-from service.app.measuring_process import Analysis
-from service.app.metrics import scrape
-from service.app.notifications import receivers_of
-from service.app.process import (
-    STALE_HOPS,
-    ProcessContext,
-    ProcessServer,
-    Supervision,
-    live_view,
-    refresh_s,
-    start_loops,
+from service.api.downloads import Downloads
+from service.api.problems import ProblemError
+from service.app.storage import (
+    built_configuration,
+    evidence_folders,
+    open_access,
+    open_store_to_serve,
+    recordings_folder,
 )
-from service.app.service_audit import ServiceTrail
-from service.app.storage import evidence_folders, open_store, recordings_folder
+from service.app.supervisor import Start, read_start
 from service.app.web import access_desk, application, server_of
-from service.cluster.replica_metrics import NoCaptures, ReplicaDeliveries, ReplicaMetrics
-from service.cluster.replica_state import ReplicaAlarms, ReplicaFilms, ReplicaLive
-from service.cluster.reported_commands import CommandClient
-from service.cluster.reported_state import Feed, UnitDescription
-from service.measuring.acquirer import Bus
-from service.measuring.commands import LocalCommands
-from service.measuring.references import ReferencesInForce
-from service.measuring.timings import Timings
+from service.dashboard.assets import compress_all
+from service.live.client import LiveClient, SocketOperators
+from service.live.exchange import MeasuringGoneError, ServingEnd, VersionError
+from service.live.receivers import receiver_views
+from service.live.references import ReferencesInForce, UnitDescription
+from service.live.snapshot import Report
+from service.reports.archive import EvidenceArchive
 from service.reports.routes import EvidenceService
-from service.runtime.heartbeats import Heartbeats
-from service.runtime.polls import TimedSource
-from service.runtime.service_manager import NO_MANAGER, ServiceManager
-from service.settings.core_values import chatter_rule_of, machine_of
+from service.runtime.heartbeats import Heartbeats, Loop, Pulse
+from service.runtime.listening import url_of
+from service.runtime.process import leave, run_to_its_end, set_up_logging, stop_on_signals
+from service.settings.core_values import machine_of, refresh_s
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
+from service.store.access.tables import AccessStore
 from service.store.store import Store
 
-GC_THRESHOLDS = (20_000, 20, 20)
-"""Garbage-collection thresholds: high, since requests and blocks leave few cycles."""
+log = structlog.get_logger()
+
+WRONG_VERSION = 78
+"""Exit code if the measuring process is of another version (EX_CONFIG of sysexits.h)."""
 
 
-def serving_of(
+async def _rendered(app: GuardedApi) -> None:
+    await asyncio.to_thread(app.openapi)
+    await asyncio.to_thread(compress_all)
+    # the objects of the start are permanent; scanning them adds 70 ms to every second long trend
+    gc.collect()
+    gc.freeze()
+
+
+async def serve_requests(
     context: Context,
-    process: ProcessContext,
+    plant: PlantFile,
     listener: socket.socket,
     desk: Authenticator,
-    announce: Callable[[str], None],
+    loops: Mapping[str, Loop],
+    stopped: asyncio.Event,
+    on_ready: Callable[[str, str | None], Awaitable[None]],
     evidence: EvidenceService | None = None,
-) -> ProcessServer:
-    """Return the API server of a context; the OpenAPI document is rendered after the start.
+) -> None:
+    """Serve API and dashboard until `stopped` is set.
 
     Parameters
     ----------
-    announce
-        Called with the URL when the server accepts requests, then with the set-up token if no
-        account exists.
+    loops
+        Background loops of the process, which run while it serves.
+    on_ready
+        Coroutine function that is called with URL and set-up token (None if an account exists)
+        when requests are accepted.
     """
     app = application(context, evidence)
-
-    async def prepare() -> None:
-        if token := await desk.offer_set_up():
-            announce(f"token to create the first account, valid once within one hour: {token}")
-        await asyncio.to_thread(app.rendered)
-        gc.collect()
-        gc.freeze()  # objects of the start are permanent; scanning them takes 0.1 s
-        gc.set_threshold(*GC_THRESHOLDS)
-
-    limited = app if context.load is None else LoadShedder(app, context.load)
-    server = server_of(limited, process.plant, process.clock)
-    return ProcessServer("serve", server, listener, announce, prepare)
+    server = server_of(app, plant, context.origin)
+    beats = Heartbeats(context.clock)
+    async with asyncio.TaskGroup() as tasks:
+        running = [
+            tasks.create_task(beats.tend(name, loop), name=name) for name, loop in loops.items()
+        ]
+        serving = tasks.create_task(
+            beats.tend("serve", partial(server.run_on, listener)), name="serve"
+        )
+        while not server.started:
+            await asyncio.sleep(0.01)
+        token = await desk.offer_set_up()
+        await on_ready(url_of(listener, has_tls=server.config.is_ssl), token)
+        running.append(tasks.create_task(_rendered(app), name="document"))
+        await stopped.wait()
+        server.should_exit = True
+        await asyncio.wait([serving])
+        for task in running:
+            task.cancel()
 
 
 def context_of(
-    analysis: Analysis,
+    plant: PlantFile,
+    store: Store,
+    live: LiveClient,
+    operators: SocketOperators,
+    references: ReferencesInForce,
     desk: Authenticator,
-    refusals: Refusals,
-    bus: Bus,
-    sources: Mapping[str, TimedSource],
+    clock: Clock,
+    origin: Origin,
 ) -> Context:
-    """Return the API context of a process that also analyses."""
-    process = analysis.process
-    plant = process.plant
+    """Return the API context of a serving process that a measuring process has started."""
+
+    async def metrics() -> bytes:
+        try:
+            found: bytes = await operators.exchange.ask("metrics", "[]")
+        except MeasuringGoneError as error:
+            raise ProblemError(503, "No answer", str(error)) from error
+        return found
+
     return Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},
-        live=process.live,
-        store=process.store,
-        clock=process.clock,
+        live=live.units,
+        alarms=live.alarms,
+        films=live.films,
+        plant=lambda: live.plant,
+        operators=operators,
+        references=references,
+        store=store,
+        clock=clock,
         refresh_s=refresh_s(plant),
-        references=analysis.references,
-        alarms=analysis.alarms,
-        films=analysis.films,
-        operators=LocalCommands(analysis.alarms, analysis.films, analysis.recorder),
-        captures=analysis.captures,
-        receivers=analysis.deliveries.look,
-        evidence=lambda: analysis.evidence.status,
-        configuration=analysis.evidence.configuration,
-        metrics=partial(scrape, analysis, bus, sources),
-        origin=process.origin,
+        receivers=lambda: asyncio.to_thread(receiver_views, live.plant.receivers, store.outbox),
+        origin=origin,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
-        sources=sources,
-        loops=process.beats.look,
-        refusals=refusals,
+        configuration=built_configuration(plant),
+        metrics=metrics,
         access=desk,
-        space=analysis.space,
-        load=analysis.load,
-        tape=analysis.tape,
         recordings=(evidence_folders(plant).captures, recordings_folder(plant)),
-        faults=lambda: analysis.recordings.faults,
-        stored_trouble=lambda: analysis.soundness.trouble,
     )
 
 
-class Replica:
-    """Replica of a plant's state, read from the database that other processes write."""
-
-    def __init__(self, plant: PlantFile, store: Store, clock: Clock) -> None:
-        self._plant, self._store, self._clock = plant, store, clock
-        units = [unit.id for unit in plant.unit]
-        self.live = ReplicaLive(units, clock, STALE_HOPS * refresh_s(plant))
-        self.alarms = ReplicaAlarms(units, self.live.is_alive, chatter_rule_of(plant.alarms))
-        self.films = ReplicaFilms(plant, store.films)
-        self.feed = Feed(store, self.live, self.alarms, self.films, clock)
-        machines = {unit.id: UnitDescription(machine_of(unit)) for unit in plant.unit}
-        self.references = ReferencesInForce(machines, store, clock)
-        receivers = receivers_of(plant, Origin.LIVE, clock)
-        self.deliveries = ReplicaDeliveries(receivers, store.outbox)
-
-    async def start(self) -> None:
-        """Read the current state; to be called before the first request.
-
-        Raises
-        ------
-        StoreError
-            If the state cannot be read.
-        """
-        await self.feed.start()
-        await self.references.look()
-
-    def checks(self) -> dict[str, str]:
-        """Return the status of each unit's analysis in words, by name of the check."""
-        return {f"analysis of {unit.id}": self._signs_of(unit.id) for unit in self._plant.unit}
-
-    def _signs_of(self, unit: str) -> str:
-        silence_s = self.live.silence_s(unit)
-        if silence_s is None:
-            return "no heartbeat yet"
-        said = f"last heartbeat {silence_s:.1f} s ago"
-        return said if self.live.is_alive(unit) else f"silent: {said}"
-
-    def context(
-        self, desk: Authenticator | None, refusals: Refusals | None, beats: Heartbeats
-    ) -> Context:
-        """Return the API context of a process that does not analyse."""
-        plant, store = self._plant, self._store
-        bearings = {unit.id: [bearing.id for bearing in unit.bearing] for unit in plant.unit}
-        seen = (self.live, self.alarms, self.films, self.deliveries, self._clock)
-        return Context(
-            plant_name=plant.plant.name,
-            units={unit.id: unit for unit in plant.unit},
-            live=self.live,
-            store=store,
-            clock=self._clock,
-            refresh_s=refresh_s(plant),
-            references=self.references,
-            alarms=self.alarms,
-            films=self.films,
-            operators=CommandClient(store, self.alarms, self._clock),
-            captures=NoCaptures(),
-            receivers=self.deliveries.look,
-            metrics=ReplicaMetrics(bearings, *seen, store.kind).scrape,
-            max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
-            loops=beats.look,
-            checks=self.checks,
-            refusals=refusals,
-            access=desk,
-        )
+def references_of(plant: PlantFile, store: Store, clock: Clock) -> ReferencesInForce:
+    """Return the gap references in force, for a process without monitors."""
+    machines = {unit.id: UnitDescription(machine_of(unit)) for unit in plant.unit}
+    return ReferencesInForce(machines, store, clock)
 
 
-async def run_serve(
-    plant: PlantFile,
+def evidence_of(
+    plant: PlantFile, store: Store, live: LiveClient, clock: Clock, downloads: Downloads
+) -> EvidenceService:
+    """Return the service for downloads of alarm evidence."""
+    archive = EvidenceArchive(evidence_folders(plant), store)
+    days = plant.evidence.trend_days
+    return EvidenceService(archive, lambda: live.plant.evidence, days, clock, downloads)
+
+
+ACCESS_EVERY_S = 10.0
+
+
+def access_reports(access: AccessStore, exchange: ServingEnd, clock: Clock) -> Loop:
+    """Return a loop that reports faults of the database of accounts, which raise an alarm."""
+
+    async def report(pulse: Pulse) -> None:
+        while True:
+            pulse.beat(ACCESS_EVERY_S)
+            trouble = await asyncio.to_thread(lambda: access.trouble)
+            with suppress(MeasuringGoneError):  # the next report repeats it
+                await exchange.ask("access", json.dumps([trouble]))
+            await clock.sleep(ACCESS_EVERY_S)
+
+    return report
+
+
+async def serve_beside(
+    start: Start,
+    reader: asyncio.StreamReader,
+    writer: asyncio.StreamWriter,
     listener: socket.socket,
     clock: Clock,
-    announce: Callable[[str], None],
-    manager: ServiceManager = NO_MANAGER,
 ) -> None:
-    """Serve the API from the database until SIGINT or SIGTERM.
+    """Serve until the measuring process ends or sends SIGTERM."""
+    plant, stopped = start.plant, stop_on_signals()
+    with (
+        closing(open_store_to_serve(plant, start.origin)) as store,
+        closing(open_access(plant, start.origin)) as access,
+    ):
+        live = LiveClient(plant, store.films, clock, lambda *question: exchange.ask(*question))
+        live.alarms.take_stored(await asyncio.to_thread(store.alarms))
+        operators = SocketOperators(store, live.alarms)
+        informed = asyncio.Event()
 
-    Parameters
-    ----------
-    listener, announce
-        As in `ProcessServer`.
+        async def take(report: Report) -> None:
+            await live.take(report, is_direct=True)
+            informed.set()
 
-    Raises
-    ------
-    StoreError
-        If the database cannot be used.
-    ClosedError
-        If the service would be reachable from other hosts without TLS or accounts.
-    """
-    with closing(open_store(plant)) as store:
-        desk = access_desk(plant, store.access, clock)
-        replica = Replica(plant, store, clock)
-        await replica.start()
-        beats = Heartbeats(clock)
-        process = ProcessContext(
-            plant, Origin.LIVE, clock, store, live_view(plant, clock), beats, Timings([], clock)
+        exchange = operators.exchange = ServingEnd(writer, take)
+        listening = asyncio.create_task(exchange.run(reader), name="reports")
+        listening.add_done_callback(lambda _: stopped.set())
+        references = references_of(plant, store, clock)
+        await references.look()
+        desk = access_desk(plant, access, clock, start.is_demo)
+        context = context_of(plant, store, live, operators, references, desk, clock, start.origin)
+        evidence = evidence_of(plant, store, live, clock, context.downloads)
+        await asyncio.wait(
+            [listening, waiting := asyncio.ensure_future(informed.wait())],
+            return_when=asyncio.FIRST_COMPLETED,
         )
-        audit = ServiceTrail(plant, Origin.LIVE, store.audit, clock)
-        await audit.begin()
-        context = replica.context(desk, audit.refusals, beats)
-        server = serving_of(context, process, listener, desk, announce)
-        supervision = Supervision(manager, beats, replica.live, [u.id for u in plant.unit], clock)
-        loops = {"feed": replica.feed.run, "references": replica.references.run}
+        waiting.cancel()
+
+        async def ready(url: str, token: str | None) -> None:
+            with suppress(MeasuringGoneError):
+                await exchange.ask("ready", json.dumps([url, token]))
+
         try:
-            await server.run(supervision, beats, lambda tasks, _: start_loops(loops, beats, tasks))
+            loops = {
+                "references": references.run,
+                "access": access_reports(access, exchange, clock),
+            }
+            await serve_requests(context, plant, listener, desk, loops, stopped, ready, evidence)
         finally:
-            desk.close()
-            await audit.end()
+            listening.cancel()
+            await desk.close()
+
+
+async def _main(connection: socket.socket, listener: socket.socket) -> None:
+    reader, writer = await asyncio.open_connection(sock=connection)
+    try:
+        start = await read_start(reader)
+    except VersionError as error:
+        log.error(str(error))
+        leave(WRONG_VERSION)
+    await serve_beside(start, reader, writer, listener, SystemClock())
+
+
+if __name__ == "__main__":
+    set_up_logging()
+    connection = socket.socket(fileno=int(sys.argv[1]))
+    descriptors = socket.recv_fds(connection, 1, 1)[1]
+    if descriptors:  # none if the measuring process could not start
+        run_to_its_end(_main(connection, socket.socket(fileno=descriptors[0])))
+    leave()

@@ -22,7 +22,7 @@ from acquisition.simulated.feed import SampleFeed
 from core.machine.unit import Unit
 from core.samples.calibration import UnitCalibration
 from service.runtime.process import stop_on_signals
-from service.settings.adapter_values import can_daq_of
+from service.settings.can_values import can_daq_of
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.plant import PlantFile
 from service.settings.sources.can import CanSettings

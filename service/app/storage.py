@@ -1,53 +1,26 @@
-"""Storage of a plant file: store, recordings, evidence, retention and disk watch."""
+"""Databases of a plant file, and the folders of its data."""
 
-from collections.abc import Callable
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from acquisition.clock import Clock
-from service.api.downloads import Downloads
-from service.app.recordings import recording_writer
-from service.live.live_view import LiveView
-from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.films import FilmMonitor
-from service.recordings.around_alarms import Captures, CaptureSettings
-from service.recordings.continuous_recorder import ContinuousRecorder, DropReason
-from service.recordings.folders import place_of
-from service.recordings.index import Index
-from service.recordings.keeper import RecordingIndexer, RecordingLock
-from service.recordings.retention import RecordingRetention, RetentionRules, RoomLimits, SpaceGauge
-from service.recordings.segment import SegmentSettings
-from service.reports.archive import EvidenceArchive
-from service.reports.collector import EvidenceCollector, EvidenceFolders
-from service.reports.document import Maker
-from service.reports.folders import captures_in_use
-from service.reports.retention import EvidenceLimits, EvidenceRetention
-from service.reports.routes import EvidenceService
-from service.reports.snapshot import SnapshotTaker
-from service.reports.writer import EvidenceWriter
-from service.runtime.disk import SpaceLimits, SpaceWatch, measure_disk
-from service.settings.adapter_values import recorded_unit
+from service.reports.folders import EvidenceFolders
 from service.settings.configuration import Configuration, built_from, configuration_of
-from service.settings.core_values import analysis_of, film_rules_of
 from service.settings.plant import PlantFile, SpectraSettings
-from service.settings.sources.devices import ModbusVectorSettings
-from service.settings.storage import Origin, SpaceSettings
-from service.settings.units import UnitSettings
+from service.settings.storage import Origin
 from service.store.access.audit_verification import head_path
+from service.store.access.tables import AccessStore
 from service.store.audit import Trail
 from service.store.outbox import Address, no_recipients
 from service.store.spectra import SpectraLimits, TierLimits
 from service.store.sqlite import SqliteStore
-from service.store.sqlite.store import file_trail
+from service.store.sqlite.store import SqliteReader, file_trail, open_access_file
 from service.store.store import Store
-from service.store.waveforms import WaveformKind
 
 if TYPE_CHECKING:
     from service.store.postgres.connection import PostgresAddress
 
-DATABASE = "padwatch.sqlite3"
+DATABASE, ACCESS_DATABASE = "padwatch.sqlite3", "access.sqlite3"
 
 
 def database_path(plant: PlantFile) -> Path:
@@ -55,8 +28,13 @@ def database_path(plant: PlantFile) -> Path:
     return Path(plant.service.data_folder) / DATABASE
 
 
+def access_path(plant: PlantFile) -> Path:
+    """Return the path of the file of accounts, sessions and keys; the file need not exist."""
+    return Path(plant.service.data_folder) / ACCESS_DATABASE
+
+
 def has_store(plant: PlantFile) -> bool:
-    """Whether the database exists; always true for PostgreSQL."""
+    """Return whether the database exists; always True for PostgreSQL."""
     return plant.store.postgresql is not None or database_path(plant).exists()
 
 
@@ -65,6 +43,17 @@ def store_name(plant: PlantFile) -> str:
     if plant.store.postgresql is not None:
         return _postgres_address(plant, plant.store.postgresql).name
     return str(database_path(plant).absolute())
+
+
+def has_access(plant: PlantFile) -> bool:
+    """Return whether the database of accounts exists; always True for PostgreSQL."""
+    return plant.store.postgresql is not None or access_path(plant).exists()
+
+
+def access_name(plant: PlantFile) -> str:
+    """Return the name of the database of accounts for messages."""
+    is_file = plant.store.postgresql is None
+    return str(access_path(plant).absolute()) if is_file else store_name(plant)
 
 
 def head_file(plant: PlantFile) -> Path:
@@ -82,7 +71,7 @@ def open_store(
     Parameters
     ----------
     address
-        Returns the recipients of an alarm event.
+        Function that returns the recipients of an alarm event.
 
     Raises
     ------
@@ -98,13 +87,45 @@ def open_store(
     return PostgresStore(where, head_file(plant), origin, address, spectra)
 
 
-def open_trail(plant: PlantFile) -> Trail:
-    """Open the audit trail of the plant's database for reading."""
+def open_store_to_serve(plant: PlantFile, origin: Origin = Origin.LIVE) -> Store:
+    """Open the plant's database for a process that only serves.
+
+    A SQLite file is opened read-only. With PostgreSQL, operators' commands are written.
+
+    Raises
+    ------
+    StoreError
+        If the database cannot be used.
+    """
     if plant.store.postgresql is None:
-        return file_trail(database_path(plant))
+        return SqliteReader(database_path(plant))
+    return open_store(plant, origin)
+
+
+def open_access(plant: PlantFile, origin: Origin = Origin.LIVE) -> AccessStore:
+    """Open the plant's accounts: a SQLite file of their own, created if missing, or PostgreSQL.
+
+    Raises
+    ------
+    StoreError
+        If the database cannot be used.
+    """
+    if plant.store.postgresql is None:
+        return open_access_file(access_path(plant))
+    from service.store.postgres.store import open_server_access
+
+    return open_server_access(
+        _postgres_address(plant, plant.store.postgresql), head_file(plant), origin
+    )
+
+
+def open_trails(plant: PlantFile) -> list[Trail]:
+    """Open the chains of the plant's audit trail for reading."""
+    if plant.store.postgresql is None:
+        return [file_trail(database_path(plant)), file_trail(access_path(plant))]
     from service.store.postgres.store import server_trail
 
-    return server_trail(_postgres_address(plant, plant.store.postgresql), head_file(plant))
+    return [server_trail(_postgres_address(plant, plant.store.postgresql), head_file(plant))]
 
 
 def _postgres_address(plant: PlantFile, conninfo: str) -> "PostgresAddress":
@@ -114,7 +135,7 @@ def _postgres_address(plant: PlantFile, conninfo: str) -> "PostgresAddress":
 
 
 def spectra_limits(settings: SpectraSettings) -> SpectraLimits:
-    """Return the limits of stored spectra by the settings."""
+    """Return the limits of stored spectra from the settings."""
     return SpectraLimits(
         TierLimits(settings.dense_every_s, settings.n_dense),
         TierLimits(settings.sparse_every_s, settings.n_sparse),
@@ -124,39 +145,6 @@ def spectra_limits(settings: SpectraSettings) -> SpectraLimits:
 
 CAPTURES = "captures"
 
-BYTES_PER_GB = 1e9
-
-
-def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
-    """Return the capture recorder of the units of a live plant; a replay makes no captures."""
-    found = plant.capture
-    kept = origin is Origin.LIVE and found.samples == "kept"
-    # a vector rack has no samples
-    waveforms = [u for u in plant.unit if not isinstance(u.source, ModbusVectorSettings)]
-    units = waveforms if kept else []
-    settings = CaptureSettings(
-        pre_s=found.pre_s,
-        post_s=found.post_s,
-        max_s=found.max_s,
-        window_s=max((_window_s(plant, unit) for unit in units), default=0.0),
-    )
-    return Captures(
-        Path(plant.service.data_folder) / CAPTURES,
-        settings,
-        {unit.id: partial(recording_writer, unit) for unit in units},
-        {unit.id: unit.sampling_hz for unit in units},
-        clock,
-    )
-
-
-def _window_s(plant: PlantFile, unit: UnitSettings) -> float:
-    """Return the length of an averaging window of a watched film; 0 if none is watched."""
-    if isinstance(film_rules_of(unit, plant.films), str):
-        return 0.0
-    analysis = analysis_of(plant.analysis)
-    n_samples = analysis.segment_samples + (analysis.n_segments - 1) * analysis.hop_samples
-    return n_samples / unit.sampling_hz
-
 
 RECORDINGS = "recordings"
 
@@ -164,24 +152,6 @@ RECORDINGS = "recordings"
 def recordings_folder(plant: PlantFile) -> Path:
     """Return the folder of continuous recordings of a plant."""
     return Path(plant.recording.folder or Path(plant.service.data_folder) / RECORDINGS)
-
-
-def tape_of(
-    plant: PlantFile, origin: Origin, clock: Clock, press: Callable[[], DropReason | None]
-) -> ContinuousRecorder:
-    """Return the continuous recorder of the units of a live plant that are recorded."""
-    found = plant.recording
-    units = {
-        unit.id: recorded_unit(unit)
-        for unit in plant.unit
-        # a vector rack has no samples; a replay is not recorded again
-        if found.keeps(unit.id)
-        and origin is Origin.LIVE
-        and not isinstance(unit.source, ModbusVectorSettings)
-    }
-    settings = SegmentSettings(60.0 * found.length_min, found.sync_s)
-    owned = [unit.id for unit in plant.unit] if origin is Origin.LIVE else []
-    return ContinuousRecorder(recordings_folder(plant), units, settings, clock, press, owned)
 
 
 EVIDENCE, CONFIGURATIONS = "evidence", "configurations"
@@ -193,103 +163,6 @@ def evidence_folders(plant: PlantFile) -> EvidenceFolders:
     return EvidenceFolders(root / EVIDENCE, root / CAPTURES, root / CONFIGURATIONS)
 
 
-def evidence_desk(
-    plant: PlantFile, store: Store, keeper: EvidenceCollector, clock: Clock, downloads: Downloads
-) -> EvidenceService:
-    """Return the service for downloads of alarm evidence."""
-    archive = EvidenceArchive(evidence_folders(plant), store)
-    return EvidenceService(archive, keeper, plant.evidence.trend_days, clock, downloads)
-
-
-def evidence_of(
-    plant: PlantFile,
-    origin: Origin,
-    live: LiveView,
-    films: FilmMonitor,
-    store: Store,
-    captures: Captures,
-    clock: Clock,
-) -> EvidenceCollector:
-    """Return the collector of alarm evidence; `watch` connects it to the alarms."""
-    limits, folders = limits_of(plant), evidence_folders(plant)
-    configuration = built_configuration(plant)
-    maker = Maker(plant, configuration, f"padwatch {version('padwatch')}", origin)
-    writer = EvidenceWriter(folders.evidence, maker, store.films, limits)
-    camera = SnapshotTaker({unit.id: unit for unit in plant.unit}, live, films)
-    room = EvidenceRetention(folders.evidence, limits, clock)
-    return EvidenceCollector(folders, camera, writer, room, configuration, captures, clock)
-
-
-def watch(
-    keeper: EvidenceCollector, alarms: AlarmEngine, captures: Captures, origin: Origin
-) -> None:
-    """Connect the collector of evidence to the alarms; a replay collects no evidence."""
-    if origin is Origin.LIVE:
-        alarms.set_observer(keeper.see)
-        captures.set_listener(keeper.captured)
-
-
 def built_configuration(plant: PlantFile) -> Configuration:
     """Return the effective configuration of the plant in this build, without secrets."""
     return configuration_of(plant, version("padwatch"), built_from())
-
-
-def limits_of(plant: PlantFile) -> EvidenceLimits:
-    """Return the limits of stored evidence."""
-    found = plant.evidence
-    return EvidenceLimits(
-        max_bytes=round(found.max_gb * BYTES_PER_GB),
-        hard_max_bytes=round(found.hard_max_gb * BYTES_PER_GB),
-        keep_days=found.keep_days,
-        max_per_alarm=found.max_per_alarm,
-        trend_days=found.trend_days,
-    )
-
-
-def space_watch(plant: PlantFile, clock: Clock) -> SpaceWatch:
-    """Return the free-space monitor of all data folders; they may be on different disks."""
-    data = Path(plant.service.data_folder)
-    folders = {"data": data, CAPTURES: data / CAPTURES, EVIDENCE: data / EVIDENCE}
-    if plant.recording.samples == "kept":
-        folders[RECORDINGS] = recordings_folder(plant)
-    return SpaceWatch(folders, space_limits(plant.space), clock)
-
-
-def space_limits(settings: SpaceSettings) -> SpaceLimits:
-    """Return the disk limits of the plant file."""
-    return SpaceLimits(
-        settings.alert_free_share,
-        settings.danger_free_share,
-        round(settings.alert_free_gb * BYTES_PER_GB),
-        round(settings.danger_free_gb * BYTES_PER_GB),
-    )
-
-
-def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> RecordingIndexer:
-    """Return the indexer of the recordings of a live plant, with their retention."""
-    data, rules = Path(plant.service.data_folder), retention_rules(plant)
-
-    def open_retention() -> RecordingRetention:
-        return RecordingRetention(rules, Index(store.waveforms, place_of(data)), clock)
-
-    return RecordingIndexer(rules.gauge, open_retention, clock, RecordingLock(data))
-
-
-def retention_rules(plant: PlantFile) -> RetentionRules:
-    """Return the folders of recordings and the rules of their retention."""
-    data = Path(plant.service.data_folder)
-    room = RoomLimits(
-        continuous_bytes=round(plant.recording.max_gb * BYTES_PER_GB),
-        capture_bytes=round(plant.capture.max_gb * BYTES_PER_GB),
-        continuous_days=plant.recording.max_days,
-    )
-    roots = {
-        WaveformKind.CAPTURE: data / CAPTURES,
-        WaveformKind.CONTINUOUS: recordings_folder(plant),
-    }
-    return RetentionRules(
-        roots=roots,
-        room=room,
-        gauge=SpaceGauge(roots, space_limits(plant.space), measure_disk),
-        in_use=partial(captures_in_use, data / EVIDENCE),
-    )

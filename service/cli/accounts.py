@@ -9,8 +9,7 @@ import typer
 
 from acquisition.clock import SystemClock
 from core.units import NS_PER_S
-from service.api.auth.passwords import Hashing
-from service.api.auth.people import AccountService, create_key
+from service.api.auth.service import AccessService
 from service.cli.options import (
     JsonOutput,
     PasswordFd,
@@ -19,7 +18,7 @@ from service.cli.options import (
     command_group,
     fail,
     password_from,
-    plant_store,
+    plant_access,
     print_result,
 )
 from service.runtime.process import made_by
@@ -32,19 +31,13 @@ from service.store.access.tables import AccessStore
 
 @contextmanager
 def access_of(plant: PlantFile, creates: bool = False) -> Iterator[AccessStore]:
-    """Open the plant's accounts and keys.
-
-    Parameters
-    ----------
-    creates
-        Whether the database is created if there is none.
-    """
-    with acting_as(Acting(Source.COMMAND_LINE, made_by())), plant_store(plant, creates) as store:
-        yield store.access
+    """Open the plant's accounts and keys, and yield their store; `creates` as in `plant_store`."""
+    with acting_as(Acting(Source.COMMAND_LINE, made_by())), plant_access(plant, creates) as store:
+        yield store
 
 
 def time_text(time_ns: int) -> str:
-    """Format a time in UTC, to the second."""
+    """Return a time as UTC text, to the second."""
     return datetime.fromtimestamp(time_ns // NS_PER_S, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
@@ -57,7 +50,7 @@ def create(
     name: Annotated[str, argument("Purpose of the key.")],
     role: Annotated[Role, typer.Option(help="Role of the machine.")] = Role.VIEWER,
     unit: Annotated[
-        list[str] | None, typer.Option(help="Open only this unit; may be repeated.")
+        list[str] | None, typer.Option(help="Limit the key to this unit; may be repeated.")
     ] = None,
     days: Annotated[
         int, typer.Option(min=1, max=MAX_DAYS, help="Days until the key expires.")
@@ -72,7 +65,7 @@ def create(
             fail(f"unknown unit {wanted}; known units: {', '.join(known)}", 2)
     with access_of(plant, creates=True) as access:
         now_ns = SystemClock().now_ns()
-        key, shown = create_key(access, name, role, unit or (), days, now_ns)
+        key, shown = AccessService(access).create_key(name, role, unit or (), days, now_ns)
     print_result({**_row(key, now_ns), "key": shown}, [shown], json_output, indent=None)
     if not json_output:
         typer.echo(f"{_line(key, now_ns)}; the key is shown only once", err=True)
@@ -93,10 +86,10 @@ def revoke(
     plant_file: PlantPath,
     id_: Annotated[str, argument("Id of the key, as listed.", metavar="ID")],
 ) -> None:
-    """Revoke a key permanently, from its next request on."""
+    """Revoke a key permanently; it is rejected from the next request on."""
     with access_of(load_plant_file(plant_file)) as access:
         if access.keys.get(id_) is None:
-            fail(f"key {id_} does not exist", 2)
+            fail(f"key {id_} does not exist; see padwatch keys list", 2)
         is_new = access.keys.revoke(id_, SystemClock().now_ns())
     typer.echo(f"{id_}: revoked" if is_new else f"{id_}: was already revoked")
 
@@ -137,7 +130,7 @@ def add(
     """Add an account."""
     plant, password = load_plant_file(plant_file), password_from(password_fd)
     with access_of(plant, creates=True) as access:
-        added = AccountService(access, Hashing()).add(name, role, password, SystemClock().now_ns())
+        added = AccessService(access).add(name, role, password, SystemClock().now_ns())
     typer.echo(f"{added}: added as {role}")
 
 
@@ -165,7 +158,7 @@ def set_role(
     name: Name,
     role: Annotated[Role, typer.Argument(help="New role of the account.")],
 ) -> None:
-    """Change the role of an account, from its next request on."""
+    """Change the role of an account; it applies from the next request on."""
     with access_of(load_plant_file(plant_file)) as access:
         access.accounts.set_role(account_name(name), role, SystemClock().now_ns())
     typer.echo(f"{account_name(name)}: role changed to {role}")
@@ -173,11 +166,10 @@ def set_role(
 
 @users_app.command("password")
 def set_password(plant_file: PlantPath, name: Name, password_fd: PasswordFd = None) -> None:
-    """Set another password and end all sessions of the account."""
+    """Set a new password of an account and end all its sessions."""
     plant, password = load_plant_file(plant_file), password_from(password_fd)
     with access_of(plant) as access:
-        people = AccountService(access, Hashing())
-        people.set_password(account_name(name), password, SystemClock().now_ns())
+        AccessService(access).set_password(account_name(name), password, SystemClock().now_ns())
     typer.echo(f"{account_name(name)}: password changed, all sessions ended")
 
 

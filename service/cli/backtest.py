@@ -87,7 +87,7 @@ def backtest(
             n_files = export_baselines(found, export)
         except OSError as error:
             fail(f"{export}: {error.strerror}")
-        typer.echo(f"{export}: {n_files} files", err=True)
+        typer.echo(f"{export}: {n_files} files written", err=True)
     duration_s = clock.monotonic_s() - begin_s
     report = found.report(str(readings), n_rows, duration_s)
     print_result(report, lines_of(report), json_output)

@@ -1,85 +1,99 @@
-"""The commands of `padwatch`; the modules of a command are imported when it is used."""
+"""Commands of `padwatch`; the modules of a command are imported when it is used."""
 
 import gc
 from collections.abc import Iterator, Mapping
 from importlib import import_module
-from typing import Any
+from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand
 
 from service.cli.options import CommandGroup
 
-COMMANDS = {
-    "run": ("run.run", "Acquire, analyse, store and serve a plant until Ctrl-C or SIGTERM."),
-    "demo": (
-        "run.demo",
-        "Show padwatch at work on two simulated 700 MW units behind a real Modbus TCP DAQ.",
-    ),
-    "acquire": (
-        "run.acquire",
-        "Read devices and publish their blocks to the stream until Ctrl-C or SIGTERM.",
-    ),
-    "analyse": (
-        "run.analyse",
-        "Analyse blocks from the stream and store results until Ctrl-C or SIGTERM.",
-    ),
-    "serve": (
-        "run.serve",
-        "Serve a plant that other processes acquire and analyse, until Ctrl-C or SIGTERM.",
-    ),
-    "daq": (
-        "daq.daq",
-        "Serve units over the protocols of their sources, at the addresses in the plant file.",
-    ),
-    "record": ("record.record", "Record a unit's samples exactly as its DAQ delivers them."),
-    "replay": (
-        "replay.replay",
-        "Play recordings through acquisition, analysis, store and dashboard, as if they happened"
-        " now.",
-    ),
-    "reanalyse": (
-        "reanalyse.reanalyse",
-        "Analyse a recording with the bearings and the analysis settings of a plant file.",
-    ),
-    "backtest": (
-        "backtest.backtest",
-        "Learn baselines from past readings, and list the alarms that would have followed.",
-    ),
-    "validate": (
-        "validate.validate",
-        "Recompute the published tables and print them beside padwatch's figures.",
-    ),
-    "backup": (
-        "store.backup",
-        "Copy the database, also while padwatch runs; verify the copy and remove the oldest ones.",
-    ),
-    "restore": (
-        "store.restore",
-        "Replace the database by a copy, while padwatch is stopped; the old one is kept beside it.",
-    ),
-    "config": ("config.app", "Check a plant file, print its schema or an example."),
-    "reference": (
-        "reference.app",
-        "Set or list references: the probe gaps with the shaft centred.",
-    ),
-    "audit": ("audit.app", "Verify and export the audit trail."),
-    "recording": ("recording.app", "Inspect, verify, export and import recordings."),
-    "store": ("store.store_app", "The database: integrity check."),
-    "readings": ("store.readings_app", "Export the stored readings of the films."),
-    "probe": ("probe.app", "Read a device once and print its data; nothing is stored."),
-    "delivery": ("notifications.app", "Test receivers of alarms; send again."),
-    "users": ("accounts.users_app", "Accounts of people: add, list, change, remove."),
-    "keys": ("accounts.keys_app", "Keys of machines: create, list, revoke."),
+GROUPS = {
+    "Run": {
+        "run": ("run.run", "Acquire, analyse, store and serve a plant until Ctrl-C or SIGTERM."),
+        "demo": (
+            "processes.demo",
+            "Run padwatch with two simulated 700 MW units, read from simulated DAQs by Modbus TCP.",
+        ),
+        "daq": (
+            "daq.daq",
+            "Run simulated DAQs of the units, with the protocols and addresses in the plant file.",
+        ),
+    },
+    "Set up": {
+        "config": ("config.app", "Check a plant file, print its schema or an example."),
+        "probe": ("probe.app", "Read a device once and print its data; nothing is stored."),
+        "reference": (
+            "reference.app",
+            "Set or list references: the probe gaps with the shaft centred.",
+        ),
+        "delivery": ("notifications.app", "Test receivers of alarms, and resend messages."),
+        "users": ("accounts.users_app", "Accounts of people: add, list, change, remove."),
+        "keys": ("accounts.keys_app", "Keys of machines: create, list, revoke."),
+    },
+    "Recordings and readings": {
+        "record": ("record.record", "Record a unit's samples exactly as its DAQ delivers them."),
+        "recording": ("recording.app", "Inspect, verify, export and import recordings."),
+        "reanalyse": (
+            "reanalyse.reanalyse",
+            "Analyse a recording with the bearings and the analysis settings of a plant file.",
+        ),
+        "replay": (
+            "replay.replay",
+            "Play recordings through acquisition, analysis, store and dashboard, as if they"
+            " happened now.",
+        ),
+        "readings": ("store.readings_app", "Export the stored readings of the films."),
+        "backtest": (
+            "backtest.backtest",
+            "Learn baselines from past readings, and list the alarms that would have followed.",
+        ),
+    },
+    "Maintain": {
+        "backup": (
+            "store.backup",
+            "Copy both databases, also while padwatch runs; verify the copies, remove the"
+            " oldest ones.",
+        ),
+        "restore": (
+            "store.restore",
+            "Replace the databases by copies, while padwatch is stopped; the old ones are"
+            " kept beside.",
+        ),
+        "store": ("store.store_app", "The databases: integrity check."),
+        "audit": ("audit.app", "Verify and export the audit trail."),
+        "validate": (
+            "validate.validate",
+            "Recompute the published tables and print them beside padwatch's figures.",
+        ),
+    },
+    "Run as several processes": {
+        "acquire": (
+            "processes.acquire",
+            "Read devices and publish their blocks to the stream until Ctrl-C or SIGTERM.",
+        ),
+        "analyse": (
+            "processes.analyse",
+            "Analyse blocks from the stream and store results until Ctrl-C or SIGTERM.",
+        ),
+        "serve": (
+            "processes.serve",
+            "Serve a plant that other processes acquire and analyse, until Ctrl-C or SIGTERM.",
+        ),
+    },
 }
-"""Module and attribute of each command, and the first sentence of its help."""
+"""Commands by heading of the help: name, then module and attribute, and first sentence."""
+
+COMMANDS = {name: entry for group in GROUPS.values() for name, entry in group.items()}
 
 
 class Commands(Mapping[str, Any]):
-    """The commands by name, each imported when it is looked up."""
+    """Mapping of the commands by name; a command is imported when it is looked up."""
 
     def __getitem__(self, name: str) -> Any:
-        """Import a command."""
+        """Return a command, imported from its module."""
         module, attribute = COMMANDS[name][0].split(".")
         gc.disable()  # a hundred collections take a fifth of the loading time
         found = getattr(import_module(f"service.cli.{module}"), attribute)
@@ -108,10 +122,16 @@ class LazyGroup(CommandGroup):
         super().__init__(**settings)
         self.commands: Any = Commands()
 
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the names of the commands and what they do."""
-        described = [TyperCommand(name, help=text) for name, (_, text) in COMMANDS.items()]
-        TyperGroup(commands=described).format_commands(ctx, formatter)
+    def format_commands(self, _: Any, formatter: Any) -> None:
+        """Write the names and help texts of the commands, by group."""
+        width = max(map(len, COMMANDS))
+        for heading, group in GROUPS.items():
+            texts = {name: TyperCommand(name, help=text) for name, (_, text) in group.items()}
+            limit = formatter.width - 6 - width
+            with formatter.section(heading):
+                formatter.write_dl(
+                    [(name.ljust(width), c.get_short_help_str(limit)) for name, c in texts.items()]
+                )
 
 
 app = typer.Typer(
@@ -123,8 +143,22 @@ app = typer.Typer(
 )
 
 
+def print_version(is_wanted: bool) -> None:
+    """Print the version of the program and exit, if the option ``--version`` was given."""
+    if is_wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"padwatch {version('padwatch')}")
+        raise typer.Exit
+
+
 @app.callback()
-def padwatch() -> None:
+def padwatch(
+    version: Annotated[  # noqa: ARG001
+        bool,
+        typer.Option("--version", help="Print the version.", callback=print_version, is_eager=True),
+    ] = False,
+) -> None:
     """Oil-film stiffness of hydrogenerator guide bearings, measured while the machine runs."""
     from service.runtime.process import set_up_logging
 

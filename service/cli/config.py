@@ -14,7 +14,7 @@ from service.cli.options import (
     fail,
     print_result,
 )
-from service.settings.adapter_values import require_dbc_fits
+from service.settings.can_values import require_dbc_fits
 from service.settings.loading import load_plant_file, plant_file_schema
 
 app = command_group("Check a plant file, print its schema or an example.")
@@ -22,7 +22,7 @@ app = command_group("Check a plant file, print its schema or an example.")
 
 @app.command()
 def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
-    """Check a plant file; every mistake is named with its line, exit code 2."""
+    """Check a plant file and print each mistake with its line; exit code 2 if there are any."""
     plant = load_plant_file(plant_file)
     try:
         for unit in plant.unit:

@@ -14,11 +14,12 @@ from typing import IO, Annotated
 import typer
 import uvloop
 
-from acquisition.clock import FastClock, SystemClock
+from acquisition.clock import Clock, SystemClock
 from acquisition.errors import ConfigError
 from acquisition.recordings.reader import open_recording
 from acquisition.simulated.devices.recorded import RecordedFeed
 from acquisition.simulated.feed import SampleFeed
+from core.units import ns_from_s
 from service.app.recordings import recordings_by_unit, selection_of
 from service.app.simulated_daq import Wire, daq_of, over_wire, run_daq
 from service.cli.options import PlantPath, fail, option
@@ -31,6 +32,41 @@ SpeedOption = Annotated[
     float,
     typer.Option(min=0.0, max=1000.0, help="Playback speed; 0: as fast as possible."),
 ]
+
+
+class FastClock:
+    """Clock that runs faster or slower than a reference clock by a constant factor; for replays.
+
+    Parameters
+    ----------
+    clock
+        Reference clock.
+    speed
+        Seconds of this clock per second of the reference clock; above 0.
+
+    Raises
+    ------
+    ValueError
+        If the speed is not positive.
+    """
+
+    def __init__(self, clock: Clock, speed: float) -> None:
+        if not speed > 0.0:
+            raise ValueError(f"speed must be above 0, got {speed}")
+        self._clock, self._speed = clock, speed
+        self._start_ns, self._start_s = clock.now_ns(), clock.monotonic_s()
+
+    def now_ns(self) -> int:
+        """Return the time at creation plus the scaled elapsed time, UTC nanoseconds since 1970."""
+        return self._start_ns + ns_from_s(self.monotonic_s())
+
+    def monotonic_s(self) -> float:
+        """Return the time since creation, in seconds of this clock."""
+        return (self._clock.monotonic_s() - self._start_s) * self._speed
+
+    async def sleep(self, duration_s: float) -> None:
+        """Suspend the current task for a duration in seconds of this clock."""
+        await self._clock.sleep(duration_s / self._speed)
 
 
 def daq(
@@ -46,10 +82,10 @@ def daq(
         typer.Option(help="Read commands UNIT FAULT [COUNT] from standard input; stop at its end."),
     ] = False,
 ) -> None:
-    """Serve units over the protocols of their sources, at the addresses in the plant file.
+    """Run simulated DAQs of the units, with the protocols and addresses in the plant file.
 
-    Prints one JSON line with the address of each unit, then runs until Ctrl-C or SIGTERM.
-    Unpaced, a device produces as fast as its reader reads.
+    Prints one JSON line with the address of each unit, then runs until Ctrl-C or SIGTERM. At speed
+    0, a device delivers samples as fast as they are read.
     """
     plant = load_plant_file(plant_file)
     if through is not None:
@@ -81,7 +117,9 @@ def _simulated_feeds(plant: PlantFile) -> dict[str, SampleFeed]:
     clock = SystemClock()
     feeds = {unit.id: simulated_feed(unit, clock) for unit in plant.unit if unit.simulation}
     if not feeds:
-        raise ConfigError("no unit of this plant file has a [unit.simulation] table")
+        raise ConfigError(
+            "no unit of this plant file has a [unit.simulation] table; add one, or use --recording"
+        )
     now_ns = clock.now_ns()  # the first feed was built seconds ago
     for feed in feeds.values():
         feed.begin_at(now_ns)
@@ -96,7 +134,7 @@ Endpoints = dict[str, dict[str, str | int]]
 
 @dataclass(frozen=True)
 class RunningDaq:
-    """A running simulated DAQ.
+    """Simulated DAQ that runs as a child process.
 
     Parameters
     ----------
@@ -114,11 +152,11 @@ class RunningDaq:
 
     @property
     def has_failed(self) -> bool:
-        """Whether the DAQ ended before its recordings."""
+        """Whether the DAQ ended before the end of its recordings."""
         return self.gone.is_set() and not all(over.is_set() for over in self.over.values())
 
     def attached(self, plant: PlantFile) -> PlantFile:
-        """Return the plant with the sources of its units at this DAQ."""
+        """Return a copy of the plant file whose sources have the addresses of this DAQ."""
         units = []
         for unit in plant.unit:
             source = unit.source.model_copy(update=self.endpoints.get(unit.id, {}))
@@ -130,8 +168,8 @@ class RunningDaq:
 def held_lines(endpoints: Endpoints) -> Iterator[None]:
     """Keep the pseudo-terminals of endpoints open, so that the system does not reuse their names.
 
-    The system reuses the name of a terminal that no program has open. A reader that reconnects
-    after its DAQ has ended would otherwise open, and lock, the terminal of another program.
+    A reader that reconnects after its DAQ has ended would otherwise open, and lock, the terminal
+    of another program.
     """
     places = [place for endpoint in endpoints.values() for place in endpoint.values()]
     with ExitStack() as stack:
@@ -144,7 +182,7 @@ def held_lines(endpoints: Endpoints) -> Iterator[None]:
 
 @contextmanager
 def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
-    """Run ``padwatch daq`` as a child process that ends with this one, however this one ends."""
+    """Run ``padwatch daq`` as a child process, and yield it; stop the child at the end."""
     with subprocess.Popen(  # noqa: S603  our own program
         [sys.executable, "-m", "service.cli.main", "daq", *arguments, "--control"],
         stdin=subprocess.PIPE,
@@ -178,7 +216,6 @@ def _stop(process: "subprocess.Popen[bytes]") -> None:
 
 
 def _listen(stdout: IO[bytes], daq: RunningDaq) -> None:
-    """Record the events that the DAQ prints, until it ends."""
     for line in stdout:
         ended = json.loads(line).get("ended")
         if ended in daq.over:

@@ -25,7 +25,7 @@ from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 
-app = command_group("Test receivers of alarms; send again.")
+app = command_group("Test receivers of alarms, and resend messages.")
 
 ReceiverId = Annotated[str, argument("Receiver of the plant file.")]
 
@@ -50,9 +50,9 @@ def send_test(plant_file: PlantPath, receiver: ReceiverId, json_output: JsonOutp
 def send_again(
     plant_file: PlantPath, receiver: ReceiverId, json_output: JsonOutput = False
 ) -> None:
-    """Queue messages again that a receiver refused or that expired, in their old order.
+    """Requeue the refused and expired messages of a receiver, in their original order.
 
-    A running service begins within half a minute.
+    A running service begins to send them within half a minute.
     """
     plant = load_plant_file(plant_file)
     names = [one.name for one in _chosen(plant, receiver)]

@@ -15,16 +15,17 @@ from typer.core import TyperGroup
 if TYPE_CHECKING:
     from service.settings.plant import PlantFile
     from service.settings.units import UnitSettings
+    from service.store.access.tables import AccessStore
     from service.store.store import Store
 
 
 def option(meaning: str, *names: str, **limits: Any) -> Any:
-    """Declare an option whose help shows no default."""
+    """Return the declaration of an option whose help shows no default."""
     return typer.Option(*names, help=meaning, show_default=False, **limits)
 
 
 def argument(meaning: str, **settings: Any) -> Any:
-    """Declare an argument whose help shows no default."""
+    """Return the declaration of an argument whose help shows no default."""
     return typer.Argument(help=meaning, show_default=False, **settings)
 
 
@@ -45,13 +46,13 @@ EXIT_CODES = {
     "service.store.access.tables.AccessRefusedError": 2,
     "service.store.access.identities.NameRefusedError": 2,
     "service.api.auth.passwords.PasswordRefusedError": 2,
-    "service.app.web.ClosedError": 2,
-    "service.api.http.listening.CertificateError": 2,
+    "service.settings.processes.ClosedError": 2,
+    "service.runtime.listening.CertificateError": 2,
     "acquisition.errors.AcquisitionError": 1,
     "service.store.port.StoreError": 1,
     "service.store.backup.BackupError": 1,
     "service.cli.offline.backtest_cells.ReadingsError": 1,
-    "service.api.http.listening.PortInUseError": 1,
+    "service.runtime.listening.PortInUseError": 1,
     "service.cluster.session.StreamAnewError": 1,
 }
 """Exit codes of expected errors: 2 if a second try would fail too, 1 for a failure of a device,
@@ -76,7 +77,7 @@ class CommandGroup(TyperGroup):
     """Group of commands; an expected error ends its command with a message and an exit code."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the chosen command."""
+        """Run the chosen command; print the message of an expected error."""
         try:
             return super().invoke(ctx)
         except CommandError as error:
@@ -104,25 +105,19 @@ def _end(message: str, code: int) -> NoReturn:
 
 
 def command_group(meaning: str) -> typer.Typer:
-    """Create a group of commands."""
+    """Return a new group of commands with the help text `meaning`."""
     return typer.Typer(no_args_is_help=True, help=meaning, cls=CommandGroup)
 
 
 def fail(message: str, code: int = 1) -> NoReturn:
-    """End the command with a message.
-
-    Raises
-    ------
-    CommandError
-        Always.
-    """
+    """Raise `CommandError`, which ends the command with a message and an exit code."""
     raise CommandError(message, code)
 
 
 def print_result(
     document: object, lines: Iterable[str], json_output: bool, indent: int | None = 1
 ) -> None:
-    """Print a result as JSON, or as lines of text."""
+    """Print a result as JSON, in one line if `indent` is None, or as lines of text."""
     from pydantic_core import to_json
 
     shown = (
@@ -133,7 +128,7 @@ def print_result(
 
 
 def progress(label: str, length: int) -> Any:
-    """Create a progress bar on standard error, shown only on a terminal."""
+    """Return a progress bar on standard error, shown only on a terminal."""
     return typer.progressbar(
         length=length, label=label, file=sys.stderr, hidden=not sys.stderr.isatty()
     )
@@ -141,26 +136,41 @@ def progress(label: str, length: int) -> Any:
 
 @contextmanager
 def plant_store(plant: "PlantFile", creates: bool = False) -> Iterator["Store"]:
-    """Open the plant's database.
+    """Open the plant's database, and yield its store.
 
     Parameters
     ----------
     creates
-        Whether a missing database is created; otherwise it ends the command.
+        Whether a missing database is created; otherwise the command fails.
     """
     from service.app.storage import has_store, open_store, store_name
 
-    if not has_store(plant):  # the data folder may be relative to another folder
-        if not creates:
-            fail(f"{store_name(plant)}: the database does not exist")
-        notice = f"{store_name(plant)}: created a new database; check that the service uses it"
-        typer.echo(notice, err=True)
+    _require(has_store(plant), store_name(plant), creates)
     with closing(open_store(plant)) as store:
         yield store
 
 
+@contextmanager
+def plant_access(plant: "PlantFile", creates: bool = False) -> Iterator["AccessStore"]:
+    """Open the plant's accounts and keys; the parameters are as in `plant_store`."""
+    from service.app.storage import access_name, has_access, open_access
+
+    _require(has_access(plant), access_name(plant), creates)
+    with closing(open_access(plant)) as store:
+        yield store
+
+
+def _require(is_there: bool, name: str, creates: bool) -> None:
+    """Report a missing database: the data folder may be relative to another folder."""
+    if is_there:
+        return
+    if not creates:
+        fail(f"{name}: the database does not exist")
+    typer.echo(f"{name}: created a new database; check that the service uses it", err=True)
+
+
 def one_unit(plant: "PlantFile", id_: str | None, path: Path) -> "UnitSettings":
-    """Return a unit, or end with exit code 2; the name of a plant's only unit is optional."""
+    """Return the unit `id_`, or the only unit for None; otherwise end with exit code 2."""
     known = ", ".join(unit.id for unit in plant.unit)
     if id_ is None and len(plant.unit) > 1:
         fail(f"{path}: choose one of the units {known} with --unit", code=2)
@@ -200,7 +210,10 @@ PasswordFd = Annotated[
 
 
 def password_from(descriptor: int | None) -> str:
-    """Read a new password from a file descriptor or the terminal, or end with exit code 2."""
+    """Return a new password from a file descriptor, or for None from the terminal.
+
+    Ends with exit code 2 if there is no terminal or no valid password.
+    """
     if descriptor is None:
         if not sys.stdin.isatty():
             fail("no terminal for the password prompt; use --password-fd", 2)
@@ -211,7 +224,7 @@ def password_from(descriptor: int | None) -> str:
         while len(found) <= MAX_BYTES and (more := os.read(descriptor, MAX_BYTES)):
             found += more
         if len(found) > MAX_BYTES:
-            fail(f"file descriptor {descriptor} contains more than a password", 2)
+            fail(f"the password from descriptor {descriptor} is longer than {MAX_BYTES} bytes", 2)
         return found.decode().removesuffix("\n").removesuffix("\r")
     except OSError as error:
         fail(f"file descriptor {descriptor}: {error.strerror}", 2)

@@ -166,7 +166,7 @@ def in_flight(
     """Measure how many simultaneous requests a device answers (Modbus TCP)."""
     place = _place(device, unit_id, timeout_s, 115_200, "even")
     if place.host is None:
-        fail("a serial line allows only one request at a time", code=2)
+        fail("a serial line allows only one request at a time; give HOST[:PORT]", code=2)
     found = asyncio.run(measure_in_flight(place, address, function, MAX_IN_FLIGHT))
     typer.echo(f"requests_in_flight = {found}")
 
@@ -174,7 +174,6 @@ def in_flight(
 def _place(
     device: str, unit_id: int, timeout_s: float, baudrate: int, parity: str
 ) -> ModbusLinkSettings:
-    """Return the link to a device, or end with exit code 2."""
     given: dict[str, Any] = {"device_id": unit_id, "timeout_s": timeout_s}
     if device.startswith(RTU_PREFIX):
         given |= {"device": device, "baudrate": baudrate, "parity": parity}
@@ -191,7 +190,6 @@ def _place(
 
 
 def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:
-    """Return the device of a unit with a register map, or end with exit code 2."""
     device = getattr(unit, "slow_source", None) if slow else unit.source
     if not isinstance(device, MappedDeviceSettings):
         key = "slow_source" if slow else "source"

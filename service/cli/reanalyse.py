@@ -14,6 +14,7 @@ from acquisition.recordings.reader import open_recording
 from acquisition.recordings.source import RecordingSource
 from acquisition.source import SampleSource
 from core.monitor.assessment import Assessment
+from core.monitor.catalogue import BY_NAME
 from core.monitor.monitor import UnitMonitor
 from service.app.recordings import selection_of
 from service.cli.offline.reanalysis import (
@@ -22,6 +23,7 @@ from service.cli.offline.reanalysis import (
     calibration_differences,
     is_full,
     refreshes,
+    stiffness_lines,
 )
 from service.cli.options import (
     PlantOption,
@@ -42,14 +44,14 @@ BLOCK_S = 10.0
 
 
 class WindowChoice(StrEnum):
-    """Choice of the results that are printed."""
+    """Printed results: the last full average of each bearing, or all results."""
 
     LAST = "last"
     ALL = "all"
 
 
 class CalibrationChoice(StrEnum):
-    """Calibration that converts counts to engineering units."""
+    """Calibration that converts counts to engineering units: recorded, or of the plant file."""
 
     RECORDED = "recorded"
     PLANT = "plant"
@@ -93,7 +95,7 @@ def reanalyse(
     found = _chosen(source, monitor, choice, opened.manifest.n_samples)
     if not uvloop.run(_print(found, json_output)):
         n_samples = plant_file.analysis.segment_samples
-        fail(f"{recording}: no result, because no {n_samples} successive samples are without a gap")
+        fail(f"{recording}: no result, because no {n_samples} consecutive samples are without gap")
 
 
 async def _chosen(
@@ -111,7 +113,6 @@ async def _chosen(
 
 
 async def _print(found: AsyncIterator[Assessment], json_output: bool) -> int:
-    """Print results as they come; return their number."""
     n_printed = 0
     async for assessment in found:
         if json_output:
@@ -134,7 +135,10 @@ def _table(assessment: Assessment) -> Iterator[str]:
         f" {segments}{'' if is_full(found) else ' (not a full average)'},"
         f" {found.duration_s:.1f} s, {document['quality'].level}"
     )
-    for reading in document["readings"].values():
+    yield from (f"  {line}" for line in stiffness_lines(assessment))
+    for name, reading in document["readings"].items():
+        if name.startswith("stiffness_"):
+            continue
         value = "—" if reading.value is None else f"{reading.value:.6g}"
         doubt = "" if reading.level == "good" else f"  {reading.level}: {reading.reason}"
-        yield f"  {reading.label:<48}{value:>14} {reading.unit:<10}{doubt}".rstrip()
+        yield f"  {BY_NAME[name].label:<48}{value:>14} {BY_NAME[name].unit:<10}{doubt}".rstrip()

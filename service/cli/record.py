@@ -55,7 +55,7 @@ def record(
     """
     settings = one_unit(load_plant_file(plant_file), unit, plant_file)
     if isinstance(settings.source, ModbusVectorSettings):
-        fail(f"unit {settings.id} has no samples to record; its rack reports vectors", code=2)
+        fail(f"unit {settings.id} has no samples to record: its rack reports vectors", code=2)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -83,7 +83,7 @@ class ReconnectPolicy:
         self._deadline_s = clock.monotonic_s() + seconds
 
     async def wait(self, error: LinkError) -> None:
-        """Wait briefly, or raise the error after the planned end of the recording."""
+        """Wait up to `RETRY_S`, or raise the error after the planned end of the recording."""
         if self._clock.monotonic_s() >= self._deadline_s:
             raise error
         # a random share, as in the service, so that many recorders do not connect at once
@@ -101,11 +101,12 @@ async def record_blocks(
     Parameters
     ----------
     policy
-        Reopens a lost link; without it, a lost link ends the recording.
+        Delay before a lost link is reopened; None ends the recording when the link is lost.
 
     Returns
     -------
-    The reason of a lost link, or None.
+    str or None
+        Reason why the link was lost; None if it was not.
 
     Raises
     ------
@@ -138,7 +139,7 @@ async def _read(
             try:
                 async with source.connect() as blocks:
                     async for block in blocks:
-                        writer.write_block(block)
+                        writer.write(block)
                         bar.update(round(min(writer.duration_s, seconds)) - bar.pos)
                         if writer.duration_s >= seconds:
                             break

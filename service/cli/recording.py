@@ -12,7 +12,8 @@ from acquisition.delivery.units import UNIT_OF
 from acquisition.recordings.export import ExportFormat, export_recording
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.summary import RecordingSummary, summary_of
-from service.app.storage import has_store, retention_rules
+from service.app.kept_files import retention_rules
+from service.app.storage import has_store
 from service.cli.offline.importing import import_recording
 from service.cli.options import (
     JsonOutput,
@@ -48,7 +49,7 @@ def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
     """Read all recordings that the service keeps, and compare them with the index.
 
     Changes nothing; the service may keep running. Exit code 1 if a recording is damaged or
-    missing. `padwatch recording verify` checks one that was made with `--out` elsewhere.
+    missing. `padwatch recording verify` checks a recording in another folder.
     """
     plant = load_plant_file(plant_file)
     roots = retention_rules(plant).roots
@@ -110,7 +111,7 @@ DESCRIBED = {
 
 
 def json_of(recording: Recording, summary: RecordingSummary) -> dict[str, Any]:
-    """Return the description of a recording as JSON."""
+    """Return the description of a recording as a JSON object."""
     manifest = recording.manifest
     return {
         "folder": str(recording.folder),
@@ -186,10 +187,10 @@ def _print_recording(folder: Path, json_output: bool) -> None:
 
 @app.command()
 def verify(folder: RecordingFolder, json_output: JsonOutput = False) -> None:
-    """Read all of a recording: checksums, lengths and every page. Exit code 1 if it is damaged."""
+    """Read a whole recording and compare its checksums; exit code 1 if it is damaged."""
     recording, n_samples = open_recording(folder), 0
     with progress("Verifying", recording.manifest.n_samples) as bar:
-        for block in recording.raw_blocks():
+        for block in recording.blocks():
             n_samples += block.n_samples
             bar.update(block.n_samples)
     document = {"folder": str(folder), "sound": True, "samples": n_samples}
@@ -219,9 +220,9 @@ def import_(
     unit: UnitOption = None,
     json_output: JsonOutput = False,
 ) -> None:
-    """Make a recording of an MDF4, TDMS, HDF5 or CSV file, or of a CAN log.
+    """Make a recording from an MDF4, TDMS, HDF5 or CSV file, or from a CAN log.
 
-    Units are converted exactly or refused, missing stretches become gaps, nothing is resampled.
+    Units are converted exactly or refused, missing samples become gaps, nothing is resampled.
     """
     settings = one_unit(load_plant_file(plant), unit, plant)
     mapped = load_toml(mapping, ImportMapping)

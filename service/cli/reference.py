@@ -21,13 +21,13 @@ from service.cli.options import (
     plant_store,
     print_result,
 )
+from service.live.commands import ReferenceRefusedError
+from service.live.references import with_reference
 from service.measuring.references import (
     Gaps,
-    ReferenceRefusedError,
     doubts,
     given_gaps,
     measured_gaps,
-    with_reference,
 )
 from service.runtime.process import person
 from service.settings.core_values import machine_of
@@ -45,7 +45,7 @@ def bearing_references(
     Parameters
     ----------
     history
-        Newest first.
+        Stored references of the bearing, newest first; empty if none was set.
 
     Returns
     -------

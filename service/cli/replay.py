@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from socket import socket
 from typing import Annotated
@@ -10,6 +12,7 @@ import typer
 
 from acquisition.clock import SystemClock
 from acquisition.errors import LinkError
+from service.app.listener import listener_of
 from service.app.recordings import (
     PlayedOut,
     recordings_by_unit,
@@ -20,10 +23,11 @@ from service.app.recordings import (
 from service.app.service import ServiceRun, run_service
 from service.app.simulated_daq import Wire, over_wire
 from service.app.storage import database_path
-from service.app.web import listener_of
 from service.cli.daq import RunningDaq, SpeedOption, daq_process
+from service.cli.offline.reanalysis import stiffness_lines
 from service.cli.options import JsonOutput, PlantOption, fail, option, print_result
-from service.cli.run import announce
+from service.cli.processes import announce
+from service.measuring.live_view import LiveView
 from service.measuring.sources import source_of, watched_units
 from service.runtime.process import run_to_its_end
 from service.settings.loading import load_plant_file
@@ -58,6 +62,8 @@ def replay(
         _service_run(played, plant, units, through, speed, serve) as (service_run, daq),
         listener_of(service_run.plant, port) as listener,
     ):
+        if not json_output:
+            service_run = replace(service_run, at_end=partial(_print_stiffness, played))
         run_to_its_end(_play(service_run, listener, daq, database, json_output))
 
 
@@ -70,7 +76,6 @@ def _service_run(
     speed: float,
     serve: bool,
 ) -> Iterator[tuple[ServiceRun, RunningDaq | None]]:
-    """Build the service run, and start the DAQ that plays the recordings, if there is one."""
     clock = SystemClock()
     if through is None:
         watched = watched_units(
@@ -90,6 +95,19 @@ def _service_run(
         yield ServiceRun(attached, watched, Origin.REPLAY, ends=not serve), daq
 
 
+def _print_stiffness(plant: PlantFile, live: LiveView) -> None:
+    """Print the film stiffness of each bearing at the end of the recordings."""
+    typer.echo("padwatch: finished; the last results are")
+    for unit in plant.unit:
+        for bearing in unit.bearing:
+            found = live.assessment(unit.id, bearing.id)
+            lines = (
+                [f"{unit.id} {bearing.id}: no result"] if found is None else stiffness_lines(found)
+            )
+            for line in lines:
+                typer.echo(f"  {line}")
+
+
 async def _play(
     service_run: ServiceRun,
     listener: socket,
@@ -97,15 +115,8 @@ async def _play(
     database: Path,
     json_output: bool,
 ) -> None:
-    """Run the service and print the place of the results, before the process may exit.
-
-    Raises
-    ------
-    LinkError
-        If the DAQ ended before its recordings.
-    """
     await run_service(service_run, listener, SystemClock(), announce)
     if daq is not None and daq.has_failed:
-        raise LinkError("the simulated DAQ ended before its recordings; results are incomplete")
+        raise LinkError("results are incomplete: the simulated DAQ ended early; repeat the replay")
     results = {"database": str(database)}
     print_result(results, [f"results: {database}"], json_output, indent=None)

@@ -1,201 +1,21 @@
-"""`padwatch run`, `serve`, `acquire`, `analyse` and `demo`."""
+"""`padwatch run`."""
 
-import os
-from collections.abc import Callable
 from contextlib import closing
-from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from acquisition.clock import SystemClock
-from service.api.http.listening import listen
-from service.app.health_page import HOST
-from service.app.service import ServiceRun, run_service
-from service.app.serving_process import run_serve
-from service.app.storage import open_store
-from service.app.web import listener_of
-from service.cli.daq import daq_process
-from service.cli.offline.demo_history import fill, without_past
-from service.cli.options import (
-    DEMO,
-    DEMO_LIFE,
-    PlantPath,
-    PortOption,
-    example_path,
-    fail,
-    terminal_to_itself,
-)
-from service.cluster.ownership import Partition
-from service.cluster.session import StreamAnewError
-from service.measuring.simulated_sources import simulated_history
-from service.measuring.sources import live_units, monitor_of
-from service.runtime.process import leave, run_to_its_end
-from service.runtime.service_manager import ServiceManager
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
-from service.settings.processes import StreamSettings
-from service.store.port import StoreError
-
-HealthPort = Annotated[
-    int | None,
-    typer.Option("--port", min=0, max=65535, help="Port of the health page instead of the file's."),
-]
+from service.cli.options import PlantPath, PortOption
+from service.runtime.child import start_child
 
 
 def run(plant_file: PlantPath, port: PortOption = None) -> None:
     """Acquire, analyse, store and serve a plant until Ctrl-C or SIGTERM."""
-    plant = load_plant_file(plant_file)
-    run_plant(plant, plant.service.port if port is None else port)
-    leave()
+    # imports take most of the start: those of the two processes run side by side
+    with closing(start_child()) as child:
+        from service.app.listener import listener_of
+        from service.cli.processes import run_plant
+        from service.runtime.process import leave
+        from service.settings.loading import load_plant_file
 
-
-def run_plant(plant: PlantFile, port: int, is_demo: bool = False) -> None:
-    """Run the service on a port.
-
-    Parameters
-    ----------
-    is_demo
-        Whether local clients may do everything without a login.
-    """
-    with listener_of(plant, port) as listener:
-        clock, manager = SystemClock(), ServiceManager(os.environ)
-        service_run = ServiceRun(plant, live_units(plant, clock), is_demo=is_demo)
-        run_to_its_end(run_service(service_run, listener, clock, announce, manager))
-
-
-def announce(url: str) -> None:
-    """Print the URL of the dashboard."""
-    typer.echo(f"padwatch: {url}")
-
-
-NEEDS_POSTGRESQL = (
-    "padwatch serve shows what other processes write into PostgreSQL, and this plant file has no"
-    " [store] with postgresql: add one, or use padwatch run"
-)
-
-
-def serve(plant_file: PlantPath, port: PortOption = None) -> None:
-    """Serve a plant that other processes acquire and analyse, until Ctrl-C or SIGTERM."""
-    plant = load_plant_file(plant_file)
-    if plant.store.postgresql is None:
-        fail(NEEDS_POSTGRESQL, 2)
-    with listener_of(plant, plant.service.port if port is None else port) as listener:
-        clock, manager = SystemClock(), ServiceManager(os.environ)
-        run_to_its_end(run_serve(plant, listener, clock, announce, manager))
-    leave()
-
-
-def acquire(
-    plant_file: PlantPath,
-    unit: Annotated[
-        list[str] | None,
-        typer.Option(help="Unit to read; may be repeated. All units by default."),
-    ] = None,
-    port: HealthPort = None,
-) -> None:
-    """Read devices and publish their blocks to the stream until Ctrl-C or SIGTERM."""
-    from service.app.cluster_processes import run_acquire
-
-    plant = load_plant_file(plant_file)
-    settings, known = stream_settings(plant), {each.id for each in plant.unit}
-    for id_ in unit or ():
-        if id_ not in known:
-            fail(f"unknown unit {id_!r}; known units: {', '.join(sorted(known))}", 2)
-    wanted = set(unit or known)
-    with listen(HOST, settings.acquire_port if port is None else port) as listener:
-        clock, manager = SystemClock(), ServiceManager(os.environ)
-        units = {id_: its for id_, its in live_units(plant, clock).items() if id_ in wanted}
-        run_to_its_end(
-            run_acquire(plant, settings, units, listener, clock, _announcer("acquire"), manager)
-        )
-    leave()
-
-
-def analyse(
-    plant_file: PlantPath,
-    partition: Annotated[
-        str, typer.Option(help="Share of the units: i/n for the i-th of n shares, such as 1/2.")
-    ] = "1/1",
-    port: HealthPort = None,
-) -> None:
-    """Analyse blocks from the stream and store results until Ctrl-C or SIGTERM.
-
-    A second process for the same units stands by, and takes over when the first one ends.
-    """
-    from service.app.cluster_processes import run_analyse
-
-    plant = load_plant_file(plant_file)
-    settings = stream_settings(plant)
-    try:
-        part = Partition.of(partition)
-        units = part.part_of(plant).unit
-    except ValueError as error:
-        fail(str(error), 2)
-    monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in units}
-    with listen(HOST, settings.analyse_port if port is None else port) as listener:
-        clock, manager = SystemClock(), ServiceManager(os.environ)
-        parts = (plant, part, settings, monitors, listener, clock, _announcer("analyse"), manager)
-        try:
-            run_to_its_end(run_analyse(*parts))
-        except ExceptionGroup as group:
-            _, others = group.split((StoreError, StreamAnewError))
-            if others is not None:
-                raise
-            raise _first(group) from None
-    leave()
-
-
-def _first(error: Exception) -> Exception:
-    return _first(error.exceptions[0]) if isinstance(error, ExceptionGroup) else error
-
-
-def _announcer(command: str) -> Callable[[str], None]:
-    """Return a function that prints the URL of the health page."""
-    return lambda url: typer.echo(f"padwatch {command}: {url}readyz")
-
-
-def stream_settings(plant: PlantFile) -> StreamSettings:
-    """Return the plant file's [stream], or end the command."""
-    if plant.stream is None:
-        fail(
-            "the plant file has no [stream]: add one with the servers of NATS, or use `padwatch"
-            " run`, which needs none",
-            2,
-        )
-    return plant.stream
-
-
-def demo(
-    port: Annotated[int, typer.Option(min=0, max=65535, help="HTTP port.")] = 8080,
-    data_folder: Annotated[
-        Path | None, typer.Option(help="Folder of the database instead of ./var/demo.")
-    ] = None,
-    plain: Annotated[
-        bool, typer.Option("--plain", help="Without a simulated past and without faults.")
-    ] = False,
-) -> None:
-    """Show padwatch at work on two simulated 700 MW units behind a real Modbus TCP DAQ."""
-    path = example_path(DEMO if plain else DEMO_LIFE)
-    plant = load_plant_file(path)
-    if data_folder is not None:
-        service = plant.service.model_copy(update={"data_folder": str(data_folder)})
-        plant = plant.model_copy(update={"service": service})
-    with terminal_to_itself():
-        if not plain:
-            _give_past(plant)
-        with daq_process([str(path)]) as daq:
-            ports = ", ".join(f"{found['port']} ({unit})" for unit, found in daq.endpoints.items())
-            typer.echo(f"padwatch: simulated DAQs on loopback, ports {ports}")
-            run_plant(daq.attached(plant), port, is_demo=True)
-
-
-def _give_past(plant: PlantFile) -> None:
-    """Fill an empty store with a simulated year."""
-    now_ns = SystemClock().now_ns()
-    with closing(open_store(plant)) as store:
-        new = without_past(store.films, plant)
-        if new:
-            typer.echo("padwatch: simulating the year before this start …")
-            lives = {unit.id: simulated_history(unit, now_ns) for unit in new}
-            fill(store.films, plant, lives, now_ns)
+        plant = load_plant_file(plant_file)
+        with listener_of(plant, plant.service.port if port is None else port) as listener:
+            run_plant(plant, listener, child=child)
+        leave()

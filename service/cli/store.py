@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from acquisition.clock import SystemClock
-from service.app.storage import database_path, store_name
+from service.app.storage import access_path, database_path, has_access, store_name
 from service.cli.accounts import access_of
 from service.cli.offline.backtest import time_ns_of
 from service.cli.offline.backtest_files import SUFFIXES, readings_file, stored_histories, table_of
@@ -26,7 +26,14 @@ from service.cli.options import (
 from service.settings.core_values import watched_estimator
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
-from service.store.backup import AccessAfter, access_before, back_up, revoke_again
+from service.store.backup import (
+    AccessAfter,
+    access_before,
+    back_up,
+    backup_beside,
+    checked,
+    revoke_again,
+)
 from service.store.backup import restore as put_back
 from service.store.films import FilmStore
 from service.store.port import StoreError
@@ -39,22 +46,32 @@ def backup(
     keep: Annotated[int, typer.Option(min=1, max=10_000, help="Number of copies to keep.")] = 14,
     json_output: JsonOutput = False,
 ) -> None:
-    """Copy the database, also while padwatch runs; verify the copy and remove the oldest ones.
+    """Copy both databases, also while padwatch runs; verify the copies, remove the oldest ones.
+
+    The copy of the results begins with `padwatch-`, that of the accounts with `access-`.
 
     Samples, evidence and the plant file are plain files that any tool can copy.
     """
-    database = _file(load_plant_file(plant_file))
-    made = back_up(database, folder, SystemClock().now_ns(), keep)
-    n_rows, schema = sum(made.content.n_rows.values()), made.content.schema
-    found = {
-        "backup": str(made.path),
-        "n_bytes": made.n_bytes,
-        "schema": schema,
-        "n_rows": dict(made.content.n_rows),
-        "removed": [str(path) for path in made.removed],
-    }
-    line = f"{made.path}: verified, {made.n_bytes} bytes, {n_rows} rows, schema {schema}"
-    print_result(found, [line], json_output, indent=None)
+    plant, now_ns = load_plant_file(plant_file), SystemClock().now_ns()
+    copies = [back_up(_file(plant), folder, now_ns, keep)]
+    if has_access(plant):
+        copies.append(back_up(access_path(plant), folder, now_ns, keep, None))
+    found = [
+        {
+            "backup": str(made.path),
+            "n_bytes": made.n_bytes,
+            "schema": made.content.schema,
+            "n_rows": dict(made.content.n_rows),
+            "removed": [str(path) for path in made.removed],
+        }
+        for made in copies
+    ]
+    lines = [
+        f"{made.path}: verified, {made.n_bytes} bytes, {sum(made.content.n_rows.values())} rows,"
+        f" schema {made.content.schema}"
+        for made in copies
+    ]
+    print_result(found, lines, json_output, indent=None)
 
 
 def restore(
@@ -62,26 +79,41 @@ def restore(
     copy: Annotated[Path, argument("A copy made by `padwatch backup`.")],
     json_output: JsonOutput = False,
 ) -> None:
-    """Replace the database by a copy, while padwatch is stopped; the old one is kept beside it.
+    """Replace the databases by copies, while padwatch is stopped; the old ones are kept beside.
 
-    Logins end, and keys that were revoked after the copy was made are revoked again. Accounts and
-    their passwords are those of the copy.
+    The accounts are restored from the copy that `padwatch backup` made together with the given one:
+    logins end, and keys that were revoked after the copy was made are revoked again. Accounts and
+    their passwords are those of the copy. Without such a copy, the accounts stay as they are.
     """
     plant = load_plant_file(plant_file)
     database, now_ns = _file(plant), SystemClock().now_ns()
-    access = access_before(database)
-    done = put_back(copy, database, now_ns)
-    with access_of(plant) as restored:
-        after = revoke_again(restored, access, now_ns)
-    before = None if done.before is None else str(done.before)
-    found = {"database": str(done.database), "before": before, "schema": done.content.schema}
-    said = f"{done.database}: restored" + (f"; the former database is {before}" if before else "")
-    lines = [said, *_access_lines(after)]
-    print_result(found | {"access": after}, lines, json_output, indent=None)
+    of_access, after = backup_beside(copy, access_path(plant).stem), None
+    if of_access is not None:
+        checked(of_access, None)  # before anything is replaced
+    done = [put_back(copy, database, now_ns)]
+    if of_access is not None:
+        access = access_before(access_path(plant))
+        done.append(put_back(of_access, access_path(plant), now_ns, None))
+        with access_of(plant) as restored:
+            after = revoke_again(restored, access, now_ns)
+    found = [
+        {
+            "database": str(each.database),
+            "before": None if each.before is None else str(each.before),
+            "schema": each.content.schema,
+        }
+        for each in done
+    ]
+    lines = [
+        f"{each.database}: restored"
+        + (f"; the former database is {each.before}" if each.before else "")
+        for each in done
+    ]
+    lines += _access_lines(after) if after else ["no copy of the accounts: they stay as they are"]
+    print_result({"restored": found, "access": after}, lines, json_output, indent=None)
 
 
 def _access_lines(after: AccessAfter) -> Iterator[str]:
-    """Yield the accounts and keys that are valid after the restore."""
     yield f"all sessions are ended; accounts, with passwords of the copy: {_listed(after.accounts)}"
     if after.returned:
         names = _listed(after.returned)
@@ -105,7 +137,7 @@ def _file(plant: PlantFile) -> Path:
     return database_path(plant)
 
 
-store_app = command_group("The database: integrity check.")
+store_app = command_group("The databases: integrity check.")
 
 MAX_LINES = 50
 STEPS = 1000
@@ -113,14 +145,14 @@ STEPS = 1000
 
 @store_app.callback()
 def store() -> None:
-    """Keep `check` a subcommand; typer would drop the name of an only command."""
+    """Do nothing; without a callback, typer would drop the name of the only command `check`."""
 
 
 @store_app.command()
 def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
-    """Read the database from end to end; exit code 1 if anything is damaged or missing.
+    """Read both databases from end to end; exit code 1 if anything is damaged or missing.
 
-    The service may keep running. Checks the structure of the file, the seal of every row, missing
+    The service may keep running. Checks the structure of each file, the seal of every row, missing
     rows, and whether the database is the one that was used last. Changes nothing.
     """
     plant = load_plant_file(plant_file)
@@ -129,18 +161,22 @@ def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
             f"{store_name(plant)} must be checked by PostgreSQL; enable its data checksums"
             " (SHOW data_checksums) and run pg_amcheck"
         )
-    with progress("Checking", STEPS) as bar:
-        found = list(
-            findings(database_path(plant), lambda share: bar.update(int(STEPS * share) - bar.pos))
-        )
-    print_result({"is_whole": not found, "findings": found}, _lines(plant, found), json_output)
-    if found:
+    files: dict[str, dict[str, object]] = {}
+    lines: list[str] = []
+    for path in (database_path(plant), access_path(plant)):
+        with progress(f"Checking {path.name}", STEPS) as bar:
+            found = list(findings(path, lambda share: bar.update(int(STEPS * share) - bar.pos)))
+        files[path.name] = {"is_whole": not found, "findings": found}
+        lines += _lines(str(path.absolute()), found)
+    are_whole = all(each["is_whole"] for each in files.values())
+    print_result({"is_whole": are_whole, "files": files}, lines, json_output)
+    if not are_whole:
         raise typer.Exit(1)
 
 
-def _lines(plant: PlantFile, found: Sequence[Finding]) -> Iterator[str]:
+def _lines(name: str, found: Sequence[Finding]) -> Iterator[str]:
     if not found:
-        yield f"{store_name(plant)}: whole"
+        yield f"{name}: whole"
         return
     for finding in found[:MAX_LINES]:
         yield f"{finding.kind}: {finding.detail}"
@@ -148,7 +184,7 @@ def _lines(plant: PlantFile, found: Sequence[Finding]) -> Iterator[str]:
         yield f"and {len(found) - MAX_LINES} more"
     counts = Counter(finding.kind for finding in found)
     summary = ", ".join(f"{n} {kind}" for kind, n in sorted(counts.items()))
-    yield f"{store_name(plant)}: CORRUPT: {summary}"
+    yield f"{name}: CORRUPT: {summary}"
 
 
 readings_app = command_group("Export the stored readings of the films.")
@@ -168,7 +204,7 @@ def export(
     start: Time = None,
     end: Time = None,
 ) -> None:
-    """Write the readings behind the decisions to a file that `padwatch backtest` reads."""
+    """Write the stored readings of all films to a file that `padwatch backtest` reads."""
     plant = load_plant_file(plant_file)
     if out.suffix not in SUFFIXES:
         fail(f"{out}: must end in {' or '.join(SUFFIXES)}", code=2)
@@ -182,7 +218,9 @@ def export(
             with readings_file(out) as write:
                 n_readings = sum(_export(store.films, plant, write, start_ns, end_ns))
                 if not n_readings:
-                    raise StoreError(f"{store_name(plant)}: no film readings in this time range")
+                    raise StoreError(
+                        f"{store_name(plant)}: no film readings in this time range; choose another"
+                    )
         except OSError as error:
             fail(f"{out}: {error.strerror}")
 
@@ -190,7 +228,6 @@ def export(
 def _export(
     films: FilmStore, plant: PlantFile, write: Callable[[Any], None], start_ns: int, end_ns: int
 ) -> Iterator[int]:
-    """Write the readings of all films; yield their numbers."""
     for unit in plant.unit:
         for bearing in unit.bearing:
             place, estimator = (unit.id, bearing.id), watched_estimator(unit, bearing)

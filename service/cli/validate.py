@@ -31,7 +31,7 @@ def validate(
 ) -> None:
     """Recompute the published tables and print them beside padwatch's figures.
 
-    Ends with 1 if a figure is further off than rounding explains.
+    Exit code 1 if an error exceeds its limit, or what the rounding of the printed figures explains.
     """
     simulated, measured = simulated_rows(), measured_rows()
     if json_output:

@@ -1,7 +1,7 @@
-"""Consumer of the stream; a message is acknowledged after the results of its block are stored."""
+"""Consumer of the stream, which acknowledges a message after storing the results of its block."""
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from contextlib import suppress
 
 from nats.aio.msg import Msg
@@ -10,10 +10,8 @@ from nats.errors import TimeoutError as NatsTimeoutError
 from nats.js.api import AckPolicy, ConsumerConfig, DeliverPolicy
 from nats.js.client import JetStreamContext
 from nats.js.errors import NotFoundError
-from prometheus_client.metrics_core import Metric
 
 from acquisition.clock import Clock
-from acquisition.delivery.network import let_stop_through
 from service.cluster.progress import UnitProgress
 from service.cluster.session import (
     MISFIT_RETRY_S,
@@ -23,15 +21,15 @@ from service.cluster.session import (
     StreamError,
     StreamMisfitError,
     consumer_name,
+    let_stop_through,
     require,
     session,
     stream_name,
     subject,
 )
-from service.measuring.metrics import one
 from service.measuring.recorder import Findings, Recorder
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.runtime.metrics import counter, gauge
+from service.runtime.metrics import Families
 from service.runtime.periodic import TroubleLog
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
@@ -84,7 +82,7 @@ class Consumer:
 
     @property
     def waiting(self) -> frozenset[str]:
-        """Ids of units with fetched messages that are not processed, as while the store fails."""
+        """Ids of the units with fetched messages that are not being processed yet."""
         return frozenset(unit for unit, queue in self._queues.items() if not queue.empty())
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
@@ -208,32 +206,27 @@ def _sequence(message: Msg) -> int:
 UNIT = ("unit",)
 
 
-def consumer_metrics(consumer: Consumer) -> Iterator[Metric]:
-    """Yield the backlog of each unit, and its counts of refused and redelivered messages."""
-    units = consumer.units.items()
-    connected = consumer.trouble is None
-    yield one("stream_connected", "1 while blocks are read from the stream.", connected)
-    yield gauge(
-        "stream_pending",
-        "Messages of the unit in the stream that are not fetched yet.",
-        UNIT,
-        (((unit,), n) for unit, n in consumer.n_pending.items()),
-    )
-    yield gauge(
-        "stream_analysis_behind_seconds",
-        "Age of the newest analysed block of the unit, by the time of the device.",
-        UNIT,
-        (((unit,), its.behind_s) for unit, its in units),
-    )
-    yield counter(
-        "stream_refused",
-        "Messages of the unit that could not be used, by reason.",
-        ("unit", "reason"),
-        (((unit, kind), n) for unit, its in units for kind, n in its.refused.items()),
-    )
-    yield counter(
-        "stream_redelivered",
-        "Messages of the unit that were delivered again and counted once.",
-        UNIT,
-        (((unit,), its.n_repeated) for unit, its in units),
-    )
+CONSUMER = {
+    "stream_connected": "This is 1 while blocks are read from the stream.",
+    "stream_pending": "This is the number of messages of the unit on the stream that were not"
+    " fetched yet.",
+    "stream_analysis_behind_seconds": "This is the delay of the newest analysed block of the unit"
+    " against its device.",
+    "stream_refused_total": "This counts the messages of the unit that could not be used, by"
+    " reason.",
+    "stream_redelivered_total": "This counts the messages of the unit that were delivered again and"
+    " counted once.",
+}
+
+
+def add_consumer(families: Families, consumer: Consumer) -> None:
+    """Add the backlog of each unit, and its counts of refused and redelivered messages."""
+    families.declare(CONSUMER)
+    families.add("stream_connected", consumer.trouble is None)
+    for unit, n_pending in consumer.n_pending.items():
+        families.add("stream_pending", n_pending, unit=unit)
+    for unit, its in consumer.units.items():
+        families.add("stream_analysis_behind_seconds", its.behind_s, unit=unit)
+        families.add("stream_redelivered_total", its.n_repeated, unit=unit)
+        for reason, n_refused in its.refused.items():
+            families.add("stream_refused_total", n_refused, unit=unit, reason=reason)

@@ -18,14 +18,14 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from core.quality import Reading
 from core.samples.blocks import DeviceClock, Rejection, SampleBlock, SideValues, StampFault
 from core.samples.calibration import UnitCalibration
-from service.live.live_view import LinkState
+from service.live.status import LinkState
 from service.measuring.acquirer import LinkNews
 
 
 class WireError(ValueError):
-    """A stream message cannot be used; decoding it again would fail in the same way.
+    """Error raised if a stream message cannot be used; another attempt would also fail.
 
-    ``kind`` is a code word for the reason, used as a label of metrics.
+    ``kind`` is a short code of the reason, used as a label of metrics.
     """
 
     def __init__(self, kind: str, message: str) -> None:
@@ -34,10 +34,10 @@ class WireError(ValueError):
 
 
 def require_possible(block: SampleBlock) -> None:
-    """Check the plausibility of a decoded block before its analysis.
+    """Check that a decoded block is possible; no adapter produces blocks that fail the check.
 
     Raises `WireError` if a block has no samples, a calibration or slow value that is not finite, or
-    a negative number of rejected samples. No adapter produces such blocks.
+    a negative number of rejected samples.
     """
     if not block.n_samples:
         raise WireError("impossible", "a block without samples")
@@ -61,8 +61,8 @@ class UnitIdentity:
     plant
         Hash of the name of the plant.
     make
-        Fingerprint of unit id, rate, source and channels; a message with a different fingerprint is
-        refused, since its samples would be misinterpreted.
+        Fingerprint of unit id, rate, kind of source, and channels; a message with a different
+        fingerprint is refused, since its samples would be misinterpreted.
     """
 
     unit: str
@@ -80,7 +80,7 @@ MAGIC = b"PWSM"
 
 VERSION = 2
 READABLE = (2,)
-"""Format versions that a reader accepts: its own, and a previous version during an upgrade."""
+"""Format versions that a reader accepts."""
 
 MAX_HEAD_BYTES = 1 << 18
 MAX_SAMPLE_BYTES = 1 << 26
@@ -106,7 +106,7 @@ class Frame:
 
 
 def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b"") -> bytes:
-    """Return a message with header and checksum. Raises `ValueError` if a part is too large."""
+    """Return a message with header and checksum; raise `ValueError` if a part is too large."""
     if len(head) > MAX_HEAD_BYTES or len(samples) > MAX_SAMPLE_BYTES:
         raise ValueError(
             f"a message has at most {MAX_HEAD_BYTES} bytes of head and {MAX_SAMPLE_BYTES} of"
@@ -122,12 +122,12 @@ def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b""
 def unframed(message: bytes, identity: UnitIdentity) -> Frame:
     """Check the header and checksum of a message, and return its parts.
 
-    Raises `WireError` if the bytes are not a message, are damaged, or have another version, plant
+    Raises `WireError` if the bytes are not a message, are damaged, or are of another version, plant
     or configuration. Invalid bytes raise no other exception.
     """
     if len(message) < _START.size + _CRC.size or message[:4] != MAGIC:
         raise WireError(
-            "not_a_message", f"{len(message)} bytes that do not begin like a message of padwatch"
+            "not_a_message", f"{len(message)} bytes that do not begin as a message of padwatch"
         )
     _, version, kind, plant, make, n_head, n_samples = _START.unpack_from(message)
     if version not in READABLE:
@@ -186,7 +186,7 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True)
 class BlockHead:
-    """JSON head of a block message: all fields of a block except its samples."""
+    """JSON head of a block message: all fields of a block but its samples, and `taken_ns`."""
 
     __pydantic_config__ = STRICT
 
@@ -288,7 +288,7 @@ def _block(frame: Frame, identity: UnitIdentity) -> Taken:
     if n_channels * head.n_samples * type_.itemsize != len(frame.samples):
         raise WireError(
             "wrong_length",
-            f"{len(frame.samples)} bytes of samples for {n_channels} channels of {head.n_samples}",
+            f"{len(frame.samples)} bytes for {n_channels} channels of {head.n_samples} samples",
         )
     counts = np.frombuffer(frame.samples, dtype=type_).reshape(n_channels, head.n_samples)
     block = SampleBlock(
@@ -307,7 +307,7 @@ def _block(frame: Frame, identity: UnitIdentity) -> Taken:
 
 @lru_cache(maxsize=1024)
 def _shared(calibration: UnitCalibration) -> UnitCalibration:
-    """Return one shared object for equal calibrations; local sources also share it among blocks."""
+    """Return the same object for equal calibrations, as the blocks of a local source share one."""
     return calibration
 
 
@@ -320,7 +320,7 @@ def _side_values(head: BlockHead) -> SideValues:
         or any(start >= stop for start, stop in itertools.pairwise(edges))
         or any(len(cell.slow) != n_slow or cell.ok >> n_channels for cell in head.cells)
     ):
-        raise WireError("not_understood", "a block whose cells and samples differ in length")
+        raise WireError("not_understood", "a block whose cells do not match its samples")
     slow = np.array([cell.slow for cell in head.cells], dtype=np.float64)
     return SideValues(
         starts=np.array(starts, dtype=np.int64),
@@ -343,5 +343,5 @@ def _read(adapter: TypeAdapter[T], head: bytes) -> T:
 def _require_own(unit: str, identity: UnitIdentity) -> None:
     if unit != identity.unit:
         raise WireError(
-            "other_unit", f"a message of unit {unit!r} in the subject of {identity.unit!r}"
+            "other_unit", f"a message of unit {unit} in the subject of unit {identity.unit}"
         )

@@ -1,4 +1,4 @@
-"""Ownership of units: database locks of units and of the shared work, and plant partitions."""
+"""Ownership of units: partitions, and database locks of units and of plant-wide tasks."""
 
 import asyncio
 import re
@@ -22,11 +22,11 @@ EVERY_S = 1.0
 
 
 class HoldLostError(StoreError):
-    """The database connection and its locks were lost; another process may analyse the units."""
+    """Error raised if the database connection was lost, and with it the locks of the units."""
 
 
 class Holds:
-    """Exclusive database locks, one for the analysis of each unit; all or none are held."""
+    """Exclusive database locks for the analysis of units, one for each; all or none are held."""
 
     def __init__(self, store: Store, units: Iterable[str], clock: Clock) -> None:
         self._store, self._clock = store, clock
@@ -36,7 +36,7 @@ class Holds:
         self.waits_for: str | None = "not started"
 
     async def take(self) -> None:
-        """Acquire all locks; wait while another process holds any of them, as a standby does."""
+        """Acquire all locks; wait while another process holds any of them or the database fails."""
         while True:
             refusal = await asyncio.to_thread(self._try)
             if refusal is None:
@@ -60,7 +60,6 @@ class Holds:
         self._stack.close()
 
     def _try(self) -> str | None:
-        """Acquire all locks or none; return the reason of a failure, None on success."""
         with ExitStack() as stack:
             try:
                 self._holds = [stack.enter_context(self._store.hold(name)) for name in self._names]
@@ -71,14 +70,14 @@ class Holds:
 
 
 SHARED_WORK = "shared work"
-"""Name of the lock for the shared work: notifications, roll-ups and retention."""
+"""Name of the lock for the plant-wide tasks: notifications, roll-ups, retention and checks."""
 
 TRY_EVERY_S = 2.0
 LOOK_EVERY_S = 1.0
 
 
 class Leadership:
-    """Leader election: periodic tasks run only while this process holds a lock in the database.
+    """Leader election among processes: the one that holds a database lock runs plant-wide tasks.
 
     When the lock passes to another process, both may run the tasks for a short time; the tasks are
     idempotent.
@@ -108,7 +107,7 @@ class Leadership:
             await self._clock.sleep(TRY_EVERY_S)
 
     async def _lead(self, hold: Hold, pulse: Pulse) -> None:
-        log.info("this process starts the shared work of the plant")
+        log.info("this process starts the plant-wide tasks")
         self.is_leading = True
         try:
             async with asyncio.TaskGroup() as tasks:
@@ -124,7 +123,7 @@ class Leadership:
         finally:
             self.is_leading = False
             self._beats.release(*self._loops)
-        log.warning("this process stops the shared work of the plant: the lock is lost")
+        log.warning("this process stops the plant-wide tasks: the database lock is lost")
 
 
 FORM = re.compile(r"([0-9]{1,4})/([0-9]{1,4})")
@@ -132,18 +131,19 @@ FORM = re.compile(r"([0-9]{1,4})/([0-9]{1,4})")
 
 @dataclass(frozen=True)
 class Partition:
-    """Part of the units of a plant for one of several processes: number 1 to ``n_parts``."""
+    """Part of the units of a plant that one process analyses: part `number` of `n_parts`."""
 
     number: int = 1
     n_parts: int = 1
 
     @classmethod
     def of(cls, text: str) -> "Partition":
-        """Parse a partition ``i/n``. Raises `ValueError` if the text is malformed."""
+        """Parse a partition ``i/n``; raise `ValueError` if the text is malformed."""
         found = FORM.fullmatch(text)
         part = cls(int(found[1]), int(found[2])) if found else cls(0, 0)
         if not 1 <= part.number <= part.n_parts:
-            raise ValueError(f"invalid partition {text!r}; use i/n with i from 1 to n, such as 1/2")
+            words = f"invalid partition '{text}'; use i/n with i from 1 to n, such as 1/2"
+            raise ValueError(words)
         return part
 
     def units(self, units: Sequence[str]) -> list[str]:

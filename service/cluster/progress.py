@@ -1,4 +1,4 @@
-"""Processing of the stream messages of a unit: position, and resumption after a restart."""
+"""Processing of the stream messages of a unit, and its resumption after a restart."""
 
 from collections import Counter, deque
 from collections.abc import Iterable
@@ -13,9 +13,10 @@ from core.samples.blocks import BlockMisfitError, SampleBlock
 from core.samples.gaps import Reach
 from core.units import s_from_ns
 from service.cluster.frames import Taken, UnitIdentity, WireError, decoded, require_possible
-from service.live.live_view import LinkState, LiveView
+from service.live.status import LinkState
 from service.measuring.acquirer import LinkNews
 from service.measuring.analyser import VERSION, Analyser, UnitMemory
+from service.measuring.live_view import LiveView
 from service.measuring.recorder import Findings, Recorder
 from service.store.sharing import StreamPosition
 
@@ -37,11 +38,11 @@ def read(document: bytes) -> UnitMemory | None:
 
 
 def memories_of(stored: Iterable[StreamPosition]) -> dict[str, UnitMemory]:
-    """Return the stored analysis states by unit; log and omit those of another version."""
+    """Return the stored analysis states by unit; log and omit those that `read` cannot parse."""
     found = {position.unit: read(position.memory) for position in stored}
     for unit, memory in found.items():
         if memory is None:
-            log.error("stored alarms of another version are discarded", unit=unit)
+            log.error("the stored analysis state is unreadable or of another version", unit=unit)
     return {unit: memory for unit, memory in found.items() if memory is not None}
 
 
@@ -81,7 +82,7 @@ class Window:
             self._seen.popleft()
 
     def first(self, otherwise: int) -> int:
-        """Return the sequence number of the oldest message; ``otherwise`` if there is none."""
+        """Return the sequence number of the oldest message, or ``otherwise`` without messages."""
         return self._seen[0].sequence if self._seen else otherwise
 
     @staticmethod
@@ -96,7 +97,7 @@ MAY_ARRIVE = (LinkState.CONNECTING, LinkState.CONNECTED)
 
 
 class UnitProgress:
-    """Processor of the stream messages of one unit; each message is processed once, in order.
+    """Processor of the stream messages of one unit: each is processed once, in order.
 
     Messages up to the stored position are replayed without publishing results, which restores the
     state of the monitor. Later messages are processed as if the process had never stopped.
@@ -108,8 +109,8 @@ class UnitProgress:
     memory
         Analysis state of the unit at the stored position.
     clock
-        Clock of this host. The error of the measured delay of a block is the difference between
-        this clock and the clock of the acquiring host.
+        Clock of this host. A difference from the clock of the acquiring host is an error of the
+        measured delays of blocks.
     done
         Epoch, sample index and time at which the stored results end, if their position on the
         stream is unknown.
@@ -148,7 +149,7 @@ class UnitProgress:
         return 1 if self._stored is None else self._stored.window_sequence
 
     def reaches_back(self, first_sequence: int) -> None:
-        """Log a fault if the stream, which begins at ``first_sequence``, lacks needed messages.
+        """Log it if the stream, which begins at ``first_sequence``, lacks needed messages.
 
         Missing messages are a gap in the samples, which the monitor detects by the sample index.
         """
@@ -156,12 +157,12 @@ class UnitProgress:
         if stored is None or self._memory is None or self.sequence:
             return
         if first_sequence > stored.sequence + 1:
-            log.error("the stream begins after the stored results", unit=self.unit)
+            log.error("the stream begins after the stored results; raise max_age_h", unit=self.unit)
         elif first_sequence > stored.window_sequence:
             log.warning("the stream begins within the window of the analysis", unit=self.unit)
 
     async def take(self, sequence: int, payload: bytes) -> bool:
-        """Process a message with its sequence number; return False if the message is refused."""
+        """Process the message with a sequence number; return False if the message is refused."""
         if sequence <= self.sequence:
             self._arrived_s = self._clock.monotonic_s()
             self.n_repeated += 1
@@ -186,7 +187,6 @@ class UnitProgress:
         return True
 
     def _require_fit(self, message: Taken) -> None:
-        """Raise `WireError` if the monitor of the unit cannot analyse a block."""
         require_possible(message.block)
         try:
             self._analyser.require(message.block)
@@ -281,7 +281,7 @@ class UnitProgress:
             self._recorder.put(replace(findings, position=self.position()))
 
     def _sampled_s(self, message: Taken) -> float:
-        """Return the monotonic time of sampling; exact if the clocks of both hosts agree."""
+        """Return the monotonic time of the last sample, s; exact if both hosts' clocks agree."""
         self.behind_s = max(0.0, s_from_ns(self._clock.now_ns() - message.taken_ns))
         return self._clock.monotonic_s() - self.behind_s
 

@@ -1,8 +1,8 @@
-"""Publisher of sample blocks on the stream; each block is queued until the servers confirm it."""
+"""Publisher of sample blocks on the stream, which queues each until the servers confirm it."""
 
 import asyncio
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from nats.errors import MaxPayloadError, NoRespondersError
@@ -10,10 +10,8 @@ from nats.errors import TimeoutError as NatsTimeoutError
 from nats.js.api import Header
 from nats.js.client import JetStreamContext
 from nats.js.errors import APIError, NoStreamResponseError
-from prometheus_client.metrics_core import Metric
 
 from acquisition.clock import Clock
-from acquisition.delivery.network import let_stop_through
 from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
 from service.cluster.frames import UnitIdentity, encoded_block, encoded_link
@@ -24,15 +22,15 @@ from service.cluster.session import (
     StreamError,
     StreamMisfitError,
     ensure,
+    let_stop_through,
     message_id,
     session,
     stream_name,
     subject,
 )
 from service.measuring.acquirer import LinkNews
-from service.measuring.metrics import one
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.runtime.metrics import counter
+from service.runtime.metrics import Families
 from service.runtime.periodic import TroubleLog
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
@@ -40,12 +38,12 @@ from service.settings.processes import StreamSettings
 
 @dataclass(frozen=True)
 class Outgoing:
-    """Outgoing message with an id that is the same for every publish attempt.
+    """Outgoing message; every attempt to publish it has the same id.
 
     Parameters
     ----------
     is_news
-        Whether the message is a link state; of consecutive link states, only the last is sent.
+        Whether the message is a link state.
     """
 
     id: str
@@ -54,9 +52,9 @@ class Outgoing:
 
 
 class Outbound:
-    """Queue of messages to publish, for each unit, with a common capacity in bytes.
+    """Queues of messages to publish, one for each unit, with a common capacity in bytes.
 
-    `put` waits while ``capacity`` bytes are queued. Meanwhile the ring of the device buffers
+    `put` waits if a message would exceed ``capacity``. Meanwhile the ring of the device buffers
     samples; if the ring overruns, the sample index of the next block shows the exact gap.
     """
 
@@ -80,13 +78,13 @@ class Outbound:
         return self._clock.monotonic_s() - self._last_s if self.n_waiting else 0.0
 
     async def put(self, unit: str, message: Outgoing) -> None:
-        """Queue a message; wait while the queue is full."""
+        """Queue a message; wait until it fits the capacity or all queues are empty."""
         async with self._room:
             await self._room.wait_for(lambda: self._fits(message))
             self.add(unit, message)
 
     def add(self, unit: str, message: Outgoing) -> None:
-        """Queue a message without waiting; of successive link states, only the last is kept."""
+        """Queue a message without waiting; a link state replaces one queued just before it."""
         queue = self._waiting[unit]
         if not self.n_waiting:
             self._last_s = self._clock.monotonic_s()
@@ -253,35 +251,34 @@ class Publisher:
 def _refusal(error: APIError, name: str) -> str:
     if error.err_code in STREAM_FULL:
         return (
-            f"the stream {name!r} is full: raise [stream] max_gb or lower max_age_h; meanwhile"
+            f"the stream '{name}' is full: raise [stream] max_gb or lower max_age_h; meanwhile"
             " blocks wait at the devices"
         )
-    return f"the NATS servers reject blocks for the stream {name!r}: {error.description}"
+    return f"the NATS servers reject blocks for the stream '{name}': {error.description}"
 
 
-def publisher_metrics(publisher: Publisher) -> Iterator[Metric]:
-    """Yield the metrics of the outgoing queue and of the published messages."""
+PUBLISHER = {
+    "stream_connected": "This is 1 while the servers of the stream accept blocks.",
+    "stream_published_total": "This counts the messages that the servers have confirmed.",
+    "stream_repeated_total": "This counts the messages that were sent again because they were not"
+    " confirmed.",
+    "stream_doubles_total": "This counts the messages that the servers already had.",
+    "stream_waiting_bytes": "This is the number of bytes that wait for the servers.",
+    "stream_waiting_share": "This is the filled share of the queue, 0 to 1; devices wait when it is"
+    " full.",
+    "stream_behind_seconds": "This is the time for which messages have waited without any being"
+    " confirmed.",
+}
+
+
+def add_publisher(families: Families, publisher: Publisher) -> None:
+    """Add the connection, the outgoing queues and the published messages."""
+    families.declare(PUBLISHER)
     waiting = publisher.waiting
-    connected = publisher.trouble is None
-    yield one("stream_connected", "1 while the servers of the stream accept blocks.", connected)
-    for name, meaning, number in (
-        ("stream_published", "Messages that the servers have confirmed.", waiting.n_published),
-        (
-            "stream_repeated",
-            "Messages that were sent again because they were not confirmed.",
-            publisher.n_repeated,
-        ),
-        ("stream_doubles", "Messages that the servers already had.", publisher.n_doubles),
-    ):
-        yield counter(name, meaning, (), [((), number)])
-    yield one("stream_waiting_bytes", "Bytes that wait for the servers.", waiting.n_bytes)
-    yield one(
-        "stream_waiting_share",
-        "Filled share of the queue, 0 to 1; devices wait at 1.",
-        waiting.n_bytes / waiting.capacity,
-    )
-    yield one(
-        "stream_behind_seconds",
-        "Time since messages wait without any being confirmed.",
-        waiting.behind_s,
-    )
+    families.add("stream_connected", publisher.trouble is None)
+    families.add("stream_published_total", waiting.n_published)
+    families.add("stream_repeated_total", publisher.n_repeated)
+    families.add("stream_doubles_total", publisher.n_doubles)
+    families.add("stream_waiting_bytes", waiting.n_bytes)
+    families.add("stream_waiting_share", waiting.n_bytes / waiting.capacity)
+    families.add("stream_behind_seconds", waiting.behind_s)

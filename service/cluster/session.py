@@ -20,7 +20,6 @@ from nats.js.errors import (
     ServiceUnavailableError,
 )
 
-from acquisition.delivery.network import let_stop_through, n_stops
 from core.samples.blocks import SampleBlock
 from service.cluster.frames import UnitIdentity, fingerprint
 from service.settings.plant import PlantFile
@@ -29,15 +28,41 @@ from service.settings.units import UnitSettings
 
 
 class StreamError(Exception):
-    """The servers do not answer or return an error; a later attempt may succeed."""
+    """Error raised if the servers do not answer or refuse a request; retrying may succeed."""
 
 
 class StreamMisfitError(StreamError):
-    """NATS servers, stream and plant file do not match; the message states the remedy."""
+    """Error raised if servers or stream do not match the plant file; the message has a remedy."""
 
 
 class StreamAnewError(Exception):
-    """The stream was replaced; stored positions in the old stream are no longer valid."""
+    """Error raised if the stream was replaced or lost messages, so that positions are invalid."""
+
+
+def n_stops() -> int:
+    """Return the number of pending cancellation requests of the current task.
+
+    Before Python 3.13, a task group that fails while its task waits for it does not reset its own
+    request.
+    """
+    task = asyncio.current_task()
+    return 0 if task is None else task.cancelling()
+
+
+def let_stop_through(n_before: int = 0) -> None:
+    """Raise `asyncio.CancelledError` if a library suppressed a cancellation of the current task.
+
+    Before Python 3.12, `asyncio.wait_for` loses a cancellation if the awaited result arrives at the
+    same time (CPython issue 86296), so the task would never end. Call this function after every
+    wait of a library that uses `wait_for`.
+
+    Parameters
+    ----------
+    n_before
+        `n_stops` before the wait, for tasks that use task groups.
+    """
+    if n_stops() > n_before:
+        raise asyncio.CancelledError
 
 
 RETRY_S = 1.0
@@ -87,14 +112,14 @@ def message_id(identity: UnitIdentity, block: SampleBlock) -> str:
 
 
 def identity_of(plant: PlantFile, unit: UnitSettings) -> UnitIdentity:
-    """Return the identity that all messages of a unit must carry: plant, rate and channels."""
+    """Return the identity of a unit, which all its messages contain."""
     channels = [(channel.id, str(channel.measurand)) for channel in unit.channel]
     make = fingerprint(unit.id, unit.sampling_hz, unit.source.kind, channels)
     return UnitIdentity(unit.id, plant_mark(plant), make)
 
 
 OLDEST_SERVER = (2, 10)
-"""Minimum version of the NATS server that has all stream and consumer features in use."""
+"""Oldest version of the NATS server with all stream and consumer features in use."""
 
 CONNECT_S = 3
 PING_S = 5
@@ -102,13 +127,13 @@ PING_S = 5
 
 @asynccontextmanager
 async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStreamContext]:
-    """Connect to the NATS servers; yield the JetStream context. A lost link cancels the body.
+    """Connect to the NATS servers and yield the JetStream context; a lost link ends the body.
 
     Raises
     ------
     StreamError
         If the connection fails or is lost, or if the body of the context manager raises an error
-        of the NATS library.
+        of the NATS library or the operating system.
     """
     lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
     client = await _connected(settings, name, lost)
@@ -229,7 +254,8 @@ def _tls(settings: StreamSettings) -> ssl.SSLContext | None:
     try:
         return ssl.create_default_context(cafile=settings.ca_file)
     except (OSError, ssl.SSLError) as error:
-        raise StreamMisfitError(f"[stream] ca_file {settings.ca_file}: {error}") from None
+        words = f"cannot read [stream] ca_file {settings.ca_file}: {error}"
+        raise StreamMisfitError(words) from None
 
 
 def _token(settings: StreamSettings) -> str | None:
@@ -238,7 +264,8 @@ def _token(settings: StreamSettings) -> str | None:
     try:
         return Path(settings.token_file).read_text("utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
-        raise StreamMisfitError(f"[stream] token_file {settings.token_file}: {error}") from None
+        words = f"cannot read [stream] token_file {settings.token_file}: {error}"
+        raise StreamMisfitError(words) from None
 
 
 BYTES_PER_GB = 1e9
@@ -273,8 +300,8 @@ def wanted(plant: PlantFile, settings: StreamSettings) -> StreamConfig:
 async def ensure(stream: JetStreamContext, plant: PlantFile, settings: StreamSettings) -> None:
     """Create the stream of a plant, or update the limits of an existing stream.
 
-    Raises `StreamMisfitError` if JetStream is disabled, or if the stream belongs to another plant
-    or cannot be configured.
+    Raises `StreamMisfitError` if JetStream does not respond, or if the stream belongs to another
+    plant or cannot be configured.
     """
     config, found = wanted(plant, settings), await _info(stream, plant)
     if found is None:
@@ -286,13 +313,13 @@ async def ensure(stream: JetStreamContext, plant: PlantFile, settings: StreamSet
 async def require(stream: JetStreamContext, plant: PlantFile) -> str:
     """Check that the stream of a plant exists; return its name with its creation time.
 
-    Raises `StreamError` if the stream does not exist, and `StreamMisfitError` if JetStream is off
-    or the stream belongs to another plant.
+    Raises `StreamError` if the stream does not exist, and `StreamMisfitError` if JetStream does not
+    respond or the stream belongs to another plant.
     """
     name, found = stream_name(plant), await _info(stream, plant)
     if found is None:
         raise StreamError(
-            f"the stream {name!r} does not exist yet; `padwatch acquire` creates it at its start"
+            f"the stream '{name}' does not exist yet; `padwatch acquire` creates it when it starts"
         )
     return f"{name} of {found.created}"
 
@@ -317,7 +344,7 @@ async def _info(stream: JetStreamContext, plant: PlantFile) -> StreamInfo | None
     mark = (found.config.metadata or {}).get(PLANT)
     if mark != plant_mark(plant).hex():
         fault = "belongs to another plant" if mark else "was not created by padwatch"
-        raise StreamMisfitError(f"the stream {name!r} {fault}: set another [stream] name")
+        raise StreamMisfitError(f"the stream '{name}' {fault}; set another [stream] name")
     return found
 
 
@@ -328,12 +355,12 @@ async def _made(stream: JetStreamContext, config: StreamConfig, *, update: bool 
         raise StreamMisfitError(NOT_ENABLED) from None
     except BadRequestError as error:
         raise StreamMisfitError(
-            f"the stream {config.name!r} cannot be configured by [stream]: {error.description}"
+            f"the stream '{config.name}' cannot be configured by [stream]: {error.description}"
         ) from None
     except APIError as error:
         raise StreamMisfitError(
-            f"the NATS servers do not create the stream {config.name!r}: {error.description}; lower"
-            " [stream] max_gb or replicas, or give the servers more"
+            f"the NATS servers do not create the stream '{config.name}': {error.description}; lower"
+            " [stream] max_gb or replicas, or give the servers more disk space"
         ) from None
 
 

@@ -8,16 +8,13 @@ import structlog
 from acquisition.clock import Clock
 from core.alarms.alarm import Alarm
 from service.cluster.progress import UnitProgress
-from service.live.live_view import LinkState, LiveView
+from service.live.alarm_list import is_shared
+from service.live.status import LinkState
 from service.measuring.acquirer import LinkNews
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.analyser import Analyser
-from service.measuring.reported_alarms import (
-    ReportedAlarms,
-    gone_alarms,
-    is_shared,
-    report_silence,
-)
+from service.measuring.live_view import LiveView
+from service.measuring.reported_alarms import ReportedAlarms, gone_alarms, report_silence
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import periodic
 from service.settings.units import UnitSettings
@@ -33,7 +30,7 @@ EVERY_S = 1.0
 
 
 class SilentUnits:
-    """Monitor that raises alarms about units whose reports have stopped; runs in the leader only.
+    """Monitor, in the leader only, that raises alarms about units whose reports have stopped.
 
     Ages are measured by the monotonic clock of this process from the arrival of a report, so that
     the clocks of the hosts need not agree. Time in which the database cannot be read is excluded.
@@ -84,7 +81,7 @@ class SilentUnits:
         return self._board is not None
 
     def _kept(self, stored: Iterable[Alarm]) -> ReportedAlarms:
-        """Restore the stored alarms about silent units, and restart the age of every report."""
+        """Restore the stored alarms about silent units; reset the ages of all reports."""
         board = gone_alarms(self._units)
         self._alarms.add_alarms(board, [alarm for alarm in stored if is_shared(alarm)])
         self._beats.clear()
@@ -110,7 +107,7 @@ MIN_BLOCKS = 3
 def silences_s(units: Iterable[UnitSettings], least_s: float) -> dict[str, float]:
     """Return the time without blocks after which a unit is not connected, s, by unit id.
 
-    The time is at least ``least_s``.
+    The time is `MIN_BLOCKS` durations of a block, and at least ``least_s`` seconds.
     """
     return {
         unit.id: max(least_s, MIN_BLOCKS * unit.block_samples / unit.sampling_hz) for unit in units
@@ -120,7 +117,7 @@ def silences_s(units: Iterable[UnitSettings], least_s: float) -> dict[str, float
 class SilenceWatch:
     """Monitor that marks a unit as not connected if no messages of the unit arrive.
 
-    This includes units that were connected before a restart, while the stream is not reached.
+    This includes units that have sent no message since the start of this process.
 
     Parameters
     ----------

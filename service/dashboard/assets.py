@@ -1,14 +1,27 @@
-"""Files of the dashboard in memory, with media types, entity tags and a version identifier."""
+"""Static files of the dashboard and of the API reference, served from memory.
+
+The path of a file contains a hash, so that browsers can cache it permanently: modules, styles and
+pictures are below the edition, a hash of all of them; a library is below the hash of its content.
+"""
 
 import gzip
 import hashlib
 import json
+import posixpath
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib.metadata import version
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
+from starlette.datastructures import Headers
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from service.api.problems import ProblemError, problem_answer
 from service.settings.alarm_kinds import ALARM_KINDS
 
 MEDIA_TYPES = {
@@ -20,42 +33,82 @@ MEDIA_TYPES = {
 """Media types of served files by suffix; other files are not served."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Asset:
-    """File of the dashboard: content and media type."""
+    """Static file: content, media type, and gzip content, which is None before `compress`."""
 
     body: bytes
     media_type: str
+    gzipped: bytes | None = None
 
     @cached_property
-    def etag(self) -> str:
-        """Entity tag: a hash of the content, in quotation marks."""
-        return f'"{hashlib.sha256(self.body).hexdigest()[:32]}"'
+    def digest(self) -> str:
+        """Hash of the content."""
+        return hashlib.sha256(self.body).hexdigest()[:32]
 
-    @cached_property
-    def gzipped(self) -> bytes:
-        """Content of the file, compressed by gzip."""
-        return gzip.compress(self.body, mtime=0)
+    def compress(self) -> None:
+        """Set `gzipped` to the content compressed by gzip, unless it is set."""
+        if self.gzipped is None:
+            self.gzipped = gzip.compress(self.body, mtime=0)
+
+
+LIBRARIES = {
+    "plotly.min.js": ("plotly", "package_data"),
+    "swagger-ui-bundle.js": ("fastapi_offline", "static"),
+    "swagger-ui.css": ("fastapi_offline", "static"),
+    "recover.js": ("service.dashboard", "library"),
+}
+"""Package and folder of each file that changes less often than the dashboard."""
+
+
+@cache
+def libraries() -> Mapping[str, tuple[str, Asset]]:
+    """Return the URL path and content of each library, by file name."""
+    found = {}
+    for name, (package, folder) in LIBRARIES.items():
+        asset = _read(files(package) / folder / name)
+        found[name] = f"/static/{asset.digest[:12]}/{name}", asset
+    return found
 
 
 @cache
 def pages() -> dict[str, Asset]:
-    """Read the files of the dashboard, and generate ``alarm_kinds.js`` from `ALARM_KINDS`.
+    """Read the files of the dashboard, and generate ``alarm_kinds.js`` and ``libraries.js``.
 
     Returns
     -------
     dict of str to Asset
         Files by path below ``static/``, for example ``charts/trend.js``.
     """
-    kinds = Asset(_alarm_kinds().encode(), MEDIA_TYPES["js"])
-    return dict(_below(files("service.dashboard") / "static", "")) | {"alarm_kinds.js": kinds}
+    kinds = {
+        name: {key: getattr(kind, key) for key in ("label", "subject", "rule", "advice")}
+        for name, kind in ALARM_KINDS.items()
+    }
+    paths = {name: path for name, (path, _) in libraries().items()}
+    return dict(_below(files("service.dashboard") / "static", "")) | {
+        "alarm_kinds.js": _module("ALARM_KINDS", kinds),
+        "libraries.js": _module("LIBRARIES", paths),
+    }
 
 
-@cache
-def plotly() -> Asset:
-    """Return the JavaScript chart library of the installed plotly package."""
-    script = files("plotly") / "package_data" / "plotly.min.js"
-    return Asset(script.read_bytes(), MEDIA_TYPES["js"])
+def _module(name: str, table: Mapping[str, object]) -> Asset:
+    """Return a JavaScript module that exports a table."""
+    text = f"export const {name} = {json.dumps(table, ensure_ascii=False, indent=2)};\n"
+    return Asset(text.encode(), MEDIA_TYPES["js"])
+
+
+def _read(file: Traversable) -> Asset:
+    return Asset(file.read_bytes(), MEDIA_TYPES[file.name.rpartition(".")[2]])
+
+
+def _below(folder: Traversable, prefix: str) -> list[tuple[str, Asset]]:
+    found: list[tuple[str, Asset]] = []
+    for entry in folder.iterdir():
+        if entry.is_dir():
+            found += _below(entry, f"{prefix}{entry.name}/")
+        elif entry.name.rpartition(".")[2] in MEDIA_TYPES:
+            found.append((prefix + entry.name, _read(entry)))
+    return found
 
 
 @cache
@@ -64,26 +117,111 @@ def edition() -> str:
 
     An open page detects an upgrade by comparing its edition with the edition in later answers.
     """
-    tags = "".join(f"{path} {asset.etag}" for path, asset in sorted(pages().items()))
-    tags += version("plotly")
-    return f"{version('padwatch')}-{hashlib.sha256(tags.encode()).hexdigest()[:8]}"
+    digests = "".join(f"{path} {asset.digest}" for path, asset in sorted(pages().items()))
+    return f"{version('padwatch')}-{hashlib.sha256(digests.encode()).hexdigest()[:8]}"
 
 
-def _alarm_kinds() -> str:
-    """Return the source of a JavaScript module with the properties of all alarm kinds, by name."""
-    table = {
-        name: {key: getattr(kind, key) for key in ("label", "subject", "rule", "advice")}
-        for name, kind in ALARM_KINDS.items()
+IMPORT = re.compile(rb'(?:from|import) "(\.{1,2}/[^"]+)"')
+"""Pattern of a static import of a JavaScript module of the dashboard."""
+
+
+def imported(module: str, found: dict[str, None] | None = None) -> list[str]:
+    """Return the paths of a module and all its imports, direct or not; `found` has known paths."""
+    found = {} if found is None else found
+    if module not in found:
+        found[module] = None
+        for match in IMPORT.finditer(pages()[module].body):
+            near = posixpath.join(posixpath.dirname(module), match[1].decode())
+            imported(posixpath.normpath(near), found)
+    return list(found)
+
+
+LINK = re.compile(rb'"/static/([^"]+)"')
+FIRST_SCRIPT = b'<script type="module"'
+
+
+def _page(name: str) -> Asset:
+    """Return a page with links to the files of the running edition, and to all its modules."""
+    page = pages()[name]
+    preloads = b"".join(
+        b'<link rel="modulepreload" href="/static/%s">\n  ' % path.encode()
+        for path in imported("app.js")
+    )
+    body = page.body.replace(FIRST_SCRIPT, preloads + FIRST_SCRIPT)
+    return Asset(LINK.sub(_hashed, body), page.media_type)
+
+
+def _hashed(link: re.Match[bytes]) -> bytes:
+    name = link[1].decode()
+    path = libraries()[name][0] if name in libraries() else f"/static/{edition()}/{name}"
+    return f'"{path}"'.encode()
+
+
+PAGES = {"/": "index.html", "/docs": "docs.html"}
+"""File of each page by URL path."""
+
+
+@cache
+def served() -> Mapping[str, Asset]:
+    """Return all static files by URL path."""
+    return (
+        {url: _page(name) for url, name in PAGES.items()}
+        | {f"/static/{edition()}/{path}": asset for path, asset in pages().items()}
+        | dict(libraries().values())
+    )
+
+
+def compress_all() -> None:
+    """Compress all static files, which takes 0.4 s; until then they are sent as they are."""
+    for asset in served().values():
+        asset.compress()
+
+
+POLICY = (
+    "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:;"
+    " object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+"""Content security policy of the pages: scripts from this server only; inline styles, because
+plotly and Swagger UI add them."""
+
+REVALIDATE = "no-cache"
+"""Cache-Control header of the pages: browsers must revalidate them, since their links change."""
+
+KEEP = "public, max-age=31536000, immutable"
+"""Cache-Control header of the files: they never change, since their paths contain a hash."""
+
+
+class StaticFiles:
+    """ASGI middleware that answers requests for static files; other requests are forwarded."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app, self._served = app, served()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer or forward a request."""
+        path = scope["path"] if scope["type"] == "http" and scope["method"] == "GET" else ""
+        app = self._app
+        if path in self._served:
+            caching = REVALIDATE if path in PAGES else KEEP
+            app = _answer(self._served[path], caching, Headers(scope=scope))
+        elif path.startswith("/static/"):
+            detail = "this version of the dashboard has no such file; reload the page"
+            app = problem_answer(Request(scope), ProblemError(404, "No such file", detail))
+        await app(scope, receive, send)
+
+
+def _answer(asset: Asset, caching: str, asked: Headers) -> Response:
+    packed = asset.gzipped if "gzip" in asked.get("accept-encoding", "") else None
+    etag = f'"{asset.digest}"' if packed is None else f'"gz-{asset.digest}"'
+    headers = {
+        "Content-Security-Policy": POLICY,
+        "Cache-Control": caching,
+        "ETag": etag,
+        "Vary": "Accept-Encoding",
     }
-    return f"export const ALARM_KINDS = {json.dumps(table, ensure_ascii=False, indent=2)};\n"
-
-
-def _below(folder: Traversable, prefix: str) -> list[tuple[str, Asset]]:
-    found: list[tuple[str, Asset]] = []
-    for entry in folder.iterdir():
-        suffix = entry.name.rpartition(".")[2]
-        if entry.is_dir():
-            found += _below(entry, f"{prefix}{entry.name}/")
-        elif suffix in MEDIA_TYPES:
-            found.append((prefix + entry.name, Asset(entry.read_bytes(), MEDIA_TYPES[suffix])))
-    return found
+    if etag in asked.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    if packed is not None:
+        headers["Content-Encoding"] = "gzip"
+    body = asset.body if packed is None else packed
+    return Response(body, headers=headers, media_type=asset.media_type)

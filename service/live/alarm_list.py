@@ -4,16 +4,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from core.alarms.alarm import Alarm, AlarmState
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState
 from core.alarms.statistics import ChatterRule
 from core.limits import AlarmLevel
+from service.settings.alarm_kinds import ANALYSIS_GONE, SAMPLES_LOST
 
 HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 
 
 @dataclass(frozen=True)
 class AlarmCount:
-    """Number of alarms by state.
+    """Numbers of alarms by state.
 
     Parameters
     ----------
@@ -37,7 +38,7 @@ class AlarmCount:
 
 
 def count_of(alarms: Sequence[Alarm], is_judged: Callable[[Alarm], bool]) -> AlarmCount:
-    """Return the number of alarms by state; `is_judged` as in `AlarmList`."""
+    """Return the numbers of alarms by state; `is_judged` as in `AlarmList`."""
     shown = [alarm for alarm in alarms if alarm.state not in HIDDEN]
     return AlarmCount(
         n_active=sum(alarm.level is not None for alarm in shown),
@@ -49,7 +50,7 @@ def count_of(alarms: Sequence[Alarm], is_judged: Callable[[Alarm], bool]) -> Ala
 
 
 class AlarmList(Protocol):
-    """List of all alarms, from `AlarmEngine` in this process or states of other processes."""
+    """List of all alarms: the `AlarmEngine` of this process, or reports of other processes."""
 
     @property
     def revision(self) -> int:
@@ -58,7 +59,7 @@ class AlarmList(Protocol):
 
     @property
     def chatter_rule(self) -> ChatterRule:
-        """Number of occurrences within a time that makes an alarm count as chattering."""
+        """Number of occurrences, and the time within which they make an alarm chattering."""
         ...
 
     @property
@@ -67,11 +68,11 @@ class AlarmList(Protocol):
         ...
 
     def alarm(self, id_: str) -> Alarm:
-        """Return the alarm with an id. Raises `LookupError` if it does not exist."""
+        """Return the alarm with an id; raise `LookupError` if it does not exist."""
         ...
 
     def is_judged(self, alarm: Alarm) -> bool:
-        """Return whether the condition of an alarm is currently known to be true or false."""
+        """Return whether the condition of an alarm is known now."""
         ...
 
     def is_chattering(self, alarm: Alarm) -> bool:
@@ -79,15 +80,19 @@ class AlarmList(Protocol):
         ...
 
     def count(self) -> AlarmCount:
-        """Return the number of alarms by state."""
+        """Return the numbers of alarms by state."""
         ...
 
 
-@dataclass(frozen=True)
-class EvidenceStatus:
-    """Numbers of evidence bundles since the service started; present write error or None."""
+SHARED = "shared work"
+"""Name used instead of a unit in reports and commands about shared alarms; not a valid unit id."""
 
-    error: str | None
-    n_waiting: int
-    n_written: int
-    n_lost: int
+
+def is_shared(alarm: Alarm) -> bool:
+    """Return whether an alarm belongs to the process that runs the plant-wide tasks."""
+    return alarm.identity.kind == ANALYSIS_GONE
+
+
+def reporting_unit(identity: AlarmIdentity) -> str:
+    """Return the unit whose process reports an alarm: for lost samples, the alarm's subject."""
+    return identity.subject if identity.kind == SAMPLES_LOST else identity.unit

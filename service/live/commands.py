@@ -21,36 +21,36 @@ class FilmPlace:
 
 
 class BaselineRefusedError(ValueError):
-    """An action is not possible in the present state of the baselines; the message says why."""
+    """Error raised if the state of the baselines does not allow an action."""
 
 
 @dataclass(frozen=True)
 class Accept:
-    """Put a version of a baseline in force; readings are then compared with this version."""
+    """Action that puts a version of a baseline in force, to compare readings with it."""
 
     version: int
 
 
 @dataclass(frozen=True)
 class Reject:
-    """Reject a version of a baseline, even if in force; it is not put in force automatically."""
+    """Action that rejects a version of a baseline, also the version in force."""
 
     version: int
 
 
 @dataclass(frozen=True)
 class Freeze:
-    """Stop learning new baselines of a bearing."""
+    """Action that stops the learning of new baselines of a bearing."""
 
 
 @dataclass(frozen=True)
 class Thaw:
-    """Resume learning new baselines of a bearing."""
+    """Action that resumes the learning of new baselines of a bearing."""
 
 
 @dataclass(frozen=True)
 class Renew:
-    """Learn a new baseline from readings after `from_ns`, the time of an overhaul or the like."""
+    """Action that records a machine event at `from_ns`, ns UTC, and starts learning anew."""
 
     from_ns: int
 
@@ -76,7 +76,7 @@ def baseline_step(
     entries
         All baselines of the bearing.
     actor, reason
-        Who ordered the action, and why; stored with the entry.
+        Author of the action and the stated reason, stored with the entry.
 
     Raises
     ------
@@ -98,19 +98,19 @@ def baseline_step(
         case Freeze():
             step = BaselineStep.FROZEN
             if versions.is_frozen:
-                raise BaselineRefusedError(f"{place.bearing} is already frozen")
+                raise BaselineRefusedError(f"the baseline of {place.bearing} is already frozen")
             if version is None:
                 raise BaselineRefusedError(f"{place.bearing} has no baseline in force")
         case Thaw():
             step = BaselineStep.THAWED
             if not versions.is_frozen:
-                raise BaselineRefusedError(f"{place.bearing} is not frozen")
+                raise BaselineRefusedError(f"the baseline of {place.bearing} is not frozen")
         case Renew():
             step, version, from_ns = BaselineStep.RENEWED, None, action.from_ns
             if from_ns > now_ns:
                 raise BaselineRefusedError("the time of a machine event must not be in the future")
             if versions.renewed_ns is not None and from_ns < versions.renewed_ns:
-                raise BaselineRefusedError("a later machine event exists already")
+                raise BaselineRefusedError("a later machine event exists; enter a time after it")
     return StoredStep(place.unit, place.bearing, version, step, now_ns, actor, reason, from_ns)
 
 
@@ -130,14 +130,14 @@ def _require_acceptable(
     if entry.estimator is not place.estimator:
         raise BaselineRefusedError(
             f"version {version} was learned with estimator {entry.estimator};"
-            f" the film is watched with {place.estimator}"
+            f" the plant file selects {place.estimator}"
         )
     if versions.renewed_ns is not None and entry.learned_from_ns < versions.renewed_ns:
         raise BaselineRefusedError(f"version {version} is older than the last machine event")
 
 
 class UnreadableCommandError(Exception):
-    """A stored command cannot be decoded by this version of the program."""
+    """Error raised if a command is damaged or from another version of the program."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ class AlarmCommand:
 
 @dataclass(frozen=True)
 class BaselineCommand:
-    """Command to apply an action to the baselines of a bearing, with actor and stated reason."""
+    """Command to apply an action to the baselines of a bearing, with its author and reason."""
 
     place: FilmPlace
     action: BaselineAction
@@ -159,13 +159,16 @@ class BaselineCommand:
 
 
 @dataclass(frozen=True)
-class ReferenceCommand:
-    """Notice to the process that a 1× reference of a unit was stored."""
+class TakeReference:
+    """Command to store the newest 1× vectors of a bearing as reference for its operating state."""
 
     unit: str
+    bearing: str
+    actor: str
+    note: str
 
 
-OperatorCommand: TypeAlias = AlarmCommand | BaselineCommand | ReferenceCommand
+OperatorCommand: TypeAlias = AlarmCommand | BaselineCommand | TakeReference
 
 _ALARM_ACTIONS = {
     kind.__name__: TypeAdapter[Any](tuple[str, kind])  # type: ignore[valid-type]
@@ -179,13 +182,13 @@ _BASELINE_ACTIONS = {
     kind.__name__: TypeAdapter[Any](tuple[FilmPlace, kind, str, str])  # type: ignore[valid-type]
     for kind in (Accept, Reject, Freeze, Thaw, Renew)
 }
-_REFERENCE = TypeAdapter(ReferenceCommand)
+_REFERENCE = TypeAdapter(TakeReference)
 
 
 def encoded(command: OperatorCommand) -> tuple[str, str]:
     """Return the kind of a command (the name of its class or action) and its JSON document."""
-    if isinstance(command, ReferenceCommand):
-        return ReferenceCommand.__name__, _REFERENCE.dump_json(command).decode()
+    if isinstance(command, TakeReference):
+        return TakeReference.__name__, _REFERENCE.dump_json(command).decode()
     kind = type(command.action).__name__
     if isinstance(command, AlarmCommand):
         return kind, _ALARM_ACTIONS[kind].dump_json((command.alarm, command.action)).decode()
@@ -206,19 +209,23 @@ def decoded(kind: str, document: str) -> OperatorCommand:
             return AlarmCommand(*_ALARM_ACTIONS[kind].validate_json(document))
         if kind in _BASELINE_ACTIONS:
             return BaselineCommand(*_BASELINE_ACTIONS[kind].validate_json(document))
-        if kind == ReferenceCommand.__name__:
+        if kind == TakeReference.__name__:
             return _REFERENCE.validate_json(document)
     except ValidationError as error:
         raise UnreadableCommandError(f"command {kind} cannot be read: {error}") from error
-    raise UnreadableCommandError(f"unknown command {kind!r}")
+    raise UnreadableCommandError(f"unknown command {kind}; update all processes to one version")
 
 
 class NotAvailableError(Exception):
-    """Requested data exist only in the process that analyses the unit; the message names them."""
+    """Error raised if requested data exist only in the process that analyses the unit."""
+
+
+class ReferenceRefusedError(Exception):
+    """Error raised if gaps or vectors cannot be used as a reference; the message states why."""
 
 
 class CommandFailedError(Exception):
-    """A command was not carried out or not stored; `title` and message state which and why."""
+    """Error raised if a command was not carried out or not stored; `title` states which."""
 
     def __init__(self, title: str, detail: str) -> None:
         super().__init__(detail)

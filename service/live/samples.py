@@ -31,7 +31,7 @@ class BlockHistory:
         return iter(self._blocks)
 
     def add(self, block: SampleBlock) -> bool:
-        """Add a block and drop old blocks; return False, without adding, for a repeated block."""
+        """Add a block and drop old ones; return False, without changes, for a repeated block."""
         if self._blocks:
             newest = self._blocks[-1]
             if block.epoch == newest.epoch and block.stop_index <= newest.stop_index:
@@ -81,7 +81,7 @@ def sample_window(
     n_samples: int,
     stamp: SampleBlock | None = None,
 ) -> SampleWindow:
-    """Return the window of `n_samples` samples from `first_index` on.
+    """Return the window of `n_samples` samples per channel that begins at `first_index`.
 
     Parameters
     ----------
@@ -115,12 +115,12 @@ def sample_window(
 def newest_blocks(
     blocks: Sequence[SampleBlock], n_samples: int
 ) -> tuple[list[SampleBlock], int, int]:
-    """Return the blocks with the newest samples, the samples' first index, and their number.
+    """Return the blocks with the newest samples, the first sample index, and the sample count.
 
     Parameters
     ----------
     blocks
-        At least one block, oldest first.
+        At least one block, oldest first; only blocks of the newest epoch are returned.
     n_samples
         Requested number of samples; the returned number is smaller if the blocks have fewer.
     """

@@ -13,7 +13,8 @@ from acquisition.clock import Clock
 from acquisition.errors import AcquisitionError, ConfigError
 from acquisition.source import SampleSource
 from core.samples.blocks import SampleBlock
-from service.live.live_view import LinkState, LiveView
+from service.live.status import LinkState
+from service.measuring.live_view import LiveView
 from service.measuring.sources import WatchedUnit
 from service.runtime.heartbeats import Heartbeats, Pulse
 from service.runtime.polls import TimedSource

@@ -20,21 +20,10 @@ from core.change.settings import FilmRules
 from core.limits import Judgement
 from core.monitor.assessment import Assessment
 from core.samples.blocks import SampleBlock
-from service.live.alarm_list import AlarmCount, count_of
+from service.live.alarm_list import AlarmCount, count_of, is_shared, reporting_unit
 from service.measuring.recorder import Findings
-from service.measuring.reported_alarms import (
-    ReportedAlarms,
-    is_shared,
-    report_refused,
-    stream_alarms,
-)
-from service.measuring.service_alarms import (
-    HealthProbe,
-    HostTime,
-    ServiceAlarms,
-    reporting_unit,
-    service_rules_of,
-)
+from service.measuring.reported_alarms import ReportedAlarms, report_refused, stream_alarms
+from service.measuring.service_alarms import HealthProbe, HostTime, ServiceAlarms, service_rules_of
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.alarm_kinds import MESSAGES_REFUSED
 from service.settings.core_values import (
@@ -102,10 +91,10 @@ class AlarmEngine:
         self._time = HostTime(clock)
         self._observer: Callable[[Sequence[AlarmNews]], None] | None = None
         self.revision = 0
-        """Revision number, increased with every change of an alarm."""
+        """Revision number, increased whenever alarms may have changed."""
 
     def set_observer(self, observer: Callable[[Sequence[AlarmNews]], None]) -> None:
-        """Set the function that is called at once with all changes of alarms."""
+        """Set the function that receives every non-empty list of changes of alarms."""
         self._observer = observer
 
     def restore(
@@ -144,7 +133,7 @@ class AlarmEngine:
         self.revision += 1
 
     def refuse(self, unit: str, reason: str) -> None:
-        """Raise the alarm about a refused stream message of a unit, with the reason."""
+        """Raise a unit's alarm about a refused stream message; no effect without a stream."""
         if self._stream is not None:
             report_refused(self._stream, unit, reason)
 
@@ -339,7 +328,7 @@ async def alarm_engine(
     rows
         Channel of each row of a block, by unit; only for units whose rows are not their channels.
     look
-        Function that returns the health of the service.
+        Function that returns the health of the service; not called during a replay.
     part
         Part of the plant that this process is responsible for.
     memories

@@ -1,23 +1,28 @@
 """Analysis of sample blocks, and transfer of a unit's analysis state to another process."""
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from time import perf_counter
 from types import MappingProxyType
+
+from prometheus_client import Histogram
 
 from acquisition.clock import Clock
 from core.alarms.board import AlarmMemory
 from core.change.film_judge import FilmMemory
+from core.monitor.assessment import Assessment
 from core.monitor.monitor import MonitorState, UnitMonitor
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import Count, Counts, SampleAccount
-from service.live.live_view import LiveView
 from service.measuring.acquirer import Acquirer, Bus, LinkNews
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.films import FilmMonitor
+from service.measuring.live_view import LiveView
 from service.measuring.recorder import Findings, Recorder
 from service.measuring.sources import WatchedUnit
 from service.runtime.heartbeats import Heartbeats, Pulse
+from service.runtime.metrics import MEASURED
 from service.store.port import UnitGap
 
 VERSION = 1
@@ -53,8 +58,28 @@ TURNS = 3
 """Iterations of the event loop between the analysis of two bearings, for waiting requests."""
 
 
+ASSESSMENTS = Histogram(
+    "padwatch_assessment_duration_seconds",
+    "This is the duration of the analysis for a result of a bearing.",
+    ["unit"],
+    buckets=(0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0),
+    registry=MEASURED,
+)
+
+
+def timed(
+    results: Iterator[Assessment], unit: str, now_s: Callable[[], float] = perf_counter
+) -> Iterator[Assessment]:
+    """Yield the results of a unit, and observe the duration of each in `ASSESSMENTS`."""
+    began_s = now_s()
+    for result in results:
+        ASSESSMENTS.labels(unit).observe(now_s() - began_s)
+        yield result
+        began_s = now_s()
+
+
 class Analyser:
-    """Analysis of the blocks of all units, one block at a time.
+    """Analyser of the blocks of all units, one block at a time.
 
     If a device restarts its sample count within an epoch, the analyser assigns a new epoch.
     """
@@ -70,6 +95,8 @@ class Analyser:
         self._monitors, self._live, self._recorder = monitors, live, recorder
         self._alarms, self._films = alarms, films
         self._counts = {unit: Counts() for unit in monitors}
+        for unit in monitors:
+            ASSESSMENTS.labels(unit)  # a unit without results has a count of zero
 
     def require(self, block: SampleBlock) -> None:
         """Raise `BlockMisfitError` if a block does not fit its unit."""
@@ -78,7 +105,7 @@ class Analyser:
     async def take(self, block: SampleBlock, sampled_s: float) -> None:
         """Analyse a block and queue its findings for the store.
 
-        ``sampled_s`` is the monotonic time of the block's samples.
+        ``sampled_s`` is the monotonic time of the block's last sample, s.
         """
         findings = await self.analyse(block, sampled_s)
         if findings != NOTHING:
@@ -89,7 +116,7 @@ class Analyser:
         monitor = self._monitors[block.unit]
         block = self._counts[block.unit].placed(block)
         found = []
-        for assessment in monitor.steps(block):
+        for assessment in timed(monitor.steps(block), block.unit):
             found.append(assessment)
             await _yield()
         assessments, films = self._films.take(block.unit, found)
@@ -189,7 +216,7 @@ class Runner:
         )
 
     async def run(self) -> None:
-        """Run until all sources have ended."""
+        """Run until all sources have ended and their results are stored, or the store fails."""
         async with asyncio.TaskGroup() as tasks:
             recording = tasks.create_task(
                 self._beats.tend("record", self._recorder.run), name="record"

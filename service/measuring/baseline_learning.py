@@ -60,7 +60,7 @@ class Learner:
     def learn(
         self, place: FilmPlace, now_ns: int, author: str = PADWATCH, reason: str = ""
     ) -> BearingBaseline | None:
-        """Learn and store a baseline, and put it in force if acceptance is automatic.
+        """Learn and store a baseline; accept it if acceptance is automatic and no check objects.
 
         Returns
         -------
@@ -134,7 +134,7 @@ class Learner:
         return steps
 
     def _disagreement(self, baseline: BearingBaseline, versions: Versions) -> str | None:
-        """Return a text on the difference from the first accepted baseline; None if it is small.
+        """Describe the difference from the first accepted baseline; None if it is small.
 
         A comparison with the previous version would accept a film that softens slowly.
         """
@@ -156,9 +156,9 @@ def drifted(
     baseline: BearingBaseline,
     limit: float,
 ) -> str | None:
-    """Return a text on a stiffness change during learning; None if below ``limit`` or uncertain.
+    """Describe a stiffness change during learning; None if below ``limit`` or not significant.
 
-    A significant change may be a fault of the bearing. ``limit`` is a natural logarithm.
+    A significant change may be a fault of the bearing. ``limit`` is a change of ln(stiffness).
     """
     for quantity in baseline.quantities:
         found = learning_drift(history, is_healthy, quantity)

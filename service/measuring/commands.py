@@ -1,68 +1,140 @@
-"""Operators' commands, executed in the measuring process."""
+"""Execution of operators' commands, and answers to questions of the serving process."""
 
 import asyncio
+import json
+from collections.abc import Awaitable, Callable
 
-from core.alarms.alarm import Alarm
-from core.alarms.judgements import VectorReference
-from core.alarms.operation import Action
-from service.live.commands import BaselineAction, CommandFailedError, FilmPlace
+from acquisition.clock import Clock
+from core.alarms.operation import ActionRefusedError
+from service.live.commands import (
+    AlarmCommand,
+    BaselineCommand,
+    BaselineRefusedError,
+    OperatorCommand,
+    ReferenceRefusedError,
+    TakeReference,
+    UnreadableCommandError,
+    decoded,
+)
+from service.live.exchange import Question
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.films import FilmMonitor
+from service.measuring.integrity import IntegrityMonitor
+from service.measuring.live_view import LiveView
 from service.measuring.recorder import NotStoredError, Recorder
+from service.measuring.references import measured_vectors
+from service.store.access.audit_entries import Acting, Source, acting_as
 from service.store.port import StoreError
+from service.store.references import SetVectorReference
+from service.store.sharing import DONE, Answer, CommandState
+from service.store.store import Store
 
-STORED_WITHIN_S = 10.0
-"""Maximum wait until the result of an action is on the disk, s."""
-
-ANSWERS_WITHIN_S = 10.0
-"""Maximum wait for the empty transaction that checks the store before an action, s."""
+WITHIN_S = 10.0
+"""Maximum wait for the store before a command is carried out, and until it is on the disk, s."""
 
 
-class LocalCommands:
-    """Operators' commands, applied to the alarms and films of this process."""
+class CommandExecutor:
+    """Executor of operators' commands; the answer `DONE` means that the result is on the disk."""
 
-    def __init__(self, alarms: AlarmEngine, films: FilmMonitor, recorder: Recorder) -> None:
-        self._alarms, self._films, self._recorder = alarms, films, recorder
+    def __init__(
+        self,
+        alarms: AlarmEngine,
+        films: FilmMonitor,
+        live: LiveView,
+        recorder: Recorder,
+        store: Store,
+        clock: Clock,
+    ) -> None:
+        self._alarms, self._films, self._live = alarms, films, live
+        self._recorder, self._store, self._clock = recorder, store, clock
 
-    async def operate(self, id_: str, action: Action) -> Alarm:
-        """Apply an operator's action to an alarm; return the alarm after it is on the disk.
-
-        The action is refused while the store fails, since it must be in the audit trail.
-        """
-        await self._require_store(self._alarms.alarm(id_))
-        alarm = self._alarms.operate(id_, action)
+    async def execute(self, command: OperatorCommand, who: Acting) -> Answer:
+        """Carry out a command for `who`, and return its answer once the result is stored."""
         try:
-            async with asyncio.timeout(STORED_WITHIN_S):
-                await self._recorder.stored()
-        except TimeoutError as error:
-            raise CommandFailedError(
-                "Not stored yet",
-                f"alarm {id_} is {alarm.state.value}, but the store does not respond:"
-                " a restart now would undo the action; storing is retried until it succeeds",
-            ) from error
+            with acting_as(who):
+                return await self._execute(command)
+        except LookupError:
+            return Answer(CommandState.UNKNOWN, "the alarm does not exist")
+        except (ActionRefusedError, BaselineRefusedError, ReferenceRefusedError) as error:
+            return Answer(CommandState.REFUSED, str(error))
         except NotStoredError as error:
-            raise CommandFailedError(
-                "Not stored",
-                f"alarm {id_} is {alarm.state.value}, but the action is not stored, and a restart"
-                f" undoes it: {error}",
-            ) from error
-        return alarm
-
-    async def _require_store(self, alarm: Alarm) -> None:
-        try:
-            async with asyncio.timeout(ANSWERS_WITHIN_S):
-                await self._recorder.require_store()
+            words = "the command was executed but not stored, and a restart undoes it"
+            return Answer(CommandState.INTERRUPTED, f"{words}: {error}")
         except (StoreError, TimeoutError) as error:
-            raise CommandFailedError(
-                "Action not applied",
-                f"alarm {alarm.identity.id} is {alarm.state.value}, as before: an action is applied"
-                f" only if it can be stored ({error or 'the store does not respond'})",
-            ) from error
+            words = "the action was not applied, because it cannot be stored"
+            return Answer(
+                CommandState.WITHDRAWN, f"{words}: {error or 'the store does not respond'}"
+            )
 
-    async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
-        """Apply an engineer's action to the baselines of a bearing."""
-        await self._films.act(place, action, actor, reason)
+    async def _execute(self, command: OperatorCommand) -> Answer:
+        match command:
+            case AlarmCommand():
+                self._alarms.alarm(command.alarm)  # before the store is tried
+                async with asyncio.timeout(WITHIN_S):
+                    await self._recorder.require_store()
+                self._alarms.operate(command.alarm, command.action)
+                return await self._stored()
+            case BaselineCommand():
+                await self._films.act(command.place, command.action, command.actor, command.reason)
+            case TakeReference():
+                await self._take_reference(command)
+        return DONE
 
-    async def refer_to(self, reference: VectorReference) -> None:
-        """Set the reference of a bearing's 1× vectors."""
-        self._alarms.set_reference(reference)
+    async def _stored(self) -> Answer:
+        try:
+            async with asyncio.timeout(WITHIN_S):
+                await self._recorder.stored()
+        except TimeoutError:
+            words = "a restart now would undo the command; storing is retried until it succeeds"
+            return Answer(CommandState.TAKEN, words)
+        return DONE
+
+    async def _take_reference(self, command: TakeReference) -> None:
+        current = self._live.current(command.unit, command.bearing)
+        measured = measured_vectors(current.assessment if current.is_current else None)
+        found = SetVectorReference(measured, self._clock.now_ns(), command.actor, command.note)
+        await asyncio.to_thread(self._store.order1_references.add, found)
+        self._alarms.set_reference(measured)
+
+
+class Questions:
+    """Answers to the questions of the serving process.
+
+    Parameters
+    ----------
+    integrity
+        Monitor to which the serving process reports faults of the database of accounts.
+    metrics
+        Function that returns the metrics of the measuring process in the Prometheus text format.
+    """
+
+    def __init__(
+        self,
+        executor: CommandExecutor,
+        live: LiveView,
+        integrity: IntegrityMonitor,
+        metrics: Callable[[], Awaitable[bytes]],
+    ) -> None:
+        self._executor, self._live, self._metrics = executor, live, metrics
+        self._integrity = integrity
+
+    async def answer(self, question: Question) -> object:
+        """Return the answer to a question: an `Answer` to a command, None to a reported fault."""
+        match question.kind:
+            case "blocks":
+                (unit,) = json.loads(question.document)
+                return self._live.blocks(unit)
+            case "result":
+                unit, bearing = json.loads(question.document)
+                return self._live.assessment(unit, bearing)
+            case "access":
+                (self._integrity.access_trouble,) = json.loads(question.document)
+                return None
+            case "metrics":
+                return await self._metrics()
+        try:
+            command = decoded(question.kind, question.document)
+        except UnreadableCommandError as error:
+            return Answer(CommandState.REFUSED, str(error))
+        who = Acting(Source.API, question.peer, question.actor)
+        return await self._executor.execute(command, who)

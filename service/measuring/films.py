@@ -63,6 +63,8 @@ class FilmMonitor:
     ) -> None:
         self._store, self._clock, self.settings = store, clock, settings
         self.learner = Learner(store, settings)
+        self.revision = 0
+        """Revision number, increased with every new reading and every change of a baseline."""
         self._acting = asyncio.Lock()  # each action depends on the previous one
         self.unwatched = {unit: why for unit, why in rules.items() if isinstance(why, str)}
         self._films = {
@@ -126,6 +128,7 @@ class FilmMonitor:
         if films is None or not assessments:
             return assessments, []
         seen, news = films.watch.take(assessments)
+        self.revision += bool(news)
         films.newest.update({each.reading.bearing: each for each in news})
         return seen, news
 
@@ -146,12 +149,12 @@ class FilmMonitor:
             try:
                 await self.learn_due(pulse)
             except StoreError as error:
-                log.error("baselines are not learned", reason=str(error))
+                log.error("baselines cannot be learned", reason=str(error))
             pulse.beat(period_s)
             await self._clock.sleep(period_s)
 
     async def learn_due(self, pulse: Pulse = UNHEARD) -> None:
-        """Learn all baselines that are due."""
+        """Learn all baselines that are due, and the shaft responses of their units."""
         for unit, films in self._films.items():
             pulse.beat(MAX_LEARN_S)
             due = [
@@ -222,6 +225,7 @@ class FilmMonitor:
         found, decisions = await asyncio.to_thread(in_force, self._store, place, films.rules)
         if found is None or held is None or found.origin != held.origin:
             films.watch.judge.activate_baseline(place.bearing, found, decisions)
+            self.revision += 1
 
 
 def _watched(unit: Unit, rules: FilmRules) -> WatchedFilms:

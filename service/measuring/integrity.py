@@ -5,7 +5,7 @@ import asyncio
 import structlog
 
 from acquisition.clock import Clock
-from service.live.live_view import LiveView
+from service.measuring.live_view import LiveView
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.store.access.audit_entries import AuditAction
 from service.store.port import StoreError
@@ -18,11 +18,11 @@ LOOK_EVERY_S = 3.0
 """Period of the integrity checks, s; the longest time until a missing database file is noticed."""
 
 MAX_REPORTED = 100
-"""Maximum number of damaged rows per run that are recorded in the audit trail."""
+"""Maximum number of damaged and missing rows per run that the audit trail records."""
 
 
 class IntegrityMonitor:
-    """Periodic check for damaged rows, an older copy of the database, and a missing file.
+    """Monitor of damaged and missing rows, outdated copies of the database, and a missing file.
 
     Parameters
     ----------
@@ -33,6 +33,8 @@ class IntegrityMonitor:
     ----------
     rolled_back
         Description of how the database differs from that of the last run; None if it does not.
+    access_trouble
+        Faults of the database of accounts that the serving process reported; None without faults.
     """
 
     def __init__(self, store: Store, clock: Clock, live: LiveView) -> None:
@@ -40,15 +42,16 @@ class IntegrityMonitor:
         self._reported: set[Place] = set()
         self._no_file: str | None = None
         self.rolled_back: str | None = None
+        self.access_trouble: str | None = None
 
     @property
     def n_damaged(self) -> int:
-        """Number of damaged rows found since the start; results of queries omit these rows."""
+        """Number of damaged and missing rows found since the start; queries omit damaged rows."""
         return self._store.integrity.n_damaged
 
     @property
     def mark_error(self) -> str | None:
-        """Reason why the commit counter could not be written; None if it was written."""
+        """Reason why the high-water mark could not be written; None if it was written."""
         return self._store.integrity.mark_error
 
     @property
@@ -58,10 +61,11 @@ class IntegrityMonitor:
         faults = [
             self._no_file,
             self.rolled_back,
-            mark and f"the commit counter cannot be written: {mark}",
+            mark and f"the high-water mark cannot be written: {mark}",
+            self.access_trouble and f"accounts: {self.access_trouble}",
         ]
         if n_damaged:
-            faults.append(f"{n_damaged} stored rows are damaged and left out")
+            faults.append(f"damaged or missing rows: {n_damaged} (see the audit trail)")
         return "; ".join(each for each in faults if each) or None
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
@@ -88,7 +92,7 @@ class IntegrityMonitor:
         except StoreError as error:
             self._no_file = self._live.store_error = str(error)
             if before is None:
-                log.error("the database file is missing", reason=self._no_file)
+                log.error("the database file is missing or replaced", reason=self._no_file)
             return False
         self._no_file = None
         if before is not None:
@@ -107,7 +111,8 @@ class IntegrityMonitor:
         if news:
             self._store.audit.record([self._deed(place) for place in news])
             self._reported.update(news)
-            log.error("stored rows are damaged", n_rows=len(news), first=str(news[0]))
+            first = f"{news[0].table}: {news[0].key}"
+            log.error("stored rows are damaged or missing", n_rows=len(news), first=first)
 
     def _deed(self, place: Place) -> AuditAction:
         return AuditAction(
@@ -117,5 +122,5 @@ class IntegrityMonitor:
             object=f"{place.table}: {place.key}",
             reason="the row is missing"
             if place.is_missing
-            else "the row does not match its checksum and is left out",
+            else "the row does not match its checksum; queries omit it",
         )

@@ -6,7 +6,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext, suppress
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,14 +14,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 import structlog
+from prometheus_client import Histogram
 
 from acquisition.clock import Clock
 from core.alarms.alarm import AlarmNews
 from core.change.film_judge import FilmNews
 from core.monitor.assessment import Assessment
 from core.spectra.cross_spectrum import NO_SPECTRUM
-from service.live.live_view import LiveView
+from service.measuring.live_view import LiveView
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.metrics import MEASURED
 from service.store.port import RefusedRowError, StoreError, UnitGap
 from service.store.sharing import StreamPosition
 from service.store.store import Store
@@ -33,7 +35,7 @@ MAX_BYTES = 16_000_000
 
 
 class ParkedRows:
-    """File of refused rows with the reasons, one JSON object per line; private to its owner."""
+    """File of refused rows with the reasons, one JSON object per line; only its owner may read."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -118,6 +120,15 @@ class Findings:
         return next(iter((*self.alarms, *self.assessments, *self.gaps, *self.films, self.position)))
 
 
+COMMITS = Histogram(
+    "padwatch_store_commit_duration_seconds",
+    "This is the duration of writing findings to the disk, without failed attempts.",
+    buckets=(0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0),
+    registry=MEASURED,
+)
+"""A commit waits for the disk, and up to five seconds for the lock of the database."""
+
+
 class Recorder:
     """Queue of findings that a thread writes to the store; a slow disk does not delay samples.
 
@@ -132,8 +143,6 @@ class Recorder:
         :attr:`LiveView.n_unstored`. Changes of alarms have a separate queue of `MAX_NEWS`.
     on_stored
         Function that is called after changes of alarms were written.
-    timed
-        Factory of a context manager around each write, in the thread.
     finds_again
         Whether the next start reproduces unwritten findings from the stream of blocks.
     """
@@ -146,12 +155,11 @@ class Recorder:
         parked: ParkedRows,
         capacity: int = 5000,
         on_stored: Callable[[], None] = lambda: None,
-        timed: Callable[[], AbstractContextManager[None]] = nullcontext,
         *,
         finds_again: bool = False,
     ) -> None:
         self._store, self._live, self._clock, self._parked = store, live, clock, parked
-        self._capacity, self._on_stored, self._timed = capacity, on_stored, timed
+        self._capacity, self._on_stored = capacity, on_stored
         self._finds_again = finds_again
         self._waiting: deque[Findings] = deque()
         self._alarms: deque[AlarmNews] = deque()
@@ -179,7 +187,7 @@ class Recorder:
         """Queue findings for writing."""
         if not (self._waiting or self._alarms):
             self._waits_since_s = self._clock.monotonic_s()
-        if findings.assessments or findings.gaps or findings.position:
+        if findings.assessments or findings.gaps or findings.films or findings.position:
             self._waiting.append(replace(findings, alarms=()))
         self._drop_oldest()
         self._alarms += findings.alarms
@@ -223,7 +231,7 @@ class Recorder:
         await loop.run_in_executor(self._thread, self._store.append, [], [])
 
     async def settled(self) -> None:
-        """Wait until all queued findings are written, or the store has failed."""
+        """Wait until all queued findings are written, or until the store refuses writes."""
         async with self._progress:
             await self._progress.wait_for(
                 lambda: self._live.store_error or not (self._waiting or self._alarms)
@@ -275,6 +283,8 @@ class Recorder:
         self._waits_since_s = self._clock.monotonic_s()
         self._note_parked(refused)
         self._n_writing = 0
+        for findings in batch:
+            self._live.note_stored(findings.assessments, findings.gaps)
         _drop(self._waiting, batch)
         _drop(self._alarms, alarms)
         reasons = {id(row): reason for row, reason in refused}
@@ -288,13 +298,14 @@ class Recorder:
     def _append(self, batch: Iterable[Findings]) -> list[tuple[object, str]]:
         """Store findings; write refused rows to the file, and return pairs of row and reason."""
         refused: list[tuple[object, str]] = []
-        with self._timed():
-            self._append_parts([part for findings in batch for part in findings.parts], refused)
+        began_s = self._clock.monotonic_s()
+        self._append_parts([part for findings in batch for part in findings.parts], refused)
+        COMMITS.observe(self._clock.monotonic_s() - began_s)
         if refused:
             try:
                 self._parked.add(self._clock.now_ns(), refused)
             except OSError as error:
-                raise StoreError(f"{self._parked.path}: {error}") from error
+                raise StoreError(f"cannot write {self._parked.path}: {error}") from error
         return refused
 
     def _append_parts(self, parts: Sequence[Findings], refused: list[tuple[object, str]]) -> None:
@@ -327,7 +338,7 @@ class Recorder:
         if refused:
             reason = f"{refused[-1][1]} (parked in {self._parked.path.name})"
             self._live.note_unstored(len(refused), reason)
-            log.error("results cannot be stored", n_parked=len(refused), reason=reason)
+            log.error("the database refused results", n_parked=len(refused), reason=reason)
 
     def _resolve(self, news: AlarmNews, refusal: str | None) -> None:
         """Resolve the future of a change of an alarm; `refusal` is None if it was stored."""
@@ -341,7 +352,6 @@ class Recorder:
 
 
 def _drop(queue: deque[T], written: Sequence[T]) -> None:
-    """Remove written entries from the front of a queue."""
     ids = {id(entry) for entry in written}
     while queue and id(queue[0]) in ids:
         queue.popleft()

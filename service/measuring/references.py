@@ -1,139 +1,17 @@
 """References of gaps and 1× vectors: in force, entered by a user, or from the newest result."""
 
-import asyncio
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
-from typing import Protocol
-
-import structlog
-
-from acquisition.clock import Clock
 from core.alarms.judgements import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
-from core.machine.unit import Bearing, Unit
+from core.machine.unit import Bearing
 from core.monitor.assessment import Assessment
 from core.quality import Level, Reading, Reason
 from core.stiffness.order_line import AMPLITUDES
 from core.units import s_from_ns
-from service.runtime.heartbeats import UNHEARD, Pulse
-from service.runtime.periodic import TroubleLog
+from service.live.commands import ReferenceRefusedError
+from service.live.references import opposite_axes
 from service.runtime.times import rfc3339
-from service.store.port import StoredReadings, StoreError
-from service.store.references import GapReference, MicrometrePair
-from service.store.store import Store
-
-log = structlog.get_logger()
-
-LOOK_EVERY_S = 2.0
-
-Key = tuple[str, str]
-"""Unit id and bearing id."""
-
-
-def opposite_axes(bearing: Bearing) -> tuple[bool, bool]:
-    """Return whether the axis x, and whether the axis y, of a bearing has an opposite probe."""
-    return bearing.opposite_x is not None, bearing.opposite_y is not None
-
-
-def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
-    """Return a bearing with its gap reference replaced by a stored reference.
-
-    If the stored reference has no gaps of opposite probes, those of the plant file remain.
-    """
-    opposite = reference.opposite_reference_um
-    if opposite is None or not any(opposite_axes(bearing)):
-        opposite = bearing.opposite_reference_um
-    return replace(
-        bearing,
-        gap_reference_um=reference.gap_reference_um,
-        opposite_reference_um=opposite,
-    )
-
-
-class HasUnit(Protocol):
-    """Protocol of objects with a replaceable unit description, such as a monitor."""
-
-    unit: Unit
-
-    def replace_description(self, unit: Unit) -> None:
-        """Replace the description of the unit."""
-        ...
-
-
-class ReferencesInForce:
-    """Gap references in force: the newest stored reference of a bearing, or its plant-file gaps.
-
-    Parameters
-    ----------
-    monitors
-        Monitors by unit, built from the plant file; their descriptions receive new references.
-    """
-
-    def __init__(self, monitors: Mapping[str, HasUnit], store: Store, clock: Clock) -> None:
-        self._monitors, self._store, self._clock = monitors, store, clock
-        self._bearings: dict[Key, Bearing] = {
-            (unit, bearing.id): bearing
-            for unit, monitor in monitors.items()
-            for bearing in monitor.unit.bearings
-        }
-        self._in_force: dict[Key, GapReference] = {}
-        self._unknown: set[Key] = set()
-        self._trouble = TroubleLog("references cannot be read", "references can be read again")
-
-    def of(self, unit: str, bearing: str) -> GapReference | None:
-        """Return the stored reference of a bearing; None if that of the plant file is in force."""
-        return self._in_force.get((unit, bearing))
-
-    def bearing(self, unit: str, bearing: str) -> Bearing:
-        """Return a bearing with the reference in force."""
-        described = self._bearings[unit, bearing]
-        reference = self.of(unit, bearing)
-        return described if reference is None else with_reference(described, reference)
-
-    async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Read the stored references periodically until cancelled."""
-        while True:
-            pulse.beat(LOOK_EVERY_S)
-            await self._clock.sleep(LOOK_EVERY_S)
-            await self.look()
-
-    async def look(self) -> None:
-        """Read the stored references once; after an error, references in force are unchanged."""
-        try:
-            found = await asyncio.to_thread(self._store.references)
-        except StoreError as error:
-            self._trouble.note(str(error))
-            return
-        self._trouble.note(None)
-        self._take(found)
-
-    def _take(self, found: Iterable[GapReference]) -> None:
-        news = {(r.unit, r.bearing): r for r in found if self._is_news(r)}
-        self._in_force |= news
-        for unit in {unit for unit, _ in news}:
-            monitor = self._monitors[unit]
-            monitor.replace_description(self._described(monitor.unit))
-        for (unit, bearing), reference in news.items():
-            log.info(
-                "reference in force",
-                unit=unit,
-                bearing=bearing,
-                gap_reference_um=reference.gap_reference_um,
-                author=reference.author,
-            )
-
-    def _is_news(self, reference: GapReference) -> bool:
-        key = (reference.unit, reference.bearing)
-        if key in self._bearings:
-            return self._in_force.get(key) != reference
-        if key not in self._unknown:
-            self._unknown.add(key)
-            log.warning("reference of an unknown bearing is ignored", unit=key[0], bearing=key[1])
-        return False
-
-    def _described(self, unit: Unit) -> Unit:
-        return replace(unit, bearings=tuple(self.bearing(unit.id, b.id) for b in unit.bearings))
-
+from service.store.port import StoredReadings
+from service.store.references import MicrometrePair
 
 MAX_AGE_S = 600.0
 """Maximum age, s, of a result whose gaps are used as a reference."""
@@ -144,10 +22,6 @@ OPPOSITE_GAPS = ("opposite_gap_x_um", "opposite_gap_y_um")
 GivenPair = tuple[float | None, float | None]
 Gaps = tuple[MicrometrePair, MicrometrePair | None]
 """Gaps (x, y) of the probes on the positive axes; gaps of the opposite probes or None."""
-
-
-class ReferenceRefusedError(Exception):
-    """Gaps cannot be used as a reference; the message states why."""
 
 
 def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
@@ -169,7 +43,8 @@ def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
                 f"bearing {bearing.id} has an opposite probe in {axis}; give its gap as well"
             )
         if gap_um is not None and not is_there:
-            raise ReferenceRefusedError(f"bearing {bearing.id} has no opposite probe in {axis}")
+            words = f"bearing {bearing.id} has no opposite probe in {axis}; omit its gap"
+            raise ReferenceRefusedError(words)
     return (x, y), _across(bearing, (x, y), opposite)
 
 
@@ -179,7 +54,7 @@ def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) 
     Raises
     ------
     ReferenceRefusedError
-        If there is no result, its age exceeds ten minutes, or its gaps are not usable.
+        If there is no result, its time is more than ten minutes from now, or a gap has no value.
     """
     if newest is None:
         raise ReferenceRefusedError("no result is stored yet")
@@ -236,20 +111,16 @@ NOT_STEADY = (Reason.NON_STATIONARY, Reason.SPEED_IMPLAUSIBLE, Reason.FEW_SEGMEN
 """Quality reasons with which an uncertain amplitude cannot be a reference."""
 
 
-class VectorRefusedError(Exception):
-    """1× vectors cannot be used as a reference; the message states why."""
-
-
 def measured_vectors(assessment: Assessment | None) -> VectorReference:
     """Return the 1× vectors of a current result as a reference for its operating state.
 
     Raises
     ------
-    VectorRefusedError
+    ReferenceRefusedError
         If there is no result, an amplitude has no value, or the machine did not run steadily.
     """
     if assessment is None:
-        raise VectorRefusedError("the bearing has no current result")
+        raise ReferenceRefusedError("the bearing has no current result")
     condition = assessment.condition
     return VectorReference(
         unit=assessment.unit,
@@ -268,7 +139,7 @@ def _vector(assessment: Assessment, place: str) -> OrderVector:
 def _steady(name: str, reading: Reading) -> float:
     reason = reading.quality.reason
     if reading.value is None:
-        raise VectorRefusedError(f"{name} has no value: {reason}")
+        raise ReferenceRefusedError(f"{name} has no value: {reason}")
     if reading.quality.level is not Level.GOOD and reason in NOT_STEADY:
-        raise VectorRefusedError(f"{name} is uncertain: {reason}")
+        raise ReferenceRefusedError(f"{name} is uncertain: {reason}")
     return reading.value

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmNews
+from core.alarms.alarm import PLANT, AlarmIdentity, AlarmNews
 from core.alarms.board import AlarmBoard
 from core.alarms.kinds import Watch
 from core.alarms.rules import rule_of
@@ -36,15 +36,6 @@ class ReportedAlarms(AlarmBoard):
         self._found |= dict.fromkeys(self._once, WITHIN)
         self._once.clear()
         return super().tick(host_ns)
-
-
-SHARED = "shared work"
-"""Name used instead of a unit in reports and commands about shared alarms; not a valid unit id."""
-
-
-def is_shared(alarm: Alarm) -> bool:
-    """Return whether an alarm belongs to the process that does the shared work of the plant."""
-    return alarm.identity.kind == ANALYSIS_GONE
 
 
 def gone_alarms(units: Iterable[str]) -> ReportedAlarms:

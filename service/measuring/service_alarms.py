@@ -16,6 +16,7 @@ from core.limits import WITHIN, AlarmLevel, Judgement, Limits
 from core.quality import Reading
 from core.samples.gaps import SampleAccount
 from core.units import NS_PER_S
+from service.runtime.times import CLOCK_STEP_S
 from service.settings.alarm_kinds import (
     DANGER_KINDS,
     MESSAGES_REFUSED,
@@ -80,9 +81,6 @@ class StreamStatus:
 
 log = structlog.get_logger()
 
-STEP_S = 0.5
-"""Clock step, s, above which the clock counts as set; NTP slews smaller errors."""
-
 
 class HostTime:
     """Wall clock of the host, compared with its monotonic clock."""
@@ -92,13 +90,13 @@ class HostTime:
         self._seen: tuple[int, float] | None = None
 
     def look(self) -> tuple[int, bool]:
-        """Return UTC nanoseconds, and whether the clock was set since the last call."""
+        """Return the time, ns UTC, and whether the clock was set since the last call."""
         now_ns, steady_s = self._clock.now_ns(), self._clock.monotonic_s()
         before, self._seen = self._seen, (now_ns, steady_s)
         if before is None:
             return now_ns, False
         step_s = (now_ns - before[0]) / NS_PER_S - (steady_s - before[1])
-        if abs(step_s) <= STEP_S:
+        if abs(step_s) <= CLOCK_STEP_S:
             return now_ns, False
         log.warning("the clock of this host was set", by_s=round(step_s, 3))
         return now_ns, True
@@ -159,11 +157,6 @@ def loss_key(unit: str) -> str:
     return f"{SAMPLES_LOST}:{unit}"
 
 
-def reporting_unit(identity: AlarmIdentity) -> str:
-    """Return the unit whose process reports an alarm: for lost samples, the alarm's subject."""
-    return identity.subject if identity.kind == SAMPLES_LOST else identity.unit
-
-
 LOSS_NS = 60 * LOSS_MINUTES * NS_PER_S
 
 LOOK_EVERY_NS = 10 * NS_PER_S
@@ -195,7 +188,7 @@ class SampleLoss:
         return (lost - lost_then + n_dropped) / max(n_new + n_dropped, 1)
 
     def is_complete(self, now_ns: int) -> bool:
-        """Return whether the observed time is ten minutes, except for one update period."""
+        """Return whether at least ten minutes less one update period were observed."""
         return bool(self._seen) and now_ns - self._seen[0][0] >= LOSS_NS - LOOK_EVERY_NS
 
 

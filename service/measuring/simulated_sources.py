@@ -91,7 +91,6 @@ def _noise(simulation: SimulationSettings) -> TransducerNoise:
 
 
 def _refuse_misfit(unit: UnitSettings, simulation: SimulationSettings) -> None:
-    """Raise `ConfigError` if the settings of a unit do not fit its machine life."""
     speed_rpm = rated_speed_rpm(simulation.life_seed or 0)
     _compare(unit, "rated_speed_rpm", unit.rated_speed_rpm, speed_rpm)
     if unit.rated_power_mw is not None:

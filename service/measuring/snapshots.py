@@ -1,68 +1,161 @@
-"""Snapshots of unit states in an analysing process, for reports through the database."""
+"""Snapshots of units, built from the parts of the measuring process, and the reports on them."""
 
-from collections.abc import Sequence
-from dataclasses import fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 
-from core.alarms.alarm import Alarm
+from acquisition.clock import Clock
+from core.alarms.alarm import PLANT, Alarm
 from core.monitor.assessment import Assessment
-from service.live.live_view import LiveView, UnitStatus
-from service.live.unit_state import BearingState, FilmState, UnitSigns, UnitState
+from service.live.alarm_list import SHARED, is_shared, reporting_unit
+from service.live.snapshot import (
+    BearingSnapshot,
+    FilmSnapshot,
+    PlantSnapshot,
+    Report,
+    UnitLink,
+    UnitReport,
+    UnitSnapshot,
+)
+from service.live.status import UnitStatus
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.films import FilmMonitor
-from service.measuring.service_alarms import reporting_unit
+from service.measuring.live_view import LiveView
 from service.settings.units import UnitSettings
 
+LINK_EVERY_S = 1.0
+"""Period of reports on the link of a unit, s: a unit without reports counts as not analysed."""
 
-def bearing_state(assessment: Assessment) -> BearingState:
+REBUILT_EVERY_S = 5.0
+"""Maximum delay, s, until a snapshot shows that an alarm has ceased to chatter."""
+
+
+def bearing_snapshot(assessment: Assessment) -> BearingSnapshot:
     """Return a result of a bearing without its arrays (spectrum, orbit)."""
-    names = [each.name for each in fields(BearingState)]
-    return BearingState(**{name: getattr(assessment, name) for name in names})
+    names = [each.name for each in fields(BearingSnapshot)]
+    return BearingSnapshot(**{name: getattr(assessment, name) for name in names})
 
 
-def unit_state(
-    settings: UnitSettings, live: LiveView, alarms: AlarmEngine, films: FilmMonitor
-) -> UnitState:
-    """Return the state of a unit: newest results, alarms, films and baseline versions in force."""
-    unit, bearings = settings.id, [bearing.id for bearing in settings.bearing]
-    own = alarm_state(
-        [alarm for alarm in alarms.alarms if reporting_unit(alarm.identity) == unit], alarms
-    )
-    found = {bearing: live.assessment(unit, bearing) for bearing in bearings}
-    seen = {bearing: films.newest(unit, bearing) for bearing in bearings}
-    in_force = {bearing: films.baseline(unit, bearing) for bearing in bearings}
-    return replace(
-        own,
-        bearings={b: bearing_state(result) for b, result in found.items() if result is not None},
-        films={b: FilmState(news.reading, news.findings) for b, news in seen.items() if news},
-        baselines={b: baseline.origin.version for b, baseline in in_force.items() if baseline},
-    )
+@dataclass(frozen=True)
+class _Built:
+    key: tuple[object, ...]
+    revision: int
+    snapshot: UnitSnapshot
 
 
-def alarm_state(own: Sequence[Alarm], alarms: AlarmEngine) -> UnitState:
-    """Return a unit state that contains only the given alarms."""
-    return UnitState(
-        bearings={},
-        alarms=tuple(own),
-        judged=frozenset(a.identity.id for a in own if alarms.is_judged(a)),
-        chattering=frozenset(a.identity.id for a in own if alarms.is_chattering(a)),
-        films={},
-        baselines={},
-    )
+class SnapshotBuilder:
+    """Builder of the snapshots of units; a snapshot is built anew only after a change."""
+
+    def __init__(
+        self,
+        units: Sequence[UnitSettings],
+        live: LiveView,
+        alarms: AlarmEngine,
+        films: FilmMonitor,
+        clock: Clock,
+    ) -> None:
+        self._units = {unit.id: unit for unit in units}
+        self._live, self._alarms, self._films, self._clock = live, alarms, films, clock
+        self._built: dict[str, _Built] = {}
+
+    def report(self, unit: str) -> UnitReport:
+        """Return the present state of a unit, or of the alarms of `PLANT` or `SHARED`."""
+        built = self._newest(unit)
+        link = replace(self._link(unit), said_s=self._clock.monotonic_s())
+        return UnitReport(unit, link, built.revision, built.snapshot)
+
+    def _newest(self, unit: str) -> _Built:
+        round_ = self._clock.monotonic_s() // REBUILT_EVERY_S
+        own = self._live.revision(unit) if unit in self._units else 0
+        key = (own, self._alarms.revision, self._films.revision, round_)
+        built = self._built.get(unit)
+        if built is not None and built.key == key:
+            return built
+        snapshot = self._snapshot(unit)
+        if built is None or built.snapshot != snapshot:
+            built = _Built(key, 1 if built is None else built.revision + 1, snapshot)
+        self._built[unit] = built = replace(built, key=key)
+        return built
+
+    def _snapshot(self, unit: str) -> UnitSnapshot:
+        own = [alarm for alarm in self._alarms.alarms if self._owner(alarm) == unit]
+        bearings = [each.id for each in self._units[unit].bearing] if unit in self._units else []
+        found = {bearing: self._live.assessment(unit, bearing) for bearing in bearings}
+        seen = {bearing: self._films.newest(unit, bearing) for bearing in bearings}
+        in_force = {bearing: self._films.baseline(unit, bearing) for bearing in bearings}
+        return UnitSnapshot(
+            bearings={b: bearing_snapshot(result) for b, result in found.items() if result},
+            alarms=tuple(own),
+            judged=frozenset(a.identity.id for a in own if self._alarms.is_judged(a)),
+            chattering=frozenset(a.identity.id for a in own if self._alarms.is_chattering(a)),
+            films={b: FilmSnapshot(**vars(news)) for b, news in seen.items() if news},
+            baselines={b: found.origin.version for b, found in in_force.items() if found},
+        )
+
+    def _owner(self, alarm: Alarm) -> str:
+        unit = reporting_unit(alarm.identity)
+        if unit in self._units:
+            return unit
+        return SHARED if is_shared(alarm) else PLANT
+
+    def _link(self, unit: str) -> UnitLink:
+        """Return a unit's link state and data ages, if measured here, and the process's faults."""
+        live = self._live
+        faults = (live.n_unstored, live.store_error)
+        if unit not in self._units:
+            return UnitLink(UnitStatus(), None, {}, *faults)
+        bearings = [bearing.id for bearing in self._units[unit].bearing]
+        ages_s = {bearing: live.current(unit, bearing).age_s for bearing in bearings}
+        known = {bearing: age_s for bearing, age_s in ages_s.items() if age_s is not None}
+        stored = live.stored(unit)
+        return UnitLink(live.status(unit), live.data_age_s(unit), known, *faults, stored=stored)
 
 
-def plant_signs(live: LiveView) -> UnitSigns:
-    """Return the `UnitSigns` of the process itself: unstored findings and store error."""
-    return UnitSigns(UnitStatus(), None, {}, live.n_unstored, live.store_error)
+class SocketReports:
+    """Reports for the serving process on changes since the previous report.
 
+    Parameters
+    ----------
+    units
+        Ids of all reported units, with `PLANT` and `SHARED`.
+    plant
+        Function that returns the state of the measuring process.
+    """
 
-def unit_signs(settings: UnitSettings, live: LiveView) -> UnitSigns:
-    """Return the `UnitSigns` of a unit: link state, and ages of samples and results."""
-    unit = settings.id
-    ages_s = {bearing.id: live.current(unit, bearing.id).age_s for bearing in settings.bearing}
-    return UnitSigns(
-        status=live.status(unit),
-        data_age_s=live.data_age_s(unit),
-        result_ages_s={bearing: age_s for bearing, age_s in ages_s.items() if age_s is not None},
-        n_unstored=live.n_unstored,
-        store_error=live.store_error,
-    )
+    def __init__(
+        self,
+        units: Sequence[str],
+        builder: SnapshotBuilder,
+        plant: Callable[[], PlantSnapshot],
+        clock: Clock,
+    ) -> None:
+        self._units, self._builder = units, builder
+        self._plant, self._clock = plant, clock
+        self._n_reports = 0
+        self._sent: dict[str, tuple[int, object, float]] = {}
+        self._sent_plant: PlantSnapshot | None = None
+
+    def report(self, is_first: bool) -> Report | None:
+        """Return a report on all changes, or on everything if `is_first`; None without changes."""
+        if is_first:
+            self._sent, self._sent_plant = {}, None
+        now_s = self._clock.monotonic_s()
+        found = [each for unit in self._units if (each := self._unit(unit, now_s)) is not None]
+        plant = self._plant()
+        is_new = plant != self._sent_plant
+        if not found and not is_new:
+            return None
+        self._n_reports, self._sent_plant = self._n_reports + 1, plant
+        return Report("measuring", self._n_reports, tuple(found), plant if is_new else None)
+
+    def _unit(self, unit: str, now_s: float) -> UnitReport | None:
+        newest = self._builder.report(unit)
+        status = newest.link.status
+        faults = (newest.link.store_error, newest.link.n_unstored)
+        arrived = (status.last_sample_ns, newest.link.stored)
+        link = (status.state, status.reason, *arrived, *faults)
+        revision, sent_link, sent_s = self._sent.get(unit, (0, None, 0.0))
+        is_new = newest.revision != revision
+        if not is_new and link == sent_link and now_s - sent_s < LINK_EVERY_S:
+            return None
+        self._sent[unit] = (newest.revision, link, now_s)
+        return newest if is_new else replace(newest, snapshot=None)

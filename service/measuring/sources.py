@@ -1,26 +1,22 @@
 """Sources and monitors of the units of a plant file."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
-from acquisition.can.source import CanSource
 from acquisition.clock import Clock
-from acquisition.delivery.joined import JoinedSource, only_slow, without_slow
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
 from acquisition.modbus.polled_source import PolledSettings, PolledSource, vector_calibration
 from acquisition.modbus.ring_source import RingSettings, RingSource
-from acquisition.modbus.slow_values import PolledSlowValues
-from acquisition.simulated.feed import SimulatedSource
+from acquisition.modbus.slow_values import JoinedSource, PolledSlowValues, only_slow, without_slow
 from acquisition.source import SampleSource
 from core.machine.unit import Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
 from core.samples.calibration import UnitCalibration
 from core.spectra.polls import PollTransform
-from service.measuring.simulated_sources import simulated_feed
 from service.runtime.polls import TimedSource
-from service.settings.adapter_values import can_settings_of, link_fields
+from service.settings.adapter_values import link_fields
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.plant import AnalysisModel, PlantFile
 from service.settings.sources.can import CanSettings
@@ -174,8 +170,20 @@ def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:
 def _main_source(unit: UnitSettings, calibration: UnitCalibration, clock: Clock) -> SampleSource:
     match unit.source:
         case CanSettings() as source:
+            from acquisition.can.source import CanSource  # slow imports, only for such a plant
+            from service.settings.can_values import can_settings_of
+
             return CanSource(can_settings_of(unit, source), calibration, clock)
         case SimulatedSettings():
+            from acquisition.simulated.feed import SimulatedSource
+            from service.measuring.simulated_sources import simulated_feed
+
             return SimulatedSource(simulated_feed(unit, clock), calibration, clock)
         case source:
             return modbus_source(source, machine_of(unit), calibration, clock)
+
+
+def timed_sources(units: Mapping[str, WatchedUnit]) -> dict[str, TimedSource]:
+    """Return the sources that measure the durations of their polls, by unit."""
+    sources = {unit: watched.source for unit, watched in units.items()}
+    return {unit: each for unit, each in sources.items() if isinstance(each, TimedSource)}

@@ -29,7 +29,7 @@ class Refused:
 
 @dataclass(frozen=True)
 class Failed:
-    """Outcome of a delivery attempt: it failed and is repeated.
+    """Outcome of a delivery attempt: temporary failure, after which it is repeated.
 
     Parameters
     ----------
@@ -55,7 +55,10 @@ class Channel(Protocol):
         ...
 
     async def send(self, message: Message, body: str) -> Outcome:
-        """Make one delivery attempt within the time-outs; ``body`` is the serialized message."""
+        """Make one delivery attempt within the time-outs, and return its outcome.
+
+        ``body`` is the serialized message.
+        """
         ...
 
 
@@ -63,7 +66,7 @@ MAX_SECRET_BYTES = 8192
 
 
 class SecretError(Exception):
-    """A secret cannot be read; the message contains its location and never its content."""
+    """Error raised if a secret cannot be read; the message has its location, not its content."""
 
 
 def read_secret(settings: SecretSettings) -> str:
@@ -76,7 +79,7 @@ def read_secret(settings: SecretSettings) -> str:
     try:
         text = os.environ.get(settings.env or "", "") if file is None else _start_of(Path(file))
     except OSError as error:
-        raise SecretError(f"{place}: {error.strerror}") from error
+        raise SecretError(f"{place} cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise SecretError(f"{place} is not valid UTF-8") from error
     text = text.strip()

@@ -70,7 +70,6 @@ def value_words(message: Message) -> str | None:
 
 
 def _change(value: float, limit: float | None, std: float | None) -> str:
-    """Return a logarithmic change of stiffness as text, in percent of the baseline."""
     percent = 100.0 * math.expm1(value)
     spread = "" if std is None else f" ± {2 * 100.0 * std * math.exp(value):.1f} (95 %)"
     edge = None if limit is None else 100.0 * math.expm1(math.copysign(limit, value))
@@ -141,7 +140,7 @@ class Mail:
         self._look_up = NameLookUp(settings.host, settings.port)
 
     async def send(self, message: Message, body: str) -> Outcome:  # noqa: ARG002
-        """Make one delivery attempt over a new SMTP connection."""
+        """Make one delivery attempt over a new SMTP connection, and return its outcome."""
         mail = mail_of(message, self._settings.sender, self.address).as_bytes()
         try:
             async with asyncio.timeout(self._settings.total_timeout_s):
@@ -215,7 +214,6 @@ def mail_of(message: Message, sender: str, recipient: str) -> EmailMessage:
 
 
 def _outcome(error: aiosmtplib.SMTPResponseException) -> Outcome:
-    """Return the outcome for an SMTP error reply: `Refused` if permanent, otherwise `Failed`."""
     is_permanent = 500 <= error.code < 600 and error.code not in LOGIN_CODES
     return Refused(_reply(error)) if is_permanent else Failed(_reply(error))
 

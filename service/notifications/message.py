@@ -12,7 +12,6 @@ from core.alarms.kinds import ALARM_KINDS, FILM_KINDS
 from core.change.film_judge import FilmNews
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
-from service.live.live_view import LiveView
 from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import value_unit
 
@@ -55,20 +54,24 @@ NewestFilm = Callable[[str, str], FilmNews | None]
 """Function that returns the newest film verdict for a unit id and a bearing id."""
 
 
-class LiveContext:
-    """Function that returns the context of an alarm from the newest monitoring results."""
+NewestResult = Callable[[str, str], Assessment | None]
+"""Function that returns the newest result for a unit id and a bearing id."""
 
-    def __init__(self, live: LiveView) -> None:
-        self._live = live
+
+class LiveContext:
+    """Callable that returns the context of an alarm from the newest monitoring results."""
+
+    def __init__(self, newest: NewestResult) -> None:
+        self._newest_result = newest
         self._newest_film: NewestFilm = lambda unit, bearing: None  # noqa: ARG005
 
     def watch_films(self, newest: NewestFilm) -> None:
-        """Set the source of the film verdicts when film monitoring starts."""
+        """Set the function that returns film verdicts; called when film monitoring starts."""
         self._newest_film = newest
 
     def __call__(self, identity: AlarmIdentity) -> AlarmContext:
         """Return the context of an alarm; empty if its bearing or part has no assessment."""
-        assessment = self._live.assessment(identity.unit, identity.subject)
+        assessment = self._newest_result(identity.unit, identity.subject)
         if assessment is None:
             return AlarmContext()
         condition = assessment.condition

@@ -1,49 +1,40 @@
-"""Prometheus metrics of notification delivery, by receiver of the plant file."""
+"""Metrics of the delivery of notifications, by receiver of the plant file."""
 
-from collections.abc import Callable, Iterator, Sequence
-
-from prometheus_client.metrics_core import Metric
+from collections.abc import Sequence
 
 from core.units import NS_PER_S
-from service.notifications.sender import ReceiverView
-from service.runtime.metrics import gauge
+from service.live.receivers import ReceiverView
+from service.runtime.metrics import Families
+
+DELIVERY = {
+    "outbox_readable": "This is 1 if the outbox could be read.",
+    "delivery_waiting_messages": "This is the number of messages that wait for the receiver.",
+    "delivery_dead_messages": "This is the number of messages that the receiver rejected or that"
+    " expired.",
+    "delivery_failed_attempts": "This is the number of failed attempts since the last delivery.",
+    "delivery_wait_seconds": "This is the waiting time of the oldest message for the receiver.",
+}
 
 
-def delivery_metrics(views: Sequence[ReceiverView] | None, now_ns: int) -> Iterator[Metric]:
-    """Yield the metrics of all receivers; ``views`` is None if the outbox cannot be read."""
+def add_deliveries(families: Families, views: Sequence[ReceiverView] | None, now_ns: int) -> None:
+    """Add the messages of all receivers; ``views`` is None if the outbox cannot be read.
+
+    The recipients of one mail have one label, the id of the mail; labels contain no address.
+    """
+    families.declare(DELIVERY)
+    families.add("outbox_readable", views is not None)
     by_name: dict[str, list[ReceiverView]] = {}
     for view in views or ():
-        if (
-            view.receiver is not None
-        ):  # one label for all recipients of a mail; labels contain no address
+        if view.receiver is not None:
             by_name.setdefault(view.name.partition(":")[0], []).append(view)
-
-    def family(name: str, meaning: str, value: Callable[[list[ReceiverView]], float]) -> Metric:
-        rows = (((key,), value(its)) for key, its in by_name.items())
-        return gauge(f"delivery_{name}", meaning, ("receiver",), rows)
-
-    def wait_s(view: ReceiverView) -> float:
-        oldest_ns = view.backlog.oldest_ns if view.backlog else None
-        return 0.0 if oldest_ns is None else max(0.0, (now_ns - oldest_ns) / NS_PER_S)
-
-    yield gauge("outbox_readable", "1 if the outbox could be read.", (), [((), views is not None)])
-    yield family(
-        "waiting_messages",
-        "Messages that wait for delivery to a receiver.",
-        lambda its: sum(view.backlog.n_waiting for view in its if view.backlog),
-    )
-    yield family(
-        "dead_messages",
-        "Messages that a receiver rejected or that expired.",
-        lambda its: sum(view.backlog.n_dead for view in its if view.backlog),
-    )
-    yield family(
-        "failed_attempts",
-        "Failed attempts since the last delivery.",
-        lambda its: sum(view.status.n_failures for view in its if view.status),
-    )
-    yield family(
-        "wait_seconds",
-        "Waiting time of the oldest message for a receiver.",
-        lambda its: max(map(wait_s, its)),
-    )
+    for name, its in by_name.items():
+        backlogs = [view.backlog for view in its if view.backlog]
+        waits_ns = [now_ns - each.oldest_ns for each in backlogs if each.oldest_ns is not None]
+        n_failed = sum(view.receiver.status.n_failures for view in its if view.receiver)
+        for measure, value in (
+            ("waiting_messages", sum(backlog.n_waiting for backlog in backlogs)),
+            ("dead_messages", sum(backlog.n_dead for backlog in backlogs)),
+            ("failed_attempts", n_failed),
+            ("wait_seconds", max((0, *waits_ns)) / NS_PER_S),
+        ):
+            families.add(f"delivery_{measure}", value, receiver=name)

@@ -56,7 +56,7 @@ def notice_of(alarm: Alarm, event: AlarmEvent) -> Notice | None:
 
 
 class Router:
-    """Function that creates the outbox messages of an alarm event when the event is stored."""
+    """Callable that creates the outbox messages of an alarm event when the event is stored."""
 
     def __init__(
         self,

@@ -2,9 +2,8 @@
 
 import asyncio
 import random
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import TypeVar
 
 import structlog
@@ -12,11 +11,18 @@ import structlog
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival
 from core.units import ns_from_s
+from service.live.receivers import (
+    ReceiverStatus,
+    ReceiverView,
+    SenderState,
+    SenderStatus,
+    receiver_views,
+)
 from service.notifications.channel import Channel, Delivered, Failed, Outcome
 from service.notifications.message import loads
 from service.runtime.heartbeats import UNHEARD, Heartbeats, Pulse
 from service.settings.notifications import AnyReceiver
-from service.store.outbox import Backlog, MessageState, Outbox, StoredMessage
+from service.store.outbox import MessageState, Outbox, StoredMessage
 from service.store.port import StoreError
 
 FIRST_WAIT_S = 1.0
@@ -73,39 +79,6 @@ class Receiver:
     name: str
     settings: AnyReceiver
     channel: Channel
-
-
-class SenderState(StrEnum):
-    """Activity of a sender; `QUIET` is waiting for the end of the quiet hours of the receiver."""
-
-    IDLE = "idle"
-    SENDING = "sending"
-    RETRYING = "retrying"
-    QUIET = "quiet"
-    STORE_FAILS = "store_fails"
-
-
-@dataclass(frozen=True)
-class SenderStatus:
-    """Status of a sender: its activity and its failed attempts.
-
-    Parameters
-    ----------
-    n_failures
-        Number of failed attempts since the last delivery.
-    failing_since_ns
-        Time of the first of these failures, in ns since 1970 UTC; None without failures.
-    reason
-        Reason of the newest failure.
-    next_attempt_ns
-        Time of the next attempt, in ns since 1970 UTC; None outside a retry delay.
-    """
-
-    state: SenderState = SenderState.IDLE
-    n_failures: int = 0
-    failing_since_ns: int | None = None
-    reason: str | None = None
-    next_attempt_ns: int | None = None
 
 
 class Sender:
@@ -172,14 +145,15 @@ class Sender:
         )
         write = log.info if is_delivered else log.error
         if not is_delivered or self.status.n_failures:
-            event = "delivered again" if is_delivered else "permanently rejected"
+            outcome_words = "delivered after failures" if is_delivered else "permanently rejected"
+            event = f"message {outcome_words}"
             write(event, receiver=self.receiver.name, id=letter.event_id, answer=outcome.answer)
         self.status = SenderStatus(SenderState.SENDING)
 
     async def _wait_after(self, letter: StoredMessage, failed: Failed) -> None:
         now_ns, before = self._clock.now_ns(), self.status
         if before.n_failures == 0:
-            log.warning("not delivered", receiver=self.receiver.name, reason=failed.answer)
+            log.warning("message not delivered", receiver=self.receiver.name, reason=failed.answer)
         await self._stored(lambda: self._outbox.fail(letter.id, failed.answer))
         await self._expire(failed.answer)
         n_failures = before.n_failures + 1
@@ -210,7 +184,7 @@ class Sender:
             lambda: self._outbox.expire(name, before_ns, words, now.host_ns)
         )
         if n_given_up:
-            log.error("messages expired", receiver=name, n_messages=n_given_up, reason=answer)
+            log.error("undelivered messages expired", receiver=name, n=n_given_up, reason=answer)
 
     async def _stored(self, work: Callable[[], T], to_the_end: bool = False) -> T:
         """Run a store operation in a thread; repeat it until it succeeds, and return its result.
@@ -227,7 +201,9 @@ class Sender:
             except StoreError as error:
                 if self.status.state is not SenderState.STORE_FAILS:
                     log.error(
-                        "the outbox cannot be used", receiver=self.receiver.name, reason=str(error)
+                        "the outbox cannot be read or written",
+                        receiver=self.receiver.name,
+                        reason=str(error),
                     )
                 self._note(SenderState.STORE_FAILS)
                 await self._clock.sleep(STORE_RETRY_S)
@@ -260,44 +236,6 @@ async def _finished(work: Callable[[], T]) -> T:
         raise
 
 
-@dataclass(frozen=True)
-class ReceiverView:
-    """State of a receiver and its messages, for the API and the metrics.
-
-    Parameters
-    ----------
-    receiver, status
-        None for a receiver that was removed from the plant file, whose messages remain queued.
-    backlog
-        Counts of the outbox messages of the receiver; None without messages.
-    """
-
-    name: str
-    receiver: Receiver | None
-    status: SenderStatus | None
-    backlog: Backlog | None
-
-
-def receiver_views(
-    receivers: Mapping[str, Receiver], outbox: Outbox, status: Callable[[str], SenderStatus]
-) -> list[ReceiverView]:
-    """Return the state of all receivers of the plant file, then of removed ones with messages.
-
-    Raises
-    ------
-    StoreError
-        If the outbox cannot be read.
-    """
-    backlogs = {backlog.receiver: backlog for backlog in outbox.backlogs()}
-    others = [
-        ReceiverView(name, None, None, b) for name, b in backlogs.items() if name not in receivers
-    ]
-    return [
-        *(ReceiverView(name, r, status(name), backlogs.get(name)) for name, r in receivers.items()),
-        *others,
-    ]
-
-
 class Deliveries:
     """Group of the senders of all receivers, which deliver independently of each other."""
 
@@ -322,12 +260,19 @@ class Deliveries:
         for sender in self._senders.values():
             sender.wake()
 
+    @property
+    def statuses(self) -> tuple[ReceiverStatus, ...]:
+        """Receivers of the plant file with the status of their senders."""
+        return tuple(
+            ReceiverStatus(
+                name, each.receiver.settings.kind, each.receiver.channel.address, each.status
+            )
+            for name, each in self._senders.items()
+        )
+
     async def look(self) -> list[ReceiverView]:
         """Return the state of all receivers, as `receiver_views` does.
 
         Raises `StoreError` if the outbox cannot be read.
         """
-        receivers = {name: sender.receiver for name, sender in self._senders.items()}
-        return await asyncio.to_thread(
-            receiver_views, receivers, self._outbox, lambda name: self._senders[name].status
-        )
+        return await asyncio.to_thread(receiver_views, self.statuses, self._outbox)

@@ -49,7 +49,7 @@ class BoundedStream(httpcore2.AsyncNetworkStream):
         self._stream, self._n_left = stream, n_left
 
     async def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
-        """Read and return up to `max_bytes` bytes.
+        """Read and return up to `max_bytes` bytes within `timeout`, in s; None for no limit.
 
         Raises `httpcore2.ReadError` if the total limit is reached.
         """
@@ -61,7 +61,7 @@ class BoundedStream(httpcore2.AsyncNetworkStream):
         return found
 
     async def write(self, buffer: bytes, timeout: float | None = None) -> None:
-        """Write bytes to the connection."""
+        """Write bytes to the connection within `timeout`, in s; None for no limit."""
         await self._stream.write(buffer, timeout)
 
     async def aclose(self) -> None:
@@ -141,7 +141,7 @@ class Webhook:
         self._look_up = NameLookUp(url.hostname or "", port)
 
     async def send(self, message: Message, body: str) -> Outcome:
-        """Make one delivery attempt with a POST request."""
+        """Make one delivery attempt with a POST request, and return its outcome."""
         try:
             async with asyncio.timeout(self._settings.total_timeout_s):
                 return await self._post(message["id"], body.encode())
@@ -183,10 +183,6 @@ class Webhook:
         return Failed(answer, retry_after_s(headers.get(b"retry-after"), self._clock))
 
     def _headers(self, id_: str, body: bytes) -> dict[str, str]:
-        """Return the headers of the request.
-
-        Raises `SecretError` if a secret cannot be read.
-        """
         time_s = str(self._clock.now_ns() // NS_PER_S)
         headers = {
             "Host": urlsplit(self._settings.url).netloc,

@@ -45,10 +45,8 @@ class CaptureSettings:
 
     Parameters
     ----------
-    pre_s
-        Duration before the alarm.
-    post_s
-        Duration after the alarm.
+    pre_s, post_s
+        Durations before and after the alarm.
     max_s
         Maximum duration of a capture.
     window_s
@@ -116,7 +114,7 @@ class Capture:
         self.is_lost = self.is_replaced = False
 
     def extend(self, event: AlarmEvent, now_s: float) -> None:
-        """Add an alarm event; extend the capture to `post_s` after it, up to `max_s` in total."""
+        """Add an alarm event at monotonic time `now_s`; extend the capture to `post_s` after it."""
         self.alarms.append(event)
         end_ns = max(self._end_ns, event.time_ns + ns_from_s(self._settings.post_s))
         self._end_ns = min(end_ns, self._last_end_ns)
@@ -166,10 +164,8 @@ class Captures(WriterThread):
 
     Attributes
     ----------
-    n_written
-        Number of finished captures since the start.
-    n_failed
-        Number of failed writes since the start.
+    n_written, n_failed
+        Numbers of finished captures and of failed writes since the start.
     """
 
     def __init__(
@@ -214,7 +210,7 @@ class Captures(WriterThread):
 
     @property
     def trouble(self) -> str | None:
-        """Reason why captures are not written, an error or a disk timeout; None otherwise."""
+        """Reason why captures are not written, such as a disk without response; None otherwise."""
         since_s = self._busy_since_s
         if since_s is not None and self._clock.monotonic_s() - since_s > MAX_BUSY_S:
             return "the disk does not respond"
@@ -225,7 +221,7 @@ class Captures(WriterThread):
         return [*self._ended, *self._running.values()]
 
     def take(self, block: SampleBlock, news: Sequence[AlarmNews]) -> None:
-        """Process a block and the alarm events that resulted from its analysis."""
+        """Keep a block in memory; start, extend or replace a capture for its alarm events."""
         if block.unit not in self._histories:
             return
         is_new = self._histories[block.unit].add(block)
@@ -264,7 +260,7 @@ class Captures(WriterThread):
                 await self._clock.sleep(WRITE_EVERY_S)
 
     async def close(self) -> None:
-        """Finish all captures with the samples so far, and stop the thread."""
+        """Finish all captures with the samples received until now, and stop the thread."""
         for unit in list(self._running):
             self._end(unit)
         await self._write()
@@ -304,14 +300,12 @@ class Captures(WriterThread):
         self._ended.append(self._running.pop(unit))
 
     def _end_idle(self) -> None:
-        """End captures whose deadline has passed without further samples."""
         now_s = self._clock.monotonic_s()
         for unit, capture in list(self._running.items()):
             if now_s > capture.deadline_s:
                 self._end(unit)
 
     async def _write(self) -> None:
-        """Write all pending blocks, and finish captures that have ended."""
         for capture in self._all:
             is_last = any(capture is ended for ended in self._ended)
             was_closed = capture.file.is_closed
@@ -341,9 +335,8 @@ class Captures(WriterThread):
             self._note(str(error))
 
     def _remove_incomplete(self) -> None:
-        """Remove captures that a crash left incomplete; runs in the writer thread."""
         try:
             for folder in remove_incomplete(self._root, self._histories):
-                log.warning("an incomplete capture is removed", folder=folder.name)
+                log.warning("a capture left incomplete by a crash is removed", folder=folder.name)
         except OSError as error:
             self._note(str(error))

@@ -65,7 +65,7 @@ class Omission:
             self.n_samples[each.reason] += each.n_samples
 
     def add_block(self, block: SampleBlock, reason: str) -> None:
-        """Add the samples of a dropped block, and the samples rejected before it."""
+        """Count the samples of a dropped block, under `reason`, and those rejected before it."""
         self.add(block.epoch, (*block.rejected, Rejection(reason, block.n_samples)))
 
     def before(self, block: SampleBlock) -> SampleBlock:
@@ -83,7 +83,7 @@ class Omission:
 
 
 def unseen_part(block: SampleBlock, end: Position | None) -> SampleBlock | None:
-    """Return the part of a block from a position on; None if the block ends before the position."""
+    """Return the part of a block from `end` on, or all if `end` is None; None without a part."""
     if end is None or end[0] != block.epoch or block.first_index >= end[1]:
         return block
     return None if block.stop_index <= end[1] else block.from_sample(end[1] - block.first_index)
@@ -161,7 +161,7 @@ class UnitRecorder:
             self._finish_part(self._segment)
 
     def end(self) -> None:
-        """End the open segment.
+        """End the open segment, if any, and add its folder to `ended`.
 
         Raises
         ------
@@ -228,8 +228,9 @@ def last_end(root: Path, unit: str) -> Position | None:
             if read_manifest(folder).unit != unit:
                 continue
             end = None
-            for head in open_recording(folder).heads():
-                end = (head.epoch, head.first_index + head.n_samples)
+            for heads, _ in open_recording(folder).heads():
+                epoch, first_index, _, n_samples, *_ = heads[-1].item()
+                end = (epoch, first_index + n_samples)
         except ConfigError:
             continue  # reported by the check of recordings
         return end
@@ -257,7 +258,7 @@ REPORTED_S = 60.0
 
 
 class ContinuousRecorder(WriterThread):
-    """Recorder that continuously writes the samples of all units to the disk.
+    """Recorder that continuously writes the samples of units to the disk.
 
     Parameters
     ----------
@@ -348,14 +349,13 @@ class ContinuousRecorder(WriterThread):
             await self._clock.sleep(WRITE_EVERY_S)
 
     async def close(self) -> None:
-        """Finish all recordings with the samples so far, and stop the thread."""
+        """Finish all recordings with the samples received until now, and stop the thread."""
         self._is_closed = True
         await self._write()
         await self._in_thread(self._end)
         self._thread.shutdown(wait=False)
 
     def _slowness(self) -> DropReason | None:
-        """Return `DISK_SLOW` if the disk is too slow for the queue; None otherwise."""
         since = [] if self._busy_since_s is None else [self._busy_since_s]
         since += [self._waiting[0][0]] if self._waiting else []
         is_late = bool(since) and self._clock.monotonic_s() - min(since) > MAX_WAIT_S
@@ -424,7 +424,6 @@ class ContinuousRecorder(WriterThread):
                 self._note(self._join_one())
 
     def _recover(self) -> None:
-        """Join the segments that a crash left unjoined; runs in the writer thread."""
         try:
             left = unjoined(self._root, self._owned)
             remove_incomplete(self._root, self._owned)

@@ -39,7 +39,7 @@ _NAME = re.compile(r"(.+)-\d{8}T\d{6}\.\d{3}Z-")
 
 
 def new_folder(root: Path, unit: str, time_ns: int, kind: str) -> Path:
-    """Return an unused folder for a recording of a unit, with its start time in the name."""
+    """Return an unused folder for a recording; its name has unit, start time and `kind`."""
     seconds, ns = divmod(time_ns, NS_PER_S)
     moment = f"{datetime.fromtimestamp(seconds, UTC):%Y%m%dT%H%M%S}.{ns // 1_000_000:03d}Z"
     return _free(root / f"{unit}-{moment}-{kind}", "", PARTS, INCOMPLETE)
@@ -158,7 +158,8 @@ def finish_removal(folder: Path) -> Path | None:
 
     Returns
     -------
-    The renamed folder if it contains files of other programs, else None.
+    Path or None
+        Renamed folder if it contains files of other programs, else None.
 
     Raises
     ------
@@ -197,7 +198,7 @@ PLACE_FILE = "place.txt"
 
 
 def place_of(data_folder: Path) -> str:
-    """Return the permanent identifier of a data folder; create it on first use.
+    """Return the permanent identifier of a data folder; create it if it is missing or invalid.
 
     Raises
     ------

@@ -50,7 +50,7 @@ class Index:
 
     @property
     def faults(self) -> Mapping[str, str]:
-        """Fault of each damaged recording, by name."""
+        """Fault of each damaged recording, by name of the recording."""
         return {f.name: f.reason for f in self._files.values() if f.state is WaveformState.DAMAGED}
 
     def put(self, files: Iterable[WaveformFile]) -> None:
@@ -178,7 +178,7 @@ def _raise_refusal(error: BaseException, folder: Path) -> None:
 
 
 class RecordingState(StrEnum):
-    """State of a recording according to `RecordingCheck`."""
+    """Result of a check: sound, not in the index, damaged, missing, or not finished."""
 
     SOUND = "sound"
     NOT_ENTERED = "not_entered"
@@ -281,7 +281,7 @@ class RetryList:
 
     @contextmanager
     def noted(self, kind: WaveformKind, name: str) -> Iterator[None]:
-        """Return a context manager that lists a recording after an `OSError`, else removes it."""
+        """Return a context that catches `OSError` and lists the recording; success unlists it."""
         try:
             yield
         except OSError as error:

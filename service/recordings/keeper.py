@@ -86,10 +86,8 @@ class RecordingIndexer:
     ----------
     faults
         Fault of each damaged recording, by name.
-    n_files
-        Number of the recordings on the disk, by kind.
-    n_bytes
-        Total size of the recordings on the disk, by kind.
+    n_files, n_bytes
+        Number and total size of the recordings on the disk, by kind.
     trouble
         First error of the last run; None if the run succeeded.
     """
@@ -134,7 +132,7 @@ class RecordingIndexer:
         return self._gauge.is_full
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Maintain the recordings until cancelled."""
+        """Maintain the recordings in the thread until cancelled; call `close` afterwards."""
         while True:
             pulse.beat(MAX_LOOK_S)
             start_s = self._clock.monotonic_s()
@@ -150,7 +148,7 @@ class RecordingIndexer:
         self._lock.release()
 
     def look(self) -> None:
-        """Measure the free space; maintain the recordings if the lock is free; in the thread."""
+        """Measure the free space; maintain recordings if the lock is free; set `trouble`."""
         errors = FirstError()
         with errors.deferred():
             self._gauge.measure()  # first, as later steps may take long or fail

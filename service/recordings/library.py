@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from acquisition.delivery.blocks import sample_block
+import numpy as np
+
 from acquisition.errors import ConfigError
 from acquisition.recordings.export import ExportFormat, write_rows
 from acquisition.recordings.manifest import Manifest, checksum_of, read_manifest
 from acquisition.recordings.reader import Recording, open_recording
-from acquisition.recordings.source import all_of
 from acquisition.recordings.summary import RecordingSummary, summary_of
 from core.samples.blocks import SampleBlock
-from core.units import ns_from_s
+from core.units import NS_PER_S, ns_from_s
 from service.recordings.folders import ALARM, CONTINUOUS, FILES, finished, n_bytes_of, unit_of
 from service.runtime.files import Sink, zipped
 from service.store.waveforms import WaveformKind
@@ -79,7 +79,7 @@ class RecordingLibrary:
         return [self._entry(folder) for folder in by_age[:limit]]
 
     def one(self, name: str) -> RecordingEntry | None:
-        """Return the entry of the recording with a name; None if the recording does not exist."""
+        """Return the entry of the recording with a name; None if the name is invalid or unknown."""
         folder = self._folder(name)
         return None if folder is None else self._entry(folder)
 
@@ -93,7 +93,7 @@ class RecordingLibrary:
         """
         folder = self._folder(name)
         if folder is None:
-            raise ConfigError(f"{name}: recording does not exist")
+            raise ConfigError(f"{name}: the recording does not exist")
         if name in self._faults:
             raise ConfigError(f"{name}: {self._faults[name]}")
         return open_recording(folder)
@@ -121,7 +121,6 @@ class RecordingLibrary:
             yield from sink.taken()
 
     def _folder(self, name: str) -> Path | None:
-        """Return the folder of a recording; None if no folder in the roots has the name."""
         if _NAME.fullmatch(name) is None:
             return None
         return next((folder for folder in self._folders() if folder.name == name), None)
@@ -146,13 +145,11 @@ def kind_of(name: str) -> WaveformKind:
 
 
 def _age(folder: Path) -> tuple[str, str]:
-    """Return the start time in the name of a recording, and the name, as a sort key."""
     found = _TIME.search(folder.name)
     return found[0] if found else "", folder.name
 
 
 def _alarms(path: Path) -> list[Mapping[str, Any]]:
-    """Return the alarms of a recording; empty if they cannot be read."""
     try:
         with path.open("rb") as file:
             document = json.loads(file.read(MAX_ALARM_BYTES))
@@ -172,10 +169,8 @@ class RecordingWindow:
 
     Parameters
     ----------
-    start_ns
-        Start time of the whole recording.
-    stop_ns
-        End time of the whole recording.
+    start_ns, stop_ns
+        Start and end of the whole recording, ns since 1970 UTC.
     blocks
         Blocks in the window that have the epoch of the first block in it; empty in a gap.
     n_other
@@ -189,7 +184,7 @@ class RecordingWindow:
 
 
 def window_of(recording: Recording, start_s: float, seconds: float) -> RecordingWindow:
-    """Read the blocks from ``start_s`` to ``start_s + seconds`` after the first sample.
+    """Return the blocks from ``start_s`` to ``start_s + seconds`` after the first sample.
 
     Raises
     ------
@@ -197,16 +192,15 @@ def window_of(recording: Recording, start_s: float, seconds: float) -> Recording
         If the recording can no longer be read.
     """
     rate_hz = recording.manifest.rate_hz
-    spans = [(h.start_ns, h.start_ns + ns_from_s(h.n_samples / rate_hz)) for h in recording.heads()]
-    if not spans:
-        raise ConfigError(f"{recording.folder}: recording has no blocks")
-    from_ns = spans[0][0] + ns_from_s(start_s)
+    heads = np.concatenate([some for some, _ in recording.heads()])
+    begin_ns = heads["start_ns"]
+    end_ns = begin_ns + np.rint(heads["n_samples"] / rate_hz * NS_PER_S).astype(np.int64)
+    from_ns = int(begin_ns[0]) + ns_from_s(start_s)
     to_ns = from_ns + ns_from_s(seconds)
-    wanted = [n for n, (begin, end) in enumerate(spans) if end > from_ns and begin < to_ns]
+    wanted = np.flatnonzero((end_ns > from_ns) & (begin_ns < to_ns)).tolist()
     blocks: list[SampleBlock] = []
     if wanted:
-        calibration = all_of(recording.manifest).calibration
-        raws = recording.raw_blocks(wanted[0], wanted[-1] + 1)
-        blocks = [sample_block([raw], calibration) for raw in raws]
+        blocks = list(recording.blocks(wanted[0], wanted[-1] + 1))
     same = [block for block in blocks if block.epoch == blocks[0].epoch]
-    return RecordingWindow(spans[0][0], spans[-1][1], same, len(blocks) - len(same))
+    n_other = sum(block.side.n_cells for block in blocks if block.epoch != blocks[0].epoch)
+    return RecordingWindow(int(begin_ns[0]), int(end_ns[-1]), same, n_other)

@@ -80,7 +80,7 @@ def channels_for(unit: Unit, bearing: Bearing) -> list[str]:
 
 
 def motion_of(window: SampleWindow, unit: Unit, bearing: Bearing) -> ShaftMotion:
-    """Return the shaft motion in a sample window, which must contain the shaft channels."""
+    """Return the shaft motion in a window, which must contain the shaft channels of the bearing."""
     channels = {channel.id: channel for channel in unit.channels}
     x_um, y_um = (
         _displacement(window, channels[id_]) for id_ in (bearing.shaft_x, bearing.shaft_y)
@@ -174,7 +174,7 @@ def _gap(window: SampleWindow, channel: Channel | None, slow_channel: str | None
 
 
 class NoMotionError(Exception):
-    """A recording lacks a needed channel or samples; the message states which."""
+    """Error raised if a recording lacks a needed channel or samples, which the message names."""
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,7 @@ class AgeLimit:
         self._newest_ns = max(self._since_ns.values(), default=None)
 
     def is_old(self, file: WaveformFile) -> bool:
-        """Return whether a recording exceeds the age limit."""
+        """Return whether a recording is too old; False without a limit, for lack of recordings."""
         since_ns = self._since_ns.get(file.unit) if file.unit else self._newest_ns
         return since_ns is not None and _time_ns(file) < since_ns
 
@@ -81,7 +81,7 @@ def _time_ns(file: WaveformFile) -> int:
 
 @dataclass(frozen=True)
 class RoomLimits:
-    """Limits of the total size of recordings by kind, and of the age of continuous recordings."""
+    """Limits of the size of all recordings of a kind, bytes, and age of continuous ones, days."""
 
     continuous_bytes: int = 100_000_000_000
     capture_bytes: int = 10_000_000_000
@@ -180,8 +180,6 @@ class SpaceGauge:
     ----------
     roots
         Folder of each kind of recordings.
-    space
-        Limits of the free space.
     measure
         Function that measures the total and free space of the disk of a folder.
 
@@ -201,7 +199,7 @@ class SpaceGauge:
         self.short_bytes = dict.fromkeys(WaveformKind, 0)
 
     def measure(self) -> None:
-        """Measure the free space of all disks; `short_bytes` is 0 for an unreadable disk.
+        """Update `is_full` and `short_bytes` for all disks; the latter is 0 for an unreadable disk.
 
         Raises
         ------
@@ -251,7 +249,10 @@ class RetentionCounts:
 
 @dataclass(frozen=True)
 class RetentionRules:
-    """Folder of each kind of recordings, limits of their size and age, and captures in use."""
+    """Folder of each kind of recordings, limits of size and age, and free space on their disks.
+
+    `in_use` returns the names of the captures to which the evidence of alarms refers.
+    """
 
     roots: Mapping[WaveformKind, Path]
     room: RoomLimits
@@ -318,7 +319,9 @@ class RecordingRetention:
     def _survey(self, kind: WaveformKind, root: Path, until_s: float) -> None:
         known, there = self._index.names(kind), set(finished(root))
         if known and not root.is_dir():
-            raise OSError(f"{root}: the folder of {len(known)} recordings does not exist")
+            n = len(known)
+            why = f"the folder of {n} recordings does not exist; mount or restore it"
+            raise OSError(f"{root}: {why}")
         self._retry.keep(kind, there)
         missing = [file for name in known - there if (file := self._index.get(kind, name))]
         if missing:
@@ -337,7 +340,6 @@ class RecordingRetention:
                     self._adopt(kind, root / name)
 
     def _adopt(self, kind: WaveformKind, folder: Path) -> None:
-        """Add a new recording to the index."""
         if not is_recording(folder):
             return
         file = inspected(folder, self._index.place, kind, self._clock.now_ns())

@@ -75,7 +75,7 @@ class CaptureFile:
         try:
             writer = self._writer or self._open()
             for block in blocks:
-                writer.write_block(block)
+                writer.write(block)
         except (OSError, ConfigError) as error:
             raise self.abandon(str(error)) from error
 
@@ -179,7 +179,6 @@ class Segment:
         self, root: Path, unit: RecordedUnit, first: SampleBlock, settings: SegmentSettings
     ) -> None:
         self._unit, self._settings = unit, settings
-        self._is_decided = False
         self._length_ns = ns_from_s(settings.segment_s)
         self._number = first.start_ns // self._length_ns
         # limit in case the time stamps of the device stop
@@ -215,11 +214,9 @@ class Segment:
         if self._writer is None:
             made_by = f"padwatch {version('padwatch')}, continuous"
             folder = parts_folder(self.folder) / f"{self._n_parts:05d}"
-            self._writer = RecordingWriter(
-                folder, self._unit, made_by, first_decides=not self._is_decided
-            )
+            self._writer = RecordingWriter(folder, self._unit, made_by)
             self._opened_s = now_s
-        self._writer.write_block(block)
+        self._writer.write(block)
         self._n_samples += block.n_samples
 
     def is_due(self, now_s: float) -> bool:
@@ -247,7 +244,6 @@ class Segment:
         except ConfigError:
             writer.abandon()
             raise
-        self._unit, self._is_decided = writer.unit, True
         self._n_parts += 1
         return writer.n_samples
 
@@ -305,8 +301,8 @@ def _write(folder: Path, parts: Sequence[Recording]) -> None:
     unit = RecordedUnit(**{name: getattr(first, name) for name in RecordedUnit.model_fields})
     with RecordingWriter(folder, unit, first.made_by) as writer:
         for part in parts:
-            for raw in part.raw_blocks():
-                writer.write(raw)
+            for block in part.blocks():
+                writer.write(block)
 
 
 def _remove_parts(parts: Path) -> None:

@@ -13,11 +13,11 @@ from pydantic import ValidationError
 from acquisition.recordings.manifest import MANIFEST
 from core.alarms.alarm import ANNOUNCED, AlarmEvent
 from service.recordings.around_alarms import is_captured
-from service.reports.collector import EvidenceFolders
 from service.reports.document import Evidence
 from service.reports.folders import (
     DOCUMENT,
     CapturePart,
+    EvidenceFolders,
     Place,
     kept_since_ns,
     linked,
@@ -39,7 +39,7 @@ Occurrences = frozenset[tuple[str, int]]
 
 
 class EvidenceState(StrEnum):
-    """State of the evidence of an occurrence."""
+    """State of the evidence: written, still to be written, lost, removed, or never kept."""
 
     COMPLETE = "complete"
     WAITING = "waiting"
@@ -49,7 +49,7 @@ class EvidenceState(StrEnum):
 
 
 class SamplesState(StrEnum):
-    """State of the samples around an occurrence."""
+    """State of the samples around an occurrence; `NONE` if none were to be recorded."""
 
     COMPLETE = "complete"
     BEING_MADE = "being_made"
@@ -91,7 +91,7 @@ class EvidenceArchive:
         return self._store.films
 
     def occurrences(self, alarm: str, pending: Occurrences, most: int) -> list[Occurrence]:
-        """Return the newest occurrences of an alarm, newest first.
+        """Return the newest occurrences of an alarm, at most `most`, newest first.
 
         Parameters
         ----------
@@ -108,7 +108,7 @@ class EvidenceArchive:
         return self._with_bundles(alarm, found, pending)
 
     def occurrence(self, alarm: str, number: int, pending: Occurrences) -> Occurrence | None:
-        """Return an occurrence of an alarm; None if it does not exist.
+        """Return an occurrence of an alarm; None if unknown. `pending` is as in `occurrences`.
 
         Raises
         ------
@@ -123,7 +123,7 @@ class EvidenceArchive:
         return None
 
     def events(self, alarm: str) -> Iterator[AlarmEvent]:
-        """Yield all events of an alarm, newest first; they are read page by page on demand."""
+        """Yield all events of an alarm, newest first; each page read may raise `StoreError`."""
         before = AlarmQuery().before
         while page := self._store.alarm_events(AlarmQuery(before, PAGE, alarm=alarm)):
             yield from (stored.event for stored in page)
@@ -144,7 +144,8 @@ class EvidenceArchive:
             raise DamagedEvidenceError(f"{place.folder.name}: {error}") from error
         content = json.loads(text)
         if hashlib.sha256(canonical(_without_hash(content))).hexdigest() != found.sha256:
-            raise DamagedEvidenceError(f"{place.folder.name}: changed since it was written")
+            name = place.folder.name
+            raise DamagedEvidenceError(f"{name}: the document was changed since it was written")
         return found
 
     def samples(self, found: Occurrence, capturing: Occurrences) -> SamplesState:
@@ -154,6 +155,11 @@ class EvidenceArchive:
         ----------
         capturing
             Occurrences whose samples are still being recorded, determined before this call.
+
+        Raises
+        ------
+        DamagedEvidenceError
+            If the document must be read and was changed or damaged.
         """
         name = (found.event.identity.id, found.event.occurrence)
         capture = None if found.place is None else linked(found.place.folder)
@@ -213,7 +219,6 @@ def capture_folder(place: Place, capture: CapturePart) -> Path | None:
 
 
 def _of_event(event: AlarmEvent, found: Sequence[Place]) -> Place | None:
-    """Return the bundle with the time of an event, else the newest bundle; None without bundles."""
     moment = compact(event.time_ns)
     return max(found, key=lambda each: (each.moment == moment, each.moment), default=None)
 
@@ -253,7 +258,7 @@ def bundle_files(
         If the bundle cannot be read, or does not exist.
     """
     if found.place is None:
-        raise LookupError("the bundle does not exist")
+        raise LookupError(f"alarm {found.event.identity.id} has no evidence bundle")
     files: dict[str, Path | bytes] = {"README.txt": README.encode(), "report.html": page.encode()}
     files |= {path.name: path for path in sorted(found.place.folder.iterdir())}
     if has_configuration:

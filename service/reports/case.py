@@ -45,7 +45,7 @@ class Case:
 
     @property
     def direction(self) -> Direction:
-        """Direction of the alarm; x if it has none."""
+        """Direction of the alarm; x if the alarm has no direction."""
         return self.evidence.direction or AXES[0]
 
     @property
@@ -70,7 +70,7 @@ def read_case(
         If the store cannot be read.
     """
     if found.place is None:
-        raise LookupError("the bundle does not exist")
+        raise LookupError(f"alarm {found.event.identity.id} has no evidence bundle")
     evidence = archive.document(found.place)
     tables = {
         name: read_table(found.place.folder / name) if name in evidence.files else {}
@@ -88,7 +88,6 @@ def read_case(
 
 
 def _of_occurrence(archive: EvidenceArchive, found: Occurrence) -> Sequence[AlarmEvent]:
-    """Return the events of an occurrence, newest first."""
     events = []
     for event in archive.events(found.event.identity.id):
         if event.occurrence < found.event.occurrence:

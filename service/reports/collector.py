@@ -3,9 +3,8 @@
 import asyncio
 import os
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -13,9 +12,12 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import ANNOUNCED, AlarmEvent, AlarmNews
-from service.live.alarm_list import EvidenceStatus
+from service.live.snapshot import EvidenceStatus
+from service.measuring.films import FilmMonitor
+from service.measuring.live_view import LiveView
 from service.recordings.around_alarms import Captures, Outcome
 from service.reports.folders import (
+    EvidenceFolders,
     clear_leftovers,
     link,
     link_all,
@@ -24,11 +26,12 @@ from service.reports.folders import (
     place_of,
 )
 from service.reports.retention import EvidenceRetention
-from service.reports.snapshot import Snapshot, SnapshotTaker
+from service.reports.snapshot import BearingSnapshot, Snapshot
 from service.reports.writer import EvidenceWriter
 from service.runtime.files import write_whole
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.configuration import Configuration
+from service.settings.units import UnitSettings
 from service.store.port import StoreError
 
 log = structlog.get_logger()
@@ -45,13 +48,49 @@ STORE_ATTEMPTS = 5
 """Number of attempts after which a bundle is written without data from the store."""
 
 
-@dataclass(frozen=True)
-class EvidenceFolders:
-    """Folders of bundles, captures and configurations, below the data folder."""
+class SnapshotTaker:
+    """Source of snapshots, which copy only references, so that the event loop is not blocked."""
 
-    evidence: Path
-    captures: Path
-    configurations: Path
+    def __init__(
+        self, units: Mapping[str, UnitSettings], live: LiveView, films: FilmMonitor
+    ) -> None:
+        self._units, self._live, self._films = units, live, films
+
+    def take(self, event: AlarmEvent, now_ns: int, samples_expected: bool) -> Snapshot:
+        """Return a snapshot of the unit of an alarm event; without a unit, of the event alone."""
+        id_, unit = event.identity.unit, self._units.get(event.identity.unit)
+        bearing = None if unit is None else bearing_of(unit, event.identity.subject)
+        ids = [] if unit is None else [each.id for each in unit.bearing]
+        ids.sort(key=lambda each: each != bearing)  # stable: the others keep their order
+        return Snapshot(
+            event=event,
+            taken_ns=now_ns,
+            status=None if unit is None else self._live.status(id_),
+            bearings={each: self._bearing(id_, each) for each in ids},
+            bearing=bearing,
+            rules=self._films.rules(id_),
+            samples_expected=samples_expected,
+        )
+
+    def _bearing(self, unit: str, bearing: str) -> BearingSnapshot:
+        return BearingSnapshot(
+            self._live.assessment(unit, bearing),
+            self._films.newest(unit, bearing),
+            self._films.baseline(unit, bearing),
+        )
+
+
+def bearing_of(unit: UnitSettings, subject: str) -> str | None:
+    """Return the bearing of an alarm subject, a bearing or one of its channels; None if unknown."""
+    for bearing in unit.bearing:
+        channels = {bearing.shaft_x, bearing.shaft_y, bearing.bearing_x, bearing.bearing_y}
+        if subject == bearing.id or subject in channels:
+            return bearing.id
+    for bearing in unit.bearing:
+        others = (bearing.oil_temperature, bearing.gap_x, bearing.gap_y)
+        if subject in (*others, bearing.opposite_x, bearing.opposite_y):
+            return bearing.id
+    return None
 
 
 class EvidenceCollector:
@@ -87,8 +126,11 @@ class EvidenceCollector:
 
     @property
     def status(self) -> EvidenceStatus:
-        """Status of the collector, for display."""
-        return EvidenceStatus(self.error, self.n_pending, self.n_written, self.n_lost)
+        """Error of the last attempt, numbers of bundles, and unfinished bundles and captures."""
+        return EvidenceStatus(
+            *(self.error, self.n_pending, self.n_written, self.n_lost),
+            *(self.pending, self.capturing),
+        )
 
     @property
     def n_pending(self) -> int:
@@ -120,7 +162,7 @@ class EvidenceCollector:
         return self._captures.being_made | linking
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Write bundles until cancelled; call `close` afterwards."""
+        """Write bundles until cancelled, and retry after errors; call `close` afterwards."""
         pulse.beat(MAX_BUSY_S)
         await self._trying(self._begin)
         await self._trying(self._make_room)
@@ -136,12 +178,14 @@ class EvidenceCollector:
             await self._trying(self._make_room)
 
     async def close(self) -> None:
-        """Write pending bundles until the first failure, and stop the thread."""
+        """Write pending bundles until the first failure; log the number lost; stop the thread."""
         while self._pending or self._outcomes:
             if not await self._write_one():
                 break
         if self._pending:
-            log.error("evidence of alarms is lost", n_occurrences=len(self._pending))
+            log.error(
+                "evidence not written before the stop is lost", n_occurrences=len(self._pending)
+            )
         self._thread.shutdown(wait=False)
 
     def _take(self, event: AlarmEvent) -> None:
@@ -150,7 +194,7 @@ class EvidenceCollector:
         if len(self._pending) > MAX_PENDING:
             lost = self._pending.popleft()
             self.n_lost += 1
-            log.error("evidence of an alarm is lost", occurrence=lost.name)
+            log.error("evidence is lost: too many alarms wait for the disk", occurrence=lost.name)
         self._news.set()
 
     async def _write_one(self) -> bool:
@@ -223,7 +267,7 @@ class EvidenceCollector:
 
 
 def keep_configuration(folder: Path, configuration: Configuration) -> None:
-    """Write a configuration to a file named by its version, unless the file exists.
+    """Write a configuration to a file named by its version, unless the file has this content.
 
     Raises
     ------

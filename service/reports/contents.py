@@ -21,7 +21,6 @@ from core.quality import Level, Reading
 from core.stiffness.estimators import ESTIMATORS
 from core.uncertainty import Budget
 from core.units import NS_PER_S
-from service.api.routes.alarm_models import LEVEL_NAMES
 from service.reports.parts import (
     AXES,
     BaselinePart,
@@ -45,6 +44,7 @@ from service.reports.parts import (
     rounded,
 )
 from service.runtime.times import rfc3339
+from service.settings.alarm_kinds import LEVEL_NAMES
 from service.store.film_readings import FilmQuery
 from service.store.films import FilmStore
 from service.store.port import ValueRange
@@ -57,7 +57,7 @@ LEVEL_WORDS: dict[Level, QualityWord] = {
 
 
 def bearing_part(found: Assessment, film: FilmNews | None, rules: FilmRules | None) -> BearingPart:
-    """Return the part of the document about one bearing."""
+    """Return the part about one bearing; `film` and `rules` are None if its film is not judged."""
     watched = None if rules is None else rules.estimators.get(found.bearing)
     return BearingPart(
         bearing=found.bearing,
@@ -87,7 +87,7 @@ def reading_part(name: str, reading: Reading) -> ReadingPart:
 
 
 def cell_bounds(cell: Cell | None, grid: CellGrid | None) -> list[tuple[float, float]] | None:
-    """Return the limits of a cell along each axis, (low, high); None if the cell is unknown."""
+    """Return the limits (low, high) of a cell along each axis; None without a cell or a grid."""
     if cell is None or grid is None:
         return None
     widths = (grid.eccentricity_width, grid.temperature_width_c, grid.attitude_width_deg)
@@ -181,7 +181,7 @@ class Members:
     history: StiffnessHistory
 
     def part(self, direction: Direction) -> MembersPart:
-        """Return the readings of one direction; of many readings, an evenly spaced selection."""
+        """Return the readings of one direction, evenly thinned to at most `MAX_MEMBERS`."""
         row, found = AXES.index(direction), self.history
         measured = np.flatnonzero(np.isfinite(found.ln_k[row]))
         step = max(1, -(-measured.size // MAX_MEMBERS))
@@ -301,7 +301,6 @@ def _own_cell(learned: QuantityBaseline, cell: Cell) -> CellStatistics | None:
 
 
 def _expected_at(learned: QuantityBaseline, conditions: FilmConditions) -> list[float]:
-    """Return the expected stiffness under each operating condition, in N/m; NaN if unknown."""
     place = learned.table.find(learned.grid.cells(conditions))
     known = learned.is_known(conditions) & (place >= 0)
     nothing = np.full(len(conditions), np.nan)

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from core.change.settings import FilmRules
-from service.api.routes.alarm_models import LEVEL_NAMES
 from service.reports.contents import bearing_part
 from service.reports.parts import (
     BearingPart,
@@ -23,7 +22,7 @@ from service.reports.parts import (
 from service.reports.snapshot import BearingSnapshot, Snapshot
 from service.runtime.files import CHUNK
 from service.runtime.times import rfc3339
-from service.settings.alarm_kinds import value_unit
+from service.settings.alarm_kinds import LEVEL_NAMES, value_unit
 from service.settings.configuration import Configuration, canonical, without_secrets
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
@@ -54,7 +53,7 @@ class AlarmPart(EvidencePart):
     """Change of the alarm: raised or escalated."""
 
     level: LevelWord | None
-    """Alarm level after the event."""
+    """Alarm level after the event; null without a level."""
 
     state: Annotated[str, Field(examples=["unacknowledged"])]
     """State of the alarm after the event."""
@@ -66,13 +65,13 @@ class AlarmPart(EvidencePart):
     """Time of the event, in nanoseconds since 1970 UTC."""
 
     value: float | None
-    """Value compared with the limit; for film alarms the stiffness change, in ln."""
+    """Value compared with the limit, or null; for film alarms the change of ln(stiffness)."""
 
     limit: float | None
-    """Limit of the alarm."""
+    """Limit of the alarm; null for an alarm without a limit."""
 
     value_unit: str | None
-    """Unit of measurement of value and limit."""
+    """Unit of measurement of value and limit; null without a unit."""
 
     reason: Annotated[str, Field(examples=["film"])]
     """Reason of the event, as a single word."""
@@ -91,10 +90,10 @@ class UnitPart(EvidencePart):
     """State of the link to the source of the samples."""
 
     link_reason: str | None
-    """Reason for the state of the link."""
+    """Reason why samples do not arrive; null if they arrive."""
 
     last_sample: Moment | None
-    """Time of the newest sample by the device's clock."""
+    """Time of the newest sample by the device's clock; null without a sample."""
 
 
 class FilePart(EvidencePart):
@@ -177,12 +176,12 @@ def file_part(path: Path) -> FilePart:
 
 @dataclass(frozen=True)
 class Maker:
-    """Origin of a bundle: plant, configuration and program.
+    """Plant file, configuration and program, as stated in each bundle.
 
     Parameters
     ----------
     made_by
-        Program and its version; for privacy without the host and its user.
+        Program and its version; without the names of host and user, for privacy.
     origin
         Origin of the data: a live machine or a replayed recording.
     """
@@ -194,7 +193,7 @@ class Maker:
 
 
 def sealed(document: dict[str, Any]) -> bytes:
-    """Return the JSON text of a document, with the SHA-256 of its other keys added."""
+    """Return the JSON text, UTF-8, of a document with the SHA-256 of its other keys added."""
     blank = Evidence(**document, sha256="0" * 64)
     content = blank.model_dump(mode="json", by_alias=True)
     content.pop("sha256")
@@ -268,7 +267,6 @@ def _direction(snapshot: Snapshot) -> Direction | None:
 
 
 def _limits(snapshot: Snapshot, plant: PlantFile, rules: FilmRules | None) -> dict[str, Any]:
-    """Return the settings in force, without secrets."""
     found: dict[str, Any] = {
         "alarms": plant.alarms.model_dump(mode="json"),
         "analysis": plant.analysis.model_dump(mode="json"),

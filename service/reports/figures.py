@@ -115,7 +115,7 @@ LOOKS = {"none": "unknown", "borrowed": "borrowed", "own": "known"}
 
 
 def condition_figure(case: Case) -> Figure | None:
-    """Return the figure of stiffness against eccentricity: cell, last day, expected stiffness."""
+    """Return the figure of stiffness against eccentricity; None without a comparison."""
     found = case.comparison
     if found is None:
         return None
@@ -219,7 +219,7 @@ SHORTEST_S, MARGIN = 3600.0, 0.04
 
 
 def trend_figure(case: Case) -> Figure | None:
-    """Return the figure of stiffness against time, with expected stiffness and alert limits."""
+    """Return the figure of stiffness against time, with its limits; None without readings."""
     found = _trend(case)
     room = None if found is None else around(_heights(case, found))
     if found is None or room is None:
@@ -314,7 +314,6 @@ def _joined(before: Columns, after: Columns) -> Columns:
 
 
 def _expected(k: Values, deviation: Values) -> list[float | None]:
-    """Return the expected stiffness of each reading, from its stiffness and its deviation."""
     return [
         None if value is None or by is None else value * math.exp(-by)
         for value, by in zip(k, deviation, strict=True)

@@ -34,7 +34,7 @@ UNIT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 
 @dataclass(frozen=True)
 class Place:
-    """Location of a bundle, with unit, subject, kind, occurrence and time of its alarm."""
+    """Location of a bundle, and its alarm; `moment` is the time in the name of the folder."""
 
     folder: Path
     unit: str
@@ -45,7 +45,7 @@ class Place:
 
     @property
     def alarm(self) -> str:
-        """Identifier of the alarm."""
+        """Identifier of the alarm: unit, subject and kind, separated by colons."""
         return f"{self.unit}:{self.subject}:{self.kind}"
 
 
@@ -64,7 +64,7 @@ def places(root: Path, unit: str | None = None) -> list[Place]:
 
 
 def note_beginning(root: Path, now_ns: int) -> None:
-    """Write the time since which evidence is kept, so that older alarms do not count as lost."""
+    """Write the time since which evidence is kept, once; evidence of older alarms is not lost."""
     path = root / KEPT_SINCE
     if not path.exists():
         root.mkdir(parents=True, exist_ok=True)
@@ -72,7 +72,7 @@ def note_beginning(root: Path, now_ns: int) -> None:
 
 
 def kept_since_ns(root: Path) -> int | None:
-    """Return the time since which evidence is kept; None if evidence was never kept."""
+    """Return the time since which evidence is kept, ns since 1970 UTC; None if it is not kept."""
     path = root / KEPT_SINCE
     return int(path.read_text(encoding="utf-8")) if path.is_file() else None
 
@@ -86,7 +86,7 @@ def clear_leftovers(root: Path) -> list[Path]:
 
 
 def removed(root: Path, unit: str) -> list[str]:
-    """Return the folder names of the bundles of a unit that were removed to free space."""
+    """Return the folder names of a unit's bundles that were removed to free space, in order."""
     path = root / unit / REMOVED
     return path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
 
@@ -183,7 +183,6 @@ def link_all(root: Path, captures: Path) -> int:
 
 
 def _captures(folder: Path) -> dict[tuple[str, int], Path]:
-    """Return the folders of complete captures, by alarm and occurrence."""
     found = {}
     for path in sorted(folder.glob(f"*/{ALARM}")):
         if (path.parent / MANIFEST).is_file():
@@ -202,3 +201,12 @@ def _alarms(path: Path) -> list[tuple[str, int]]:
 
 def _write_link(folder: Path, part: CapturePart) -> None:
     write_whole(folder / CAPTURE, part.model_dump_json(indent=1).encode() + b"\n")
+
+
+@dataclass(frozen=True)
+class EvidenceFolders:
+    """Folders of bundles, captures and configurations, below the data folder."""
+
+    evidence: Path
+    captures: Path
+    configurations: Path

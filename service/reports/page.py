@@ -100,7 +100,7 @@ def plain(name: str) -> str:
 
 
 def shortened(text: str, longest: int = LONGEST) -> str:
-    """Return a text shortened to a maximum length, so that the report fits on one page."""
+    """Return a text cut to at most `longest` characters, so that the report fits on one page."""
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
@@ -111,7 +111,7 @@ def headline(evidence: Evidence) -> str:
 
 
 def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
-    """Yield name and text of each entry in the list of facts at the top of the report."""
+    """Yield name and text of each fact at the top of the report; `now` is its time as text."""
     evidence, alarm = case.evidence, case.evidence.alarm
     unit = evidence.unit
     where = [evidence.plant, unit.name if unit and unit.name else alarm.unit, alarm.subject]
@@ -146,7 +146,7 @@ def value_words(case: Case) -> str:
 
 
 def change_words(found: FindingPart) -> str:
-    """Return the change of a film, a difference of ln, in percent with its 95 % interval."""
+    """Return the change of a film in percent with its 95 % interval; a dash if unknown."""
     if found.change is None:
         return "–"
     if found.change_std is None:
@@ -157,7 +157,7 @@ def change_words(found: FindingPart) -> str:
 
 
 def percent(change: float) -> str:
-    """Return a change, given as a difference of ln, in percent."""
+    """Return a change of ln(stiffness) as text in percent, with its sign."""
     return f"{100.0 * math.expm1(change):+.1f} %".replace("-", "−")
 
 
@@ -176,20 +176,20 @@ def condition_words(bearing: BearingPart) -> str:
 
 
 def number_words(reading: ReadingPart) -> str:
-    """Return the value of a reading with its unit, to four significant digits."""
+    """Return the value of a reading with its unit, in four digits; a dash if unknown."""
     unit = "" if reading.unit == "1" else f" {reading.unit}"
     return "–" if reading.value is None else f"{reading.value:.4g}{unit}"
 
 
 def state_words(case: Case) -> str:
-    """Return the state of the alarm after the newest event."""
+    """Return the state of the alarm after the newest event; a sentence if none is stored."""
     if not case.events:
         return "its events are not in the store"
     return plain(case.events[-1].state_after.value)
 
 
 def seen_words(case: Case) -> str:
-    """Return the user who acknowledged the occurrence, and the time of the acknowledgement."""
+    """Return person and time of the newest acknowledgement; "not acknowledged" without one."""
     seen = [each for each in case.events if each.change is AlarmChange.ACKNOWLEDGED]
     if not seen:
         return "not acknowledged"
@@ -343,13 +343,7 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-a
 
 
 def report_page(case: Case, now_ns: int) -> str:
-    """Return the report of an occurrence as an HTML page.
-
-    Parameters
-    ----------
-    now_ns
-        Time of the report, as stated in it.
-    """
+    """Return the report of an occurrence, made at the time `now_ns`, as an HTML page."""
     evidence = case.evidence
     title, level = escape(headline(evidence)), evidence.alarm.level or "alert"
     bearing = case.bearing

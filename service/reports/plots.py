@@ -37,7 +37,7 @@ class Scale:
         return (value - self.low) / (self.high - self.low)
 
     def ticks(self, most: int = 6) -> Sequence[Tick]:
-        """Return the ticks of the axis, at round values; `most` applies to linear scales."""
+        """Return about `most` ticks at round values, or on a log scale all powers of ten."""
         return self._decades() if self.is_log else self._linear(most)
 
     def _linear(self, most: int) -> list[Tick]:
@@ -65,7 +65,7 @@ class TimeScale:
         return (value - self.low) / (self.high - self.low)
 
     def ticks(self, most: int = 8) -> Sequence[Tick]:
-        """Return at most about `most` ticks, at round hours or days."""
+        """Return the ticks at round hours or days, about `most` of them."""
         span_h = (self.high - self.low) / 3600.0
         step_s = 3600.0 * next((s for s in TIME_STEPS_H if span_h / s <= most), TIME_STEPS_H[-1])
         first = math.ceil(self.low / step_s)
@@ -75,7 +75,7 @@ class TimeScale:
 
 
 def around(values: Iterable[float | None], margin: float = 0.06) -> tuple[float, float] | None:
-    """Return the range of the finite values, widened by a margin; None without finite values."""
+    """Return the range of finite values, extended by `margin` of it at both ends; None if none."""
     found = [value for value in values if value is not None and math.isfinite(value)]
     if not found:
         return None
@@ -95,7 +95,7 @@ Values = Sequence[float | None]
 
 @dataclass
 class Plot:
-    """Plot that is built up by adding marks, and returned as SVG.
+    """Plot in SVG, built from marks; the argument `look` of a method is the CSS class of a mark.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class Plot:
     def points(
         self, xs: Values, ys: Values, look: str, radius: float = 1.6, errors: Values | None = None
     ) -> None:
-        """Add points, optionally with error bars; `errors` are their half-lengths along y."""
+        """Add points; `errors` are half-lengths of error bars along y, None without error bars."""
         for i, (x, y) in enumerate(zip(xs, ys, strict=True)):
             if x is None or y is None:
                 continue
@@ -173,7 +173,7 @@ class Plot:
     def cell(
         self, x: tuple[float, float], y: tuple[float, float], look: str, opacity: float = 1.0
     ) -> None:
-        """Add a rectangle, given by its limits along x and along y."""
+        """Add a rectangle, given by its limits along x and y, with an opacity of 0 to 1."""
         left, right, top, bottom = self._x(x[0]), self._x(x[1]), self._y(y[1]), self._y(y[0])
         self._marks.append(
             f'<path class="{look}" fill-opacity="{opacity:.2f}"'

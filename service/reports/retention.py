@@ -69,7 +69,7 @@ class EvidenceRetention:
         self._surveyed_s: float | None = None
 
     def note(self, place: Place) -> None:
-        """Update the cached size of a bundle that was written or has grown."""
+        """Update the cached size of a bundle after it was written or a file was added to it."""
         own = self._sizes.setdefault(place.alarm, {})
         held, size = _Held(place.folder.name, place.unit), _size(place.folder)
         self._n_bytes += size - own.get(held, 0)
@@ -109,7 +109,6 @@ class EvidenceRetention:
         return now_s
 
     def _surplus(self) -> dict[_Held, str]:
-        """Return the bundles in excess of `max_per_alarm`, with their alarms."""
         most = self._limits.max_per_alarm
         return {
             held: alarm for alarm in self._crowded for held in sorted(self._sizes[alarm])[:-most]

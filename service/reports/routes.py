@@ -2,7 +2,7 @@
 
 import asyncio
 import re
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
@@ -18,25 +18,25 @@ from service.api.auth.gate import identity_of
 from service.api.context import Context
 from service.api.downloads import Downloads, TooManyDownloadsError
 from service.api.problems import ProblemError, problem_responses
-from service.api.routes.alarm_models import LEVEL_NAMES
 from service.api.routes.alarms import AlarmId
 from service.api.values import ApiModel, Time
+from service.live.snapshot import EvidenceStatus
 from service.reports.archive import (
     DamagedEvidenceError,
     EvidenceArchive,
     EvidenceState,
     Occurrence,
+    Occurrences,
     SamplesState,
     bundle_files,
 )
 from service.reports.case import read_case
-from service.reports.collector import EvidenceCollector
 from service.reports.document import Evidence
 from service.reports.page import POLICY, report_page
 from service.reports.tables import TableError
 from service.runtime.files import zipped
 from service.runtime.times import rfc3339
-from service.settings.alarm_kinds import ALARM_KINDS
+from service.settings.alarm_kinds import ALARM_KINDS, LEVEL_NAMES
 from service.store.access.identities import Permission
 
 
@@ -92,23 +92,27 @@ class Found:
 
 
 class EvidenceService:
-    """Service of the evidence routes: lists evidence, and creates reports and bundles."""
+    """Service of the evidence routes: lists evidence, and creates reports and bundles.
+
+    `status` returns the state of the collector, or None if no evidence is collected. All methods
+    raise StoreError if the store cannot be read.
+    """
 
     def __init__(
         self,
         archive: EvidenceArchive,
-        keeper: EvidenceCollector,
+        status: Callable[[], EvidenceStatus | None],
         trend_days: float,
         clock: Clock,
         downloads: Downloads,
     ) -> None:
-        self.archive, self.keeper, self._clock = archive, keeper, clock
+        self.archive, self._status, self._clock = archive, status, clock
         self._downloads = downloads
         self._trend_days = trend_days
 
     async def occurrences(self, alarm: str, most: int) -> list[Found]:
-        """Return the newest occurrences of an alarm, newest first."""
-        pending, capturing = self.keeper.pending, self.keeper.capturing
+        """Return the newest occurrences of an alarm, at most `most`, newest first."""
+        pending, capturing = self._unfinished()
 
         def look() -> list[Found]:
             found = self.archive.occurrences(alarm, pending, most)
@@ -118,7 +122,7 @@ class EvidenceService:
 
     async def occurrence(self, alarm: str, number: int) -> Occurrence | None:
         """Return an occurrence of an alarm; None if it does not exist."""
-        pending = self.keeper.pending
+        pending, _ = self._unfinished()
         return await self._downloads.worked(lambda: self.archive.occurrence(alarm, number, pending))
 
     async def report(self, found: Occurrence) -> str:
@@ -126,10 +130,10 @@ class EvidenceService:
 
         Raises
         ------
-        DamagedEvidenceError, LookupError
+        DamagedEvidenceError, TableError, LookupError
             If the bundle cannot be read, or does not exist.
         """
-        capturing = self.keeper.capturing
+        _, capturing = self._unfinished()
         return await self._downloads.worked(lambda: self._report(found, capturing))
 
     async def bundle(self, found: Occurrence, has_configuration: bool) -> AsyncIterator[bytes]:
@@ -142,7 +146,7 @@ class EvidenceService:
 
         Raises
         ------
-        DamagedEvidenceError, LookupError, OSError
+        DamagedEvidenceError, TableError, LookupError, OSError
             If the bundle cannot be read, or does not exist.
         TooManyDownloadsError
             If too many downloads are in progress.
@@ -153,6 +157,11 @@ class EvidenceService:
             lambda: bundle_files(self.archive, found, page, has_configuration)
         )
         return await self._downloads.download(zipped(files))
+
+    def _unfinished(self) -> tuple[Occurrences, Occurrences]:
+        """Return which bundles are to be written, and which recordings are to be linked."""
+        status = self._status()
+        return (frozenset(), frozenset()) if status is None else (status.pending, status.capturing)
 
     def _report(self, found: Occurrence, capturing: frozenset[tuple[str, int]]) -> str:
         samples = self.archive.samples(found, capturing)
@@ -190,7 +199,7 @@ log = structlog.get_logger()
 
 
 def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter:
-    """Return the read-only routes of evidence; they respond with 404 if no evidence is kept."""
+    """Return the read-only routes of evidence; they respond with 404 if `desk` is None."""
     router = APIRouter(
         prefix="/api/v1/alarms/{alarm}/evidence",
         tags=["alarms"],
@@ -287,7 +296,6 @@ def _known(context: Context, alarm: str) -> str:
 async def _complete(
     context: Context, desk: EvidenceService, alarm: str, occurrence: int
 ) -> Occurrence:
-    """Return an occurrence with complete evidence; raise problem 404 or 409 otherwise."""
     found = await desk.occurrence(_known(context, alarm), occurrence)
     if found is None:
         detail = f"alarm {alarm} has no occurrence {occurrence}"

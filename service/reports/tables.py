@@ -36,7 +36,7 @@ class TableError(Exception):
 
 
 def spectra_table(found: Iterable[Assessment]) -> bytes:
-    """Return the Parquet table of the cross-spectra of bearings, with amplitudes and coherence."""
+    """Return the Parquet table of cross-spectra, amplitudes and coherence of some bearings."""
     tables = [_spectrum(each.bearing, each.spectrum) for each in found]
     return _written(pa.concat_tables(tables))
 
@@ -104,13 +104,7 @@ def trend_columns(found: FilmHistory) -> Columns:
 
 
 def read_table(path: Path) -> Columns:
-    """Read a Parquet table of a bundle.
-
-    Raises
-    ------
-    TableError
-        If the table cannot be read.
-    """
+    """Return a Parquet table of a bundle; raise `TableError` if it cannot be read."""
     try:
         columns: Columns = pq.read_table(path, memory_map=False).to_pydict()
     except (OSError, pa.ArrowException) as error:

@@ -56,7 +56,9 @@ class EvidenceWriter:
         return place
 
     def _fill(self, folder: Path, snapshot: Snapshot, with_history: bool) -> None:
-        missing = [] if with_history else ["the store could not be read: no members, no trend"]
+        missing = (
+            [] if with_history else ["the store could not be read: no readings of cell and trend"]
+        )
         compared = self._compared(snapshot, with_history)
         for name, content in self._tables(snapshot, with_history).items():
             write_synced(folder / name, content)

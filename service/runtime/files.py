@@ -104,7 +104,7 @@ class Sink(RawIOBase):
         self._pieces: list[bytes] = []
 
     def writable(self) -> bool:
-        """Return true: the stream accepts writes."""
+        """Return True, since the stream accepts writes."""
         return True
 
     def write(self, piece: object) -> int:

@@ -50,7 +50,7 @@ class LoopPulse(Pulse):
 
     @property
     def trouble(self) -> str | None:
-        """Reason why the loop is dead or stuck; None if it is alive."""
+        """Text that the loop has ended or is stuck; None if it runs."""
         if self._has_ended:
             return "has ended"
         now_s = self._clock.monotonic_s()
@@ -67,7 +67,7 @@ class Heartbeats:
         self._pulses: dict[str, LoopPulse] = {}
 
     async def tend(self, name: str, run: Loop) -> None:
-        """Run a loop and record its heartbeats; a loop that returns or raises counts as dead."""
+        """Run a loop and record its heartbeats, and its end if it returns or raises."""
         pulse = self._pulses[name] = LoopPulse(self._clock)
         try:
             await run(pulse)
@@ -80,10 +80,10 @@ class Heartbeats:
             self._pulses.pop(name, None)
 
     def look(self) -> dict[str, str | None]:
-        """Return the reason why each loop is dead or stuck, by loop name; None if it is alive."""
+        """Return, by loop name, that the loop has ended or is stuck; None if it runs."""
         return {name: pulse.trouble for name, pulse in self._pulses.items()}
 
     @property
     def troubles(self) -> dict[str, str]:
-        """Reasons why loops are dead or stuck, by loop name; empty if all loops are alive."""
+        """Texts that loops have ended or are stuck, by loop name; empty if all loops run."""
         return {name: trouble for name, trouble in self.look().items() if trouble}

@@ -3,18 +3,29 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from typing import Any
 from weakref import WeakKeyDictionary
+
+from prometheus_client import Histogram
 
 from acquisition.clock import Clock
 from acquisition.source import SampleSource, refused_frames_of
 from core.samples.blocks import SampleBlock
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.runtime.metrics import Durations
 
 POLL_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0)
 """Upper bounds of the histogram of poll durations, from milliseconds on the plant network up to a
 time-out."""
+
+
+@dataclass(frozen=True)
+class PollStatistics:
+    """Number of polls of a device since the start, and their newest and mean duration."""
+
+    n: int
+    newest_s: float
+    mean_s: float
 
 
 class PollClock:
@@ -28,7 +39,13 @@ class PollClock:
         self._pulse: Pulse = UNHEARD
         self._reader: asyncio.Task[Any] | None = None
         self._woken_s: WeakKeyDictionary[asyncio.Task[Any], float] = WeakKeyDictionary()
-        self.polls = Durations(POLL_BOUNDS_S, clock)
+        self.statistics: PollStatistics | None = None
+        self.polls = Histogram(
+            "padwatch_poll_duration_seconds",
+            "This is the duration of a poll, with decoding and delivery of its samples.",
+            buckets=POLL_BOUNDS_S,
+            registry=None,
+        )
 
     def now_ns(self) -> int:
         """Return UTC nanoseconds since 1970."""
@@ -47,9 +64,16 @@ class PollClock:
             await self._clock.sleep(duration_s)
             return
         if task in self._woken_s:
-            self.polls.observe(self._clock.monotonic_s() - self._woken_s[task])
+            self._add(self._clock.monotonic_s() - self._woken_s[task])
         await self._clock.sleep(duration_s)
         self._woken_s[task] = self._clock.monotonic_s()
+
+    def _add(self, duration_s: float) -> None:
+        self.polls.observe(duration_s)
+        before = self.statistics or PollStatistics(0, 0.0, 0.0)
+        n = before.n + 1
+        mean_s = before.mean_s + (duration_s - before.mean_s) / n
+        self.statistics = PollStatistics(n, duration_s, mean_s)
 
     def set_pulse(self, pulse: Pulse) -> None:
         """Send a heartbeat to ``pulse`` at each clock call of the calling task."""
@@ -68,7 +92,6 @@ class PollClock:
 
 
 def _current_task() -> asyncio.Task[Any] | None:
-    """Return the current task; None in a thread without an event loop."""
     try:
         return asyncio.current_task()
     except RuntimeError:
@@ -87,9 +110,14 @@ class TimedSource:
         self._clock.set_pulse(pulse)
 
     @property
-    def polls(self) -> Durations:
+    def polls(self) -> Histogram:
         """Histogram of the poll durations."""
         return self._clock.polls
+
+    @property
+    def statistics(self) -> PollStatistics | None:
+        """Statistics of the poll durations; None before the first poll."""
+        return self._clock.statistics
 
     @property
     def refused_frames(self) -> Mapping[str, int]:

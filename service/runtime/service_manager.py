@@ -47,7 +47,7 @@ class ServiceManager:
                 sender.sendto(message.encode(), self._address)
         except OSError as error:
             if self._is_reached:
-                log.warning("the service manager is not reached", reason=str(error))
+                log.warning("the service manager cannot be reached", reason=str(error))
             self._is_reached = False
         else:
             self._is_reached = True

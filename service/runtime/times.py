@@ -22,3 +22,7 @@ def compact(time_ns: int) -> str:
 def day_and_time(time_ns: int) -> str:
     """Return a time to the second in readable form, example: ``2026-01-31 12:00:00 UTC``."""
     return f"{datetime.fromtimestamp(time_ns // NS_PER_S, UTC):%Y-%m-%d %H:%M:%S} UTC"
+
+
+CLOCK_STEP_S = 0.5
+"""Clock step, s, above which the clock counts as set; NTP slews smaller errors."""

@@ -1,24 +1,10 @@
-"""Conversion of the source settings to settings of the acquisition adapters."""
+"""Conversion of Modbus and recording settings to settings of the acquisition adapters."""
 
-from pathlib import Path
 from typing import Any
 
-from acquisition.can.compiler import compile_plan
-from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
-from acquisition.clock import Clock
-from acquisition.delivery.units import UNIT_OF
 from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters, Identity
 from acquisition.modbus.transport import SerialTransport, TcpTransport, Transport
 from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
-from acquisition.simulated.devices.can_device import CanDevice
-from acquisition.simulated.devices.can_server import CanBusServer
-from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_settings
-from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
-from acquisition.simulated.devices.server import DaqServer
-from acquisition.simulated.feed import SampleFeed
-from core.checks.channels import COUNTS_FULL_SCALE
-from service.settings.core_values import calibration_of
-from service.settings.sources import can as settings
 from service.settings.sources.devices import MappedDeviceSettings, ModbusRingSettings
 from service.settings.sources.modbus import (
     IdentificationIdentity,
@@ -27,137 +13,6 @@ from service.settings.sources.modbus import (
     SignatureIdentity,
 )
 from service.settings.units import UnitSettings
-
-
-def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSettings:
-    """Return the settings of the CAN adapter for a unit."""
-    link = can_link_of(source)
-    others: dict[str, Any] = {
-        "hold_s": source.hold_s,
-        "stale_after_s": source.stale_after_s,
-        "queue_frames": source.receive_buffer,
-        "when_full": source.when_full,
-        "stamps": source.stamps,
-    }
-    units = tuple(UNIT_OF[channel.measurand] for channel in unit.channel)
-    if source.profile is not None:
-        return daq_settings(can_shape_of(unit, source), link, units, **others)
-    return CanSettings(
-        link=link,
-        dbc=source.dbc_path,
-        channels=tuple(
-            CanChannel(channel.id, engineering_unit, _listed(source.signals[channel.id]))
-            for channel, engineering_unit in zip(unit.channel, units, strict=True)
-        ),
-        slow=tuple(CanSlowChannel(s.id, s.unit, source.slow[s.id]) for s in unit.slow_channel),
-        counters=source.counters,
-        counter_counts=source.counter_counts,
-        frame_samples=source.frame_samples,
-        epoch=source.epoch,
-        ok_bits=source.ok_bits,
-        seconds=source.seconds,
-        microseconds=source.microseconds,
-        hold_samples=source.hold_samples,
-        **others,
-    )
-
-
-def can_link_of(source: settings.CanSettings) -> CanLinkSettings:
-    """Return the connection settings of a CAN bus."""
-    return CanLinkSettings(
-        interface=source.interface,
-        channel=source.channel,
-        bitrate=source.bitrate,
-        fd=source.fd,
-        data_bitrate=source.data_bitrate,
-        options=source.options,
-    )
-
-
-def can_shape_of(unit: UnitSettings, source: settings.CanSettings) -> CanShape:
-    """Return the messages of the simulated CAN DAQ for the channels of a unit.
-
-    Raises `LookupError` if the source of the unit reads CAN by a DBC file instead of a profile.
-    """
-    if source.profile is None:
-        raise LookupError(
-            f"unit {unit.id}: a simulated CAN DAQ cannot send the messages of a DBC file;"
-            ' use profile "padwatch_int16" or "padwatch_float32"'
-        )
-    floats = source.profile == "padwatch_float32"
-    return CanShape(
-        channels=tuple(
-            DaqSignal(
-                c.id,
-                UNIT_OF[c.measurand] if floats else "V",
-                1.0 if floats else c.scale["full_scale_v"] / COUNTS_FULL_SCALE,
-            )
-            for c in unit.channel
-        ),
-        slow=tuple(DaqSignal(slow.id, slow.unit) for slow in unit.slow_channel),
-        fd=source.fd,
-        floats=floats,
-    )
-
-
-def can_daq_of(
-    unit: UnitSettings,
-    source: settings.CanSettings,
-    feed: SampleFeed,
-    clock: Clock | None,
-    *,
-    patient: bool,
-) -> DaqServer:
-    """Build the simulated CAN DAQ that the source of a unit connects to.
-
-    Parameters
-    ----------
-    feed
-        Simulated samples that the device sends.
-    clock
-        Clock that paces the device; if None, the device produces samples as fast as they are read.
-    patient
-        Whether the device waits for a slow reader instead of losing samples.
-
-    Raises
-    ------
-    ConfigError, LookupError
-        If the source cannot be connected to a simulated DAQ.
-    """
-    device = CanDevice(feed, can_shape_of(unit, source), unit.id, block_samples=unit.block_samples)
-    waiting: dict[str, Any] = {"on_demand": clock is None, "patient": patient}
-    if source.interface != "slcan":
-        return CanBusServer(
-            device,
-            clock,
-            interface=source.interface,
-            channel=source.channel,
-            options=source.options,
-            **waiting,
-        )
-    if source.channel == "pty" or source.channel.startswith("/"):
-        link = None if source.channel == "pty" else Path(source.channel)
-        return SlcanPtyServer(device, clock, link=link, **waiting)
-    host, _, port = source.channel.removeprefix("socket://").rpartition(":")
-    if not source.channel.startswith("socket://") or not port.isdecimal():
-        raise LookupError(
-            f"unit {unit.id}: a simulated DAQ cannot use channel {source.channel!r}; use"
-            ' "socket://127.0.0.1:0", "pty" or a path for the link to a pseudo-terminal'
-        )
-    return SlcanTcpServer(device, clock, host=host, port=int(port), **waiting)
-
-
-def _listed(signals: str | tuple[str, ...]) -> tuple[str, ...]:
-    return (signals,) if isinstance(signals, str) else signals
-
-
-def require_dbc_fits(unit: UnitSettings) -> None:
-    """Check the DBC file of a unit with a CAN source, without opening a bus.
-
-    Raises `ConfigError` if the DBC file does not match the unit; the message names file and key.
-    """
-    if isinstance(unit.source, settings.CanSettings):
-        compile_plan(can_settings_of(unit, unit.source), calibration_of(unit))
 
 
 def recorded_unit(unit: UnitSettings) -> RecordedUnit:

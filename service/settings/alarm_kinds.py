@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 from core.alarms import kinds as units
 from core.alarms.kinds import AlarmKind, kind_table
+from core.limits import AlarmLevel
 
 STORE, SERVICE, CAPTURES, DISK = "store", "service", "captures", "disk"
 RECORDINGS, STREAM, UNIT = "recordings", "stream", "unit"
@@ -64,7 +65,6 @@ SERVICE_KINDS = kind_table(
     AlarmKind(
         "recordings_damaged", "Recordings damaged or missing", "recordings", RECORDINGS, "lasting"
     ),
-    AlarmKind("questions_refused", "Too busy to answer", None, SERVICE, "steady", "refused"),
     AlarmKind("disk_nearly_full", "Disk nearly full", "1", DISK, "steady"),
     AlarmKind(
         "stored_data_damaged",
@@ -114,3 +114,11 @@ def value_unit(kind: str) -> str | None:
     """Return the unit of the values of an alarm kind; None if the kind has no value."""
     found = ALARM_KINDS.get(kind)
     return None if found is None else found.unit
+
+
+AlarmLevelName = Literal["alert", "danger"]
+
+LEVEL_NAMES: dict[AlarmLevel, AlarmLevelName] = {
+    AlarmLevel.ALERT: "alert",
+    AlarmLevel.DANGER: "danger",
+}

@@ -211,7 +211,6 @@ class ChannelSettings(Settings):
         return self
 
     def _check_scale(self) -> None:
-        """Check that the scale keys are either all in volts or all in scaled counts."""
         in_counts = self.unit_per_count is not None
         keys, others = (
             (SCALE_KEYS_COUNTS, SCALE_KEYS_V) if in_counts else (SCALE_KEYS_V, SCALE_KEYS_COUNTS)

@@ -26,7 +26,7 @@ from service.settings.limits import (
     ZoneTableSettings,
     states_of,
 )
-from service.settings.plant import AnalysisModel
+from service.settings.plant import AnalysisModel, PlantFile
 from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.storage import Origin
 from service.settings.transducers import response_of
@@ -86,7 +86,6 @@ def _gap_accuracy(settings: BearingSettings, gain: Mapping[str, float]) -> GapAc
 
 
 def _accuracy(settings: BearingSettings, gain: Mapping[str, float]) -> BearingAccuracy:
-    """Return the accuracy of a bearing, by its less accurate transducer of x and y."""
     return BearingAccuracy(
         shaft_gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
         bearing_gain=max(gain[settings.bearing_x], gain[settings.bearing_y]),
@@ -247,3 +246,22 @@ def watched_estimator(unit: UnitSettings, bearing: BearingSettings) -> Estimator
     if isinstance(unit.source, ModbusVectorSettings):
         return Estimator.RATIO_ORDER1  # the only estimator that requires no phase
     return bearing.preference[0]
+
+
+STALE_HOPS = 2.5
+"""Age of a result in refresh periods above which the result is stale."""
+
+
+def refresh_s(plant: PlantFile) -> float:
+    """Return the result period of the slowest unit of a plant, s."""
+    hop_samples = analysis_of(plant.analysis).hop_samples
+    return max(
+        (unit.source.hop_polls if isinstance(unit.source, ModbusVectorSettings) else hop_samples)
+        / unit.sampling_hz
+        for unit in plant.unit
+    )
+
+
+def stale_after_s(plant: PlantFile) -> float:
+    """Return the age above which a result of a plant is stale, s."""
+    return STALE_HOPS * refresh_s(plant)

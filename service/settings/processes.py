@@ -36,56 +36,20 @@ class AccessSettings(Settings):
     """Maximum duration of a login, hours."""
 
 
-DeadlineS = Annotated[float, Field(ge=0.5, le=60.0)]
-"""Time limit in seconds."""
-
 HostName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9:][A-Za-z0-9.:-]{0,252}$")]
 """Host name or IP address, without a port."""
 
 
 class HttpLimitSettings(Settings):
-    """Limits of HTTP; a connection with an incomplete request is closed after head_s + body_s."""
-
-    head_s: DeadlineS = 4.0
-    """Time limit for receiving the request line and headers, s, from the start of the connection or
-    from the first byte of the request."""
-
-    body_s: DeadlineS = 4.0
-    """Time limit for receiving the body of a request after its headers, s."""
-
-    unsent_s: DeadlineS = 8.0
-    """Time after which the connection of a slow client is closed, s. A client is slow if it
-    receives no bytes of a response in this time, or less than 48 KiB of a long response."""
-
-    keep_alive_s: DeadlineS = 8.0
-    """Time after which an idle connection is closed, s."""
+    """Limits of the HTTP server; a reverse proxy adds time limits for slow clients."""
 
     answer_s: Annotated[float, Field(ge=1.0, le=600.0)] = 20.0
-    """Time limit for the start of a response, s; otherwise the request is cancelled with status
-    503."""
-
-    max_head_kb: Annotated[int, Field(ge=1, le=1024)] = 16
-    """Maximum size of the request line and headers, KiB; a larger request gets status 431."""
-
-    max_target_kb: Annotated[int, Field(ge=1, le=1024)] = 8
-    """Maximum size of path and query, KiB; a longer target gets status 414."""
-
-    max_body_kb: Annotated[int, Field(ge=1, le=16_384)] = 64
-    """Maximum size of a request body, KiB; a larger body gets status 413."""
-
-    max_json_depth: Annotated[int, Field(ge=1, le=200)] = 16
-    """Maximum nesting depth of arrays and objects in a JSON body; a deeper body gets status 400."""
+    """Time limit from the head of a request to the start of its response, s; otherwise the request
+    is cancelled with status 503."""
 
     max_connections: Annotated[int, Field(ge=2, le=100_000)] = 640
-    """Maximum number of connections. Above this number the server closes the connection that has
-    waited longest without a complete request. The process requires as many open files, and about
-    100 more."""
-
-    max_connections_per_peer: Annotated[int, Field(ge=1, le=100_000)] = 320
-    """Maximum number of connections from one IP address; a proxy counts as one address."""
-
-    max_requests: Annotated[int, Field(ge=1, le=10_000)] = 64
-    """Maximum number of concurrent requests; further requests get status 503 with Retry-After."""
+    """Maximum number of connections; requests on further connections get status 503. The process
+    requires as many open files, and about 100 more."""
 
 
 ServerUrl = Annotated[
@@ -182,3 +146,7 @@ def why_closed(
         f" {' and '.join(missing)}; else listen on 127.0.0.1, or on a Unix socket"
         " behind a reverse proxy"
     )
+
+
+class ClosedError(Exception):
+    """The service would be reachable from other hosts without TLS or accounts."""

@@ -5,6 +5,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from datetime import datetime
+from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
@@ -142,7 +143,10 @@ def sentence(
     shown = key if holds_tables else f"{key} = {_shown(value)}"
     meaning = description(schema, location)
     if error["type"] == "extra_forbidden":
-        return f"{shown}: unknown key; known keys: {', '.join(known_keys(schema, location[:-1]))}"
+        known = known_keys(schema, location[:-1])
+        similar = get_close_matches(str(location[-1]), known, n=1)
+        hint = f" (did you mean {similar[0]}?)" if similar else ""
+        return f"{shown}: unknown key{hint}; known keys: {', '.join(known)}"
     is_missing = isinstance(error.get("ctx", {}).get("error"), MissingError)
     if error["type"] == "value_error" and not is_missing:
         if isinstance(error["ctx"]["error"], SecretMisfitError):
@@ -205,7 +209,7 @@ Model = TypeVar("Model", bound=Settings)
 
 
 class TomlFileError(Exception):
-    """A TOML file is unreadable or invalid; the message has one line for each mistake."""
+    """Error raised if a TOML file is unreadable or invalid, with one line for each mistake."""
 
 
 def load_toml(path: Path, model: type[Model]) -> Model:
@@ -244,6 +248,10 @@ def _read(path: Path) -> str:
         raise TomlFileError(f"{path}:{line}: byte {error.start} is not valid UTF-8") from error
 
 
+UNQUOTED = re.compile(r"\s*[\w.-]+\s*=\s*[^\W\d]")
+"""A key with a value that begins with a letter."""
+
+
 def _parsed(path: Path, text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
@@ -251,7 +259,9 @@ def _parsed(path: Path, text: str) -> dict[str, Any]:
         place = SYNTAX_PLACE.match(str(error))
         last = text.count("\n") + 1
         line, words = (place[2], f"{place[1]} ({place[3]})") if place else (last, error)
-        raise TomlFileError(f"{path}:{line}: invalid TOML: {words}") from error
+        wrong = text.splitlines()[int(line) - 1 :][:1]
+        hint = "; text needs quotes" if wrong and UNQUOTED.match(wrong[0]) else ""
+        raise TomlFileError(f"{path}:{line}: invalid TOML: {words}{hint}") from error
     except ValueError as error:
         raise TomlFileError(f"{path}: an integer has too many digits") from error
     except RecursionError as error:

@@ -25,7 +25,7 @@ MAX_SHEET_BYTES = 1_000_000
 
 
 class SheetError(Exception):
-    """A calibration sheet is unreadable or invalid; the message states file, line and fault."""
+    """Error raised if a calibration sheet is invalid; the message states file, line and fault."""
 
 
 def read_calibration_sheet(path: Path) -> ResponseTable:

@@ -242,7 +242,8 @@ class UnitSettings(Settings):
     def _check_key_phase(self) -> None:
         if self.key_phase is not None and self.key_phase not in self._key_phases():
             words = ", ".join(self._key_phases()) or "none"
-            raise MisfitError(f'must have transducer "key_phase"; known: {words}', "key_phase")
+            limit = f'must be a channel with transducer "key_phase"; known: {words}'
+            raise MisfitError(limit, "key_phase")
 
     def _check_slow(self, id_: str | None, unit: str, *at: int | str) -> None:
         units = {channel.id: channel.unit for channel in self.slow_channel}

@@ -63,7 +63,10 @@ def insert_alarms(
     audit: AuditChain,
     address: Address = no_recipients,
 ) -> None:
-    """Insert alarm events with their messages and audit entries, and update the alarms."""
+    """Insert new alarm events with their messages and audit entries, and update the alarms.
+
+    `address` returns the outbox messages about an event.
+    """
     for each in news:
         for event in each.events:
             if writer.execute(INSERT_EVENT, _event_row(event)).rowcount == 1:
@@ -187,7 +190,7 @@ def _alarm(row: tuple[Any, ...]) -> Alarm:
             raised_at=_point(found),
         )
     except ValueError as error:
-        raise StoreError(f"alarm {found['id']}: {error}") from error
+        raise StoreError(f"stored alarm {found['id']} is invalid: {error}") from error
 
 
 def _event(row: tuple[Any, ...]) -> AlarmEvent:
@@ -209,7 +212,8 @@ def _event(row: tuple[Any, ...]) -> AlarmEvent:
             raised_at=_point(found),
         )
     except ValueError as error:
-        raise StoreError(f"event {found['number']} of alarm {found['alarm']}: {error}") from error
+        name = f"stored event {found['number']} of alarm {found['alarm']}"
+        raise StoreError(f"{name} is invalid: {error}") from error
 
 
 def _identity(found: dict[str, Any]) -> AlarmIdentity:

@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, astuple, dataclass, fields, replace
+from heapq import merge
+from itertools import repeat
 from pathlib import Path
 from threading import Lock
 
@@ -12,6 +14,7 @@ from service.store.access.audit_verification import (
     AuditHead,
     HeadError,
     Verdict,
+    chain_name,
     place_of,
     read_head,
     walk,
@@ -39,7 +42,7 @@ PAGE = 1000
 
 @dataclass(frozen=True)
 class AuditQuery:
-    """Query for audit entries, newest first; None for actor, action or object matches all.
+    """Query for entries of one chain, newest first; None for actor, action or object matches all.
 
     Parameters
     ----------
@@ -61,7 +64,7 @@ class AuditQuery:
 
 
 class AuditChain:
-    """Writer of the audit trail; all writing transactions of the store are opened through it.
+    """Writer of the audit trail; all write transactions of the store are opened through it.
 
     Parameters
     ----------
@@ -75,11 +78,15 @@ class AuditChain:
         self._head, self._database = head, database
         self._lock = Lock()
         self._is_due = False
+        self.name = chain_name(head)
         self.head_error: str | None = None
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
-        """Open a writing transaction; after it is committed, update the head file."""
+        """Open a write transaction and yield its connection; then update the head file if due.
+
+        Raises `StoreError` if the transaction fails, but not if the head file cannot be written.
+        """
         with self._lock:
             self._is_due = False
             with self._database.writing() as writer:
@@ -88,7 +95,10 @@ class AuditChain:
                 self._update_head()
 
     def add(self, writer: Connection, actions: Iterable[AuditAction]) -> None:
-        """Append the entries of actions, after an entry on a contradicting head file, if any."""
+        """Append the audit entries of actions.
+
+        If the head file contradicts the chain, an entry that records this is appended first.
+        """
         for action in actions:
             newest = newest_of(writer)
             if not self._is_due and self.head_error is None:
@@ -104,14 +114,14 @@ class AuditChain:
             head = read_head(self._head)
         except HeadError as error:
             is_new = not self._head.exists() and not self._database.ever_had(writer, "audit")
-            return None if is_new else f"the head {error}"
+            return None if is_new else str(error)
         found = writer.execute(SELECT_HASH, (head.number,)).fetchone()
         hash_ = found[0] if found else FIRST if head.number == 0 else None
         if hash_ == head.hash:
             return None
         if head.number > newest.number:
-            return f"the head names entry {head.number}, but the trail ends at {newest.number}"
-        return f"entry {head.number} does not match the head's hash"
+            return f"the head file names entry {head.number}, but the trail ends at {newest.number}"
+        return f"entry {head.number} does not match the hash in the head file"
 
     def _update_head(self) -> None:
         """Write the head file in a transaction, so that no process can write an older head later.
@@ -135,7 +145,7 @@ class AuditedTables(Tables):
     Parameters
     ----------
     chain
-        Audit trail, through which writing transactions are opened.
+        Audit trail, through which write transactions are opened.
     """
 
     def __init__(self, chain: AuditChain, reading: Reading) -> None:
@@ -145,6 +155,11 @@ class AuditedTables(Tables):
 
 class AuditStore(AuditedTables):
     """Store of the audit trail; other stores add audit entries to their transactions."""
+
+    @property
+    def chain(self) -> str:
+        """Name of the chain: "padwatch" and "access" with SQLite, "postgresql" with PostgreSQL."""
+        return self._audit.name
 
     @property
     def head_error(self) -> str | None:
@@ -168,8 +183,19 @@ class AuditStore(AuditedTables):
             return [AuditEntry(*row) for row in reader.execute(SELECT, vars(query))]
 
 
+def by_time(
+    chains: Iterable[tuple[str, Iterable[AuditEntry]]], *, newest_first: bool = False
+) -> Iterator[tuple[str, AuditEntry]]:
+    """Merge the entries of several chains by time; yield each with the name of its chain.
+
+    The entries of one chain keep their order, also if the clock was set back between them.
+    """
+    named = [zip(repeat(name), entries) for name, entries in chains]
+    return merge(*named, key=lambda pair: pair[1].time_ns, reverse=newest_first)
+
+
 class Trail:
-    """Read-only access to the audit trail of a database that may be in use.
+    """Read-only access to one chain of the audit trail in a database that may be in use.
 
     Parameters
     ----------
@@ -183,9 +209,10 @@ class Trail:
 
     def __init__(self, reading: Connect, head: Path, *, is_shared: bool = False) -> None:
         self._reading, self._head, self._is_shared = reading, head, is_shared
+        self.chain = chain_name(head)
 
     def verify(self) -> Verdict:
-        """Return the result of verifying the whole audit trail, which is not changed.
+        """Verify the number and hash of each entry and the head file; return the result.
 
         Raises
         ------
@@ -225,7 +252,6 @@ class Trail:
 
 
 def _all(reader: Connection) -> Iterator[AuditEntry]:
-    """Yield all entries, oldest first, from queries of `PAGE` rows."""
     after = -(2**63)
     while rows := reader.execute(SELECT_NEXT, (after, PAGE)).fetchall():
         yield from (AuditEntry(*row) for row in rows)

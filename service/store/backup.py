@@ -20,14 +20,14 @@ from service.store.access.tables import AccessStore
 from service.store.highwater.commits import adopt_restored
 from service.store.schema import MIGRATIONS
 from service.store.sqlite.checking import structure_findings
-from service.store.sqlite.migrating import APPLICATION_IDS
+from service.store.sqlite.migrating import application_id_of
 
 MAX_FINDINGS = 5
 """Maximum number of defects listed in an error message."""
 
 
 class BackupError(Exception):
-    """A backup cannot be made, is damaged, or cannot be restored; the message states the cause."""
+    """Error raised if a backup cannot be made or restored, or is damaged."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,13 @@ def content_of(connection: sqlite3.Connection) -> Content:
     return Content(_number(connection, "user_version"), n_rows)
 
 
-def checked(path: Path) -> Content:
+def checked(path: Path, origin: Origin | None = Origin.LIVE) -> Content:
     """Verify a backup completely and return its schema number and row counts.
+
+    Parameters
+    ----------
+    origin
+        Origin of the data; None for a backup of the access file.
 
     Raises
     ------
@@ -72,16 +77,17 @@ def checked(path: Path) -> Content:
         # immutable: no journal is read or created
         uri = f"{path.absolute().as_uri()}?mode=ro&immutable=1"
         with closing(sqlite3.connect(uri, uri=True)) as connection:
-            _require_ours(connection, path)
+            _require_ours(connection, path, origin)
             _require_whole(connection, path)
             return content_of(connection)
     except (sqlite3.Error, UnicodeDecodeError) as error:
         raise BackupError(f"{path}: {error}") from error
 
 
-def _require_ours(connection: sqlite3.Connection, path: Path) -> None:
-    if _number(connection, "application_id") != APPLICATION_IDS[Origin.LIVE]:
-        raise BackupError(f"{path} is not the padwatch database of a live plant")
+def _require_ours(connection: sqlite3.Connection, path: Path, origin: Origin | None) -> None:
+    if _number(connection, "application_id") != application_id_of(origin):
+        what = "padwatch database of a live plant" if origin else "access database of padwatch"
+        raise BackupError(f"{path} is not the {what}")
     schema = _number(connection, "user_version")
     if schema > len(MIGRATIONS):
         raise BackupError(
@@ -124,18 +130,12 @@ def alone_in(folder: Path) -> Iterator[None]:
 
 BUSY_TIMEOUT_S = 30.0
 
-NAME = re.compile(r"padwatch-\d{8}T\d{6}Z\.sqlite3")
+NAME = re.compile(r"(?P<stem>[a-z]+)-\d{8}T\d{6}Z\.sqlite3")
 
 
 @dataclass(frozen=True)
 class Backup:
-    """Verified backup.
-
-    Parameters
-    ----------
-    removed
-        Paths of older backups that were removed.
-    """
+    """Verified backup, with the paths of the older backups that were then removed."""
 
     path: Path
     n_bytes: int
@@ -143,7 +143,9 @@ class Backup:
     removed: tuple[Path, ...]
 
 
-def back_up(database: Path, folder: Path, now_ns: int, n_kept: int) -> Backup:
+def back_up(
+    database: Path, folder: Path, now_ns: int, n_kept: int, origin: Origin | None = Origin.LIVE
+) -> Backup:
     """Back up a database by SQLite's online backup, verify the copy, and remove the oldest copies.
 
     Older copies are removed only after the new copy is verified and on the disk.
@@ -154,42 +156,48 @@ def back_up(database: Path, folder: Path, now_ns: int, n_kept: int) -> Backup:
         Folder of the backups; created if missing.
     n_kept
         Number of backups to keep, at least 1.
+    origin
+        Origin of the data; None for the access file.
 
     Raises
     ------
     BackupError
-        If no verified backup was made; the folder is then unchanged.
+        If the backup, its verification or the removal of older backups fails.
     """
     if not database.is_file():
         raise BackupError(f"{database}: the database does not exist")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with alone_in(folder):
-            return _back_up(database, folder, now_ns, n_kept)
+            return _back_up(database, folder, now_ns, n_kept, origin)
     except (OSError, sqlite3.Error) as error:
         raise BackupError(f"{folder}: the backup of {database} failed: {error}") from error
 
 
-def _back_up(database: Path, folder: Path, now_ns: int, n_kept: int) -> Backup:
-    path = folder / _name(now_ns)
+def _back_up(
+    database: Path, folder: Path, now_ns: int, n_kept: int, origin: Origin | None
+) -> Backup:
+    moment = datetime.fromtimestamp(s_from_ns(now_ns), UTC)
+    path = folder / f"{database.stem}-{moment:%Y%m%dT%H%M%SZ}.sqlite3"
     aside = folder / f".{path.name}.part"
-    for leftover in folder.glob(".padwatch-*.sqlite3.part*"):
+    for leftover in folder.glob(f".{database.stem}-*.sqlite3.part*"):
         leftover.unlink()
     create_private(aside)
     try:
         expected = _copy(database, aside)
-        found = checked(aside)
+        found = checked(aside, origin)
         if found != expected:
-            raise BackupError(f"{aside} differs from {database}: {found}, expected {expected}")
+            raise BackupError(
+                f"{aside} differs from {database} in its schema or numbers of rows; check the disk"
+            )
         put_in_place(aside, path)
     except BaseException:
         aside.unlink(missing_ok=True)
         raise
-    return Backup(path, path.stat().st_size, found, _make_room(path, n_kept))
+    return Backup(path, path.stat().st_size, found, _make_room(path, database.stem, n_kept))
 
 
 def _copy(database: Path, aside: Path) -> Content:
-    """Copy a database in one transaction; return its schema number and row counts."""
     uri = f"{database.absolute().as_uri()}?mode=ro"
     with (
         closing(sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S)) as source,
@@ -202,18 +210,29 @@ def _copy(database: Path, aside: Path) -> Content:
     return content
 
 
-def _make_room(newest: Path, n_kept: int) -> tuple[Path, ...]:
+def _make_room(newest: Path, stem: str, n_kept: int) -> tuple[Path, ...]:
     """Remove the oldest backups beyond the number to keep, but never the newest."""
-    others = (path for path in newest.parent.iterdir() if NAME.fullmatch(path.name))
+    named = ((path, NAME.fullmatch(path.name)) for path in newest.parent.iterdir())
+    others = (path for path, name in named if name and name["stem"] == stem)
     older = sorted((path for path in others if path != newest), reverse=True)
     for path in older[n_kept - 1 :]:
         path.unlink()
     return tuple(older[n_kept - 1 :])
 
 
-def _name(now_ns: int) -> str:
-    moment = datetime.fromtimestamp(s_from_ns(now_ns), UTC)
-    return f"padwatch-{moment:%Y%m%dT%H%M%SZ}.sqlite3"
+def backup_beside(copy: Path, stem: str) -> Path | None:
+    """Return the backup of another file of the same moment; None if there is none.
+
+    Parameters
+    ----------
+    stem
+        Name of the other file without its suffix.
+    """
+    name = NAME.fullmatch(copy.name)
+    if name is None:
+        return None
+    beside = copy.with_name(stem + copy.name.removeprefix(name["stem"]))
+    return beside if beside.is_file() else None
 
 
 LOGS = ("-wal", "-shm")
@@ -236,33 +255,40 @@ class Restored:
     content: Content
 
 
-def restore(copy: Path, database: Path, now_ns: int) -> Restored:
+def restore(
+    copy: Path, database: Path, now_ns: int, origin: Origin | None = Origin.LIVE
+) -> Restored:
     """Replace a database atomically by a backup; the previous database is kept beside it.
+
+    Parameters
+    ----------
+    origin
+        Origin of the data; None for the access file.
 
     Raises
     ------
     BackupError
-        If the backup is damaged or has a newer schema, or the database is in use; nothing is
-        changed then.
+        If the backup is damaged or has a newer schema, or the database is in use, and nothing was
+        changed; or if a file cannot be written.
     """
-    content = checked(copy)
+    content = checked(copy, origin)
     if database.exists() and copy.samefile(database):
         raise BackupError(f"{copy} is the database itself; name a copy")
     try:
         database.parent.mkdir(parents=True, exist_ok=True)
-        return Restored(database, _replace(copy, database, now_ns), content)
+        return Restored(database, _replace(copy, database, now_ns, origin), content)
     except (OSError, sqlite3.Error) as error:
         raise BackupError(f"{database}: restoring {copy} failed: {error}") from error
 
 
-def _replace(copy: Path, database: Path, now_ns: int) -> Path | None:
+def _replace(copy: Path, database: Path, now_ns: int, origin: Origin | None) -> Path | None:
     aside = database.with_name(f".{database.name}.restoring")
     aside.unlink(missing_ok=True)
     with _unused(database):
         create_private(aside)
         try:
             shutil.copyfile(copy, aside)
-            checked(aside)
+            checked(aside, origin)
             before = _keep(database, now_ns)
             put_in_place(aside, database)
             adopt_restored(database)
@@ -364,7 +390,7 @@ def access_before(database: Path) -> AccessBefore | None:
 
 
 def revoke_again(access: AccessStore, before: AccessBefore | None, now_ns: int) -> AccessAfter:
-    """End all sessions of a restored database; revoke again the API keys listed in `before`.
+    """End all sessions of a restored database, and revoke again the API keys revoked before.
 
     Raises
     ------

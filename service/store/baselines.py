@@ -56,7 +56,7 @@ class StoredStep:
 
 @dataclass(frozen=True)
 class BaselineEntry:
-    """Metadata of a stored baseline, without the baseline itself."""
+    """Metadata of a stored baseline; `event` is the machine event that required it, or empty."""
 
     unit: str
     bearing: str

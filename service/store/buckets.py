@@ -59,13 +59,13 @@ class Summaries:
 
     @classmethod
     def joined(cls, parts: Sequence["Summaries"]) -> "Summaries":
-        """Concatenate the rows of one or more summaries with the same columns."""
+        """Return the concatenated rows of one or more summaries with the same columns."""
         rows = {name: np.concatenate([getattr(part, name) for part in parts]) for name in ROWS}
         return cls(parts[0].names, **rows)
 
     @classmethod
     def together(cls, parts: Sequence["Summaries"]) -> "Summaries":
-        """Concatenate the rows of one or more summaries and sort them by time."""
+        """Return the rows of one or more summaries with the same columns, sorted by time."""
         found = cls.joined(parts)
         return found.at(np.argsort(found.time_ns, kind="stable"))
 
@@ -80,7 +80,7 @@ class Summaries:
         return Summaries(names, self.time_ns, **chosen)
 
     def in_spans(self, width_ns: int) -> "Summaries":
-        """Aggregate the rows, sorted by time, over spans that start at multiples of `width_ns`."""
+        """Return the rows, which are sorted by time, aggregated over spans of `width_ns`."""
         if self.time_ns.size == 0:
             return self
         number = self.time_ns // width_ns
@@ -141,7 +141,7 @@ def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int 
     Parameters
     ----------
     finest_ns
-        Width of the finest available roll-ups, a divisor of a day and of the bucket width.
+        Width of the finest available roll-ups, a divisor of a day; the result is a multiple of it.
     """
     # a range that is not aligned with the buckets may overlap one more bucket
     needed = -(-(end_ns - start_ns) // max(max_points - 1, 1))
@@ -152,7 +152,7 @@ def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int 
 
 
 def single_points(readings: Summaries, hole_ns: int) -> Trend:
-    """Return the trend of single readings, with an empty point in each interval above `hole_ns`."""
+    """Return the trend of single readings, with an empty point in intervals over `hole_ns`."""
     holes = np.flatnonzero(np.diff(readings.time_ns) > hole_ns) + 1
     time_ns = np.insert(readings.time_ns, holes, readings.time_ns[holes - 1] + hole_ns // 2)
     series = {}

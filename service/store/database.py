@@ -9,7 +9,7 @@ Each SQL statement is written once and runs on both databases. Rules for stateme
 - ``ON CONFLICT``, never ``INSERT OR REPLACE``; ``table.column`` is the old value in such a clause;
 - no ``rowid``, ``typeof``, ``instr``, ``GLOB``, ``min`` or ``max`` of two values, ``LIMIT -1``;
 - rows from which other rows are computed are read from the view named ``whole_`` plus the table
-  name, which omits damaged rows also in a writing transaction;
+  name, which omits damaged rows also in a write transaction;
 - a row number assigned by the database is read by ``RETURNING`` or by a separate query.
 """
 
@@ -46,7 +46,7 @@ class Connection(Protocol):
     """Database connection within a transaction; used by one thread at a time."""
 
     def execute(self, statement: str, parameters: Parameters = ..., /) -> Rows:
-        """Run a statement. The whole result may be held in memory, so queries must be bounded."""
+        """Run a statement and return its rows, which may be in memory: queries must be bounded."""
         ...
 
     def executemany(self, statement: str, parameters: Iterable[Parameters], /) -> Rows:
@@ -84,7 +84,7 @@ class Database(Protocol):
         ...
 
     def writing(self) -> AbstractContextManager[Connection]:
-        """Open a writing transaction; only one is open at a time among all processes.
+        """Open a write transaction, the only one among all processes, and yield its connection.
 
         Data that the transaction reads do not change until it ends. An error rolls it back. If
         the commit raises `StoreError`, its outcome may be unknown; therefore writing the same data
@@ -93,7 +93,7 @@ class Database(Protocol):
         ...
 
     def reading(self, unreadable: Unreadable = "strict") -> AbstractContextManager[Connection]:
-        """Open a read-only transaction on one consistent state of the database."""
+        """Open a read-only transaction on one consistent state, and yield its connection."""
         ...
 
     def ever_had(self, connection: Connection, table: str) -> bool:
@@ -124,7 +124,7 @@ class Tables:
     Parameters
     ----------
     writing
-        Function that opens a writing transaction.
+        Function that opens a write transaction.
     reading
         Function that opens a read-only transaction.
     """

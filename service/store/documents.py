@@ -89,4 +89,4 @@ def _read(model: type[_Model], text: str) -> _Model:
 def _refuse_repeated_keys(pairs: list[tuple[str, Any]]) -> None:
     keys = [key for key, _ in pairs]
     if len(set(keys)) < len(keys):
-        raise ValueError(f"a key is repeated among {keys}")
+        raise ValueError(f"a key is repeated among {', '.join(keys)}")

@@ -37,7 +37,7 @@ class FilmQuery:
     Parameters
     ----------
     start_ns, end_ns
-        Half-open time range.
+        Half-open time range, ns since 1970 UTC.
     states
         Operating states to include; empty for all.
     newest
@@ -231,7 +231,9 @@ def select_decisions(reader: Connection, unit: str, bearing: str) -> list[Stored
             for direction, estimator, version, document in rows
         ]
     except ValueError as error:
-        raise StoreError(f"a decision of unit {unit} bearing {bearing}: {error}") from error
+        raise StoreError(
+            f"stored decision of unit {unit} bearing {bearing} is invalid: {error}"
+        ) from error
 
 
 def select_film_history(reader: Connection, query: FilmQuery) -> FilmHistory:

@@ -82,7 +82,7 @@ class FilmStore(BaselineTables):
             writer.execute(MARK_PAST, span)
 
     def past_end_ns(self, unit: str, bearing: str) -> int | None:
-        """Return the end time of the simulated past data of a bearing; None without such data."""
+        """Return the end time, in ns, of the simulated past of a bearing; None without a past."""
         with self._reading() as reader:
             row = reader.execute(
                 "SELECT end_ns FROM simulated_past JOIN series ON series.id = simulated_past.series"

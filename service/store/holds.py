@@ -29,7 +29,7 @@ machines, and an acknowledged write may not be on a disk."""
 
 _MEMORY = "is in memory: all results are lost when the machine restarts"
 _CONTAINER = "belongs to a container: results are lost when it is replaced; mount a volume"
-_NO_JOURNAL = "has no journal: a power cut may take the whole folder with it"
+_NO_JOURNAL = "has no journal: a power cut may destroy the whole folder"
 FORGETFUL = {
     "tmpfs": _MEMORY,
     "ramfs": _MEMORY,
@@ -123,7 +123,7 @@ def why_unusable(path: Path) -> str | None:
     except PermissionError:
         return f"{_user()} may not read or create the folder {folder}: {_give(folder)}"
     if is_directory:
-        return f"{path} is a folder: move it away, the database is a file of that name"
+        return f"{path} is a folder, but must be the database file: move the folder away"
     if is_other:
         return f"{path} is not a regular file: move it away"
     return _why_protected(path)
@@ -164,7 +164,7 @@ _PID_BYTES = 20
 
 
 class AlreadyRunningError(StoreError):
-    """Another service uses the database; the message states its process id."""
+    """Error raised if another service uses the database; the message states its process id."""
 
 
 def lock_path(database: Path) -> Path:
@@ -214,7 +214,7 @@ def _require_local(folder: Path, found: FileSystem) -> None:
             " once and acknowledged writes may be lost: choose a data folder on a local disk"
         )
     if found.warning:
-        log.warning("the data folder may lose results", folder=str(folder), why=found.warning)
+        log.warning("results in the data folder may be lost", folder=str(folder), why=found.warning)
 
 
 def _take(descriptor: int, database: Path) -> None:

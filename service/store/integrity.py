@@ -18,7 +18,7 @@ class Integrity:
     marks
         High-water mark of a SQLite database; None for PostgreSQL.
     damage
-        Log of the damaged rows found since the start.
+        Log of the damaged and missing rows found since the start.
     check_some
         Function that checks the next rows; returns True when all rows have been checked once.
     require_file
@@ -48,12 +48,12 @@ class Integrity:
 
     @property
     def n_damaged(self) -> int:
-        """Number of damaged rows found since the start; queries omit these rows."""
+        """Number of damaged and missing rows found since the start; queries omit damaged rows."""
         return self._damage.n_damaged
 
     @property
     def damaged(self) -> Sequence[Place]:
-        """Damaged rows found since the start, at most `seals.MAX_PLACES`."""
+        """Damaged and missing rows found since the start, at most `seals.MAX_PLACES`."""
         return self._damage.places
 
     def adopt(self, now_ns: int) -> Sequence[MarkFinding]:

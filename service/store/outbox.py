@@ -71,7 +71,7 @@ class StoredMessage:
     n_attempts
         Number of delivery attempts.
     answer
-        Result of the last attempt.
+        Reply to the last attempt, or its error; empty before the first attempt.
     done_ns
         Time of delivery, refusal or expiry; None while the message waits.
     """

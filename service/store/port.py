@@ -10,15 +10,15 @@ from core.samples.gaps import Gap
 
 
 class StoreError(Exception):
-    """The database cannot be used; the message states the cause and the remedy."""
+    """Error raised if the database cannot be used; the message states cause and remedy."""
 
 
 class RefusedRowError(StoreError):
-    """The database permanently rejects a row: it violates a constraint, or its page is damaged."""
+    """Error raised if a row violates a constraint or its page is damaged; a retry is useless."""
 
 
 class QueryTooLargeError(Exception):
-    """A query exceeds the amount of data that one call returns; the message states the limit."""
+    """Error raised if a query needs more data than the limit, which the message states."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class TrendQuery:
     Parameters
     ----------
     start_ns, end_ns
-        Half-open time range.
+        Half-open time range, ns since 1970 UTC.
     max_points
         Maximum number of points; more readings are aggregated into buckets of equal width.
     hole_ns
@@ -126,7 +126,7 @@ class AlarmQuery:
     limit
         Maximum number of events.
     start_ns, end_ns
-        Half-open time range.
+        Half-open time range, ns since 1970 UTC.
     states
         Operating states to include; empty for all.
     """

@@ -37,7 +37,7 @@ class GapReference:
     Parameters
     ----------
     set_ns
-        Time at which the reference was set, UTC.
+        Time at which the reference was set, ns since 1970 UTC.
     author
         Person who set the reference, 1 to 80 printable characters.
     gap_reference_um
@@ -67,7 +67,7 @@ class GapReference:
         if self.opposite_reference_um is not None:
             _check_pair("opposite gap", self.opposite_reference_um)
         if not self.author.strip():
-            raise ValueError(f"author {self.author!r} is empty; name who sets the reference")
+            raise ValueError("author is empty; name who sets the reference")
         _check_text("author", self.author, MAX_AUTHOR)
         _check_text("note", self.note, MAX_NOTE)
 
@@ -84,7 +84,7 @@ def _check_text(what: str, text: str, n_most: int) -> None:
     if len(text) > n_most:
         raise ValueError(f"{what} has {len(text)} characters, must be at most {n_most}")
     if not text.isprintable():
-        raise ValueError(f"{what} {text!r} must be printable characters on one line")
+        raise ValueError(f"{what} has a line break or another unprintable character; remove it")
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class SetVectorReference:
     Parameters
     ----------
     set_ns
-        Time at which the reference was set, UTC.
+        Time at which the reference was set, ns since 1970 UTC.
     """
 
     reference: VectorReference
@@ -212,7 +212,8 @@ class GapReferenceStore(_References[GapReference]):
         try:
             return GapReference(unit, bearing, set_ns, author, *gaps, ReferenceSource(source), note)
         except ValueError as error:
-            raise StoreError(f"a reference of unit {unit} bearing {bearing}: {error}") from error
+            name = f"stored gap reference of unit {unit} bearing {bearing}"
+            raise StoreError(f"{name} is invalid: {error}") from error
 
     def _object(self, reference: GapReference) -> str:
         return f"{reference.unit}:{reference.bearing}"
@@ -243,7 +244,8 @@ class VectorReferenceStore(_References[SetVectorReference]):
             found = {place: OrderVector(*vector) for place, vector in json.loads(vectors).items()}
             reference = VectorReference(unit, bearing, OperatingState(state), found)
         except (ValueError, TypeError) as error:
-            raise StoreError(f"a 1× reference of unit {unit} bearing {bearing}: {error}") from error
+            name = f"stored 1× reference of unit {unit} bearing {bearing}"
+            raise StoreError(f"{name} is invalid: {error}") from error
         return SetVectorReference(reference, set_ns, author, note)
 
     def _object(self, reference: SetVectorReference) -> str:

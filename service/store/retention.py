@@ -187,12 +187,12 @@ class RetentionStore(Tables):
             return None
         setting, series = min(self._blocked)
         return (
-            f"roll-ups of bearing {series} are damaged or disagree with wider ones, so data beyond"
-            f" {setting} are kept ({len(self._blocked)} such cases)"
+            f"roll-ups with series id {series} are damaged or disagree with wider ones, so they are"
+            f" kept beyond {setting} ({len(self._blocked)} such cases)"
         )
 
     def series(self) -> list[int]:
-        """Return the database numbers of all bearings that have stored data."""
+        """Return the series ids of all bearings with stored data, in ascending order."""
         with self._reading() as reader:
             return [int(row[0]) for row in reader.execute("SELECT id FROM series ORDER BY id")]
 
@@ -271,7 +271,6 @@ def _verified_until(writer: Connection, series: int, span: Span) -> int:
 
 
 def _agrees(writer: Connection, series: int, fine: Cells, width_ns: int, span: Span) -> bool:
-    """Return whether the roll-ups of a width equal the aggregate of finer cells."""
     wanted = fine.gathered(width_ns)
     found = select_cells(writer, series, width_ns, span, rolled_columns())
     return found is not None and _is_same(found, wanted)

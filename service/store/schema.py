@@ -3,6 +3,10 @@
 Migrations are written for SQLite. For PostgreSQL `service.store.postgres.schema` translates column
 types, ``STRICT``, ``WITHOUT ROWID`` and triggers, and replaces migrations that it cannot translate.
 A new migration is appended to `MIGRATIONS`; the tests of the store run it on both databases.
+
+A PostgreSQL database has all tables. SQLite has two files with a common schema number: the access
+file has the tables of accounts, sessions and keys, the other file has the tables of results. Each
+file has its own audit trail.
 """
 
 from service.store.access.tables import ACCESS_TABLES, MUST_CHANGE
@@ -157,3 +161,14 @@ MIGRATIONS = (
     ),
 )
 """SQL script of each migration; item n migrates a database from schema n to schema n + 1."""
+
+OF_ACCESS = frozenset({ACCESS_TABLES, MUST_CHANGE})
+"""Migrations of the access file alone."""
+
+OF_BOTH = frozenset({AUDIT_TABLES})
+
+
+def migration_of(number: int, *, is_access: bool) -> str:
+    """Return the script of a migration for one of the two SQLite files; empty if it has none."""
+    script = MIGRATIONS[number]
+    return script if script in OF_BOTH or (script in OF_ACCESS) == is_access else ""

@@ -1,4 +1,4 @@
-"""Result series, one per bearing: database number, unique times, and encoding of readings."""
+"""Result series, one per bearing: id in the database, unique times, and encoding of readings."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -18,13 +18,13 @@ ADD = "INSERT INTO series (unit, bearing) VALUES (?, ?) ON CONFLICT DO NOTHING"
 
 
 def find_series(reader: Connection, unit: str, bearing: str) -> int | None:
-    """Return the database number of a bearing; None if nothing is stored for it."""
+    """Return the series id of a bearing; None if nothing is stored for it."""
     found = reader.execute(FIND, (unit, bearing)).fetchone()
     return None if found is None else int(found[0])
 
 
 def series_of(writer: Connection, unit: str, bearing: str) -> int:
-    """Return the database number of a bearing; assign a new number if it has none."""
+    """Return the series id of a bearing; insert the bearing if it has none."""
     found = find_series(writer, unit, bearing)
     if found is None:
         writer.execute(ADD, (unit, bearing))
@@ -39,7 +39,7 @@ def unique_time_ns(
     time_ns: int,
     measured: tuple[object, ...],
 ) -> int:
-    """Return the earliest time, `time_ns` or later, at which no other measurement is stored.
+    """Return the earliest time, in ns, from `time_ns` on, at which no other measurement is stored.
 
     A device whose clock restarts or is set back reports the same times again for different
     measurements. A measurement that is already stored keeps its time.

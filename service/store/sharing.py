@@ -9,7 +9,7 @@ from service.store.database import Connection, Tables, insert, upsert
 
 
 @dataclass(frozen=True)
-class UnitReport:
+class UnitRow:
     """Status report of a process on a unit.
 
     Parameters
@@ -76,7 +76,7 @@ UNIT_STATUS_TABLES = """
     ) STRICT;
 """
 
-REPORT_COLUMNS = [field.name for field in fields(UnitReport)]
+REPORT_COLUMNS = [field.name for field in fields(UnitRow)]
 UPDATE_BEAT = """
     UPDATE unit_status SET n_beats = :n_beats, beat_ns = :beat_ns, link = :link, reason = :reason,
     last_sample_ns = :last_sample_ns, signs = :signs
@@ -94,8 +94,8 @@ SELECT_STATE = "SELECT process, revision, state FROM unit_status WHERE unit = ?"
 class UnitStates(Tables):
     """Store of the newest status report on each unit."""
 
-    def report(self, process: str, reports: Sequence[UnitReport]) -> None:
-        """Write the status reports of a process in one transaction."""
+    def report(self, process: str, reports: Sequence[UnitRow]) -> None:
+        """Write the status reports of a process in one transaction; keep unchanged states."""
         with self._writing() as writer:
             # in a fixed order, so that two writers cannot deadlock
             for report in sorted(reports, key=lambda report: report.unit):
@@ -121,7 +121,7 @@ class UnitStates(Tables):
 
 
 class CommandState(StrEnum):
-    """State of an operator command."""
+    """State of an operator command; `UNKNOWN` if it refers to an alarm that does not exist."""
 
     WAITING = "waiting"
     TAKEN = "taken"
@@ -251,7 +251,7 @@ class Commands(Tables):
         return [each for each in found if each.command.unit in units]
 
     def take(self, id_: str, process: str) -> bool:
-        """Record the process that executes a command; return False for an answered command."""
+        """Record the process that executes a command; return False if answered or unknown."""
         with self._writing() as writer:
             return bool(writer.execute(TAKE, (process, id_)).rowcount == 1)
 

@@ -69,7 +69,7 @@ class SpectraQuery:
     Parameters
     ----------
     start_ns, end_ns
-        Half-open time range.
+        Half-open time range, ns since 1970 UTC.
     max_spectra
         Maximum number of spectra; if more are stored, spectra evenly spaced in time are chosen.
     """

@@ -9,7 +9,6 @@ from core.change.film_judge import FilmNews
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
 from core.samples.gaps import Gap, Reach
-from service.store.access.tables import AccessStore
 from service.store.alarms import insert_alarms, select_alarms, select_events
 from service.store.audit import AuditChain, AuditStore
 from service.store.database import Connection, Database, Hold
@@ -88,6 +87,8 @@ class Store:
         Function that returns the outbox messages about an alarm event.
     spectra
         Limits of stored spectra.
+    is_read_only
+        Whether another process writes the database; all methods that write then raise `StoreError`.
     """
 
     def __init__(
@@ -96,6 +97,8 @@ class Store:
         head: Path,
         address: Address = no_recipients,
         spectra: SpectraLimits | None = None,
+        *,
+        is_read_only: bool = False,
     ) -> None:
         self.database, self._address = database, address
         self._spectra_limits = spectra or SpectraLimits()
@@ -106,7 +109,6 @@ class Store:
         self.films = FilmStore(*audited)
         self.gap_references = GapReferenceStore(*audited)
         self.order1_references = VectorReferenceStore(*audited)
-        self.access = AccessStore(*audited)
         self.outbox = Outbox(self._writing, self._reader)
         self.spectra = SpectraStore(self._writing, self._reader)
         self.rollups = RollupStore(self._writing, self._reader)
@@ -116,8 +118,9 @@ class Store:
         self.commands = Commands(database.writing, self._reader)
         self.integrity = Integrity(self._chain)
         self._layout = Layout.of(columns_of(CATALOGUE))
-        with database.writing() as writer:
-            self._layout_id = remember_layout(writer, self._layout)
+        if not is_read_only:
+            with database.writing() as writer:
+                self._layout_id = remember_layout(writer, self._layout)
 
     @property
     def kind(self) -> str:
@@ -162,7 +165,9 @@ class Store:
             write_positions(writer, positions)
 
     def trend(self, query: TrendQuery) -> Trend:
-        """Return the trends of one bearing, in buckets if more than ``max_points`` readings match.
+        """Return the trends of one bearing as a page, or as ``max_points`` or fewer points.
+
+        More readings are aggregated into buckets.
 
         Raises
         ------
@@ -220,7 +225,7 @@ class Store:
         return self.gap_references.in_force()
 
     def reference_history(self, unit: str, bearing: str) -> list[GapReference]:
-        """Return the newest 1000 gap references of a bearing, newest first."""
+        """Return the newest gap references of a bearing, at most 1000, newest first."""
         return self.gap_references.history(unit, bearing)
 
     def position(self, unit: str) -> StreamPosition | None:

@@ -149,14 +149,19 @@ def arguments(query: TrendQuery) -> dict[str, object]:
 
 
 def decoded_rows(rows: list[Row], layouts: dict[int, Layout], names: tuple[str, ...]) -> Summaries:
-    """Return the columns `names` of stored rows; a column that a row lacks has level BAD."""
+    """Return the columns `names` of stored rows; a column that a row lacks has level BAD.
+
+    Raises `StoreError` if the layout of a row is damaged or missing.
+    """
     time_ns = np.array([row[0] for row in rows], dtype=np.int64)
     layout_of_row = np.array([row[1] for row in rows], dtype=np.int64)
     value = np.full((len(rows), len(names)), np.nan)
     level = np.full((len(rows), len(names)), Level.BAD, dtype=np.uint8)
     for id_ in np.unique(layout_of_row).tolist():
         if id_ not in layouts:
-            raise StoreError(f"layout {id_} of readings is damaged or missing")
+            raise StoreError(
+                f"layout {id_} of stored readings is damaged or missing; restore a backup"
+            )
         layout, where = layouts[id_], np.flatnonzero(layout_of_row == id_)
         numbers, levels = layout.decode([rows[i][2] for i in where], [rows[i][3] for i in where])
         place = {name: column for column, name in enumerate(layout.quantities)}

@@ -130,5 +130,5 @@ def _file(row: tuple[Any, ...]) -> WaveformFile:
     try:
         found |= {"kind": WaveformKind(found["kind"]), "state": WaveformState(found["state"])}
     except ValueError as error:
-        raise StoreError(f"index entry of recording {found['name']!r}: {error}") from error
+        raise StoreError(f"invalid index entry of recording {found['name']}: {error}") from error
     return WaveformFile(**found)

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable
 
 import pytest
-from playwright.async_api import Locator, Page, expect
+from playwright.async_api import Locator, Page, Route, expect
 from real_plant import PASSWORD
 
 from service.dashboard.assets import edition
@@ -46,12 +46,30 @@ async def log_in(page: Page, name: str, password: str = PASSWORD) -> None:
 async def freeze(page: Page, url: str, is_wanted: Callable[[dict], bool] = bool) -> dict:
     """Let the page receive one real answer of the service, as it is wanted, again and again.
 
-    What a test changes in it is received, too.
+    The bearings in it have all their readings. What a test changes in it is received, too.
     """
-    address = f"{url}api/v1/overview"
-    while not is_wanted(overview := await (await page.request.get(address)).json()):
+    while not is_wanted(overview := await _whole_overview(page, f"{url}api/v1/")):
         await page.wait_for_timeout(500)
-    await page.route("**/api/v1/overview", lambda route: route.fulfill(json=overview))
+    latest = {
+        f"{unit['id']}/bearings/{bearing['bearing']}/latest": bearing
+        for unit in overview["units"]
+        for bearing in unit["bearings"]
+    }
+
+    async def give_latest(route: Route) -> None:
+        await route.fulfill(json=latest[route.request.url.partition("/units/")[2]])
+
+    await page.route("**/api/v1/overview*", lambda route: route.fulfill(json=overview))
+    await page.route("**/latest", give_latest)
+    return overview
+
+
+async def _whole_overview(page: Page, api: str) -> dict:
+    overview: dict = await (await page.request.get(f"{api}overview")).json()
+    for unit in overview["units"]:
+        for bearing in unit["bearings"]:
+            path = f"units/{unit['id']}/bearings/{bearing['bearing']}/latest"
+            bearing |= await (await page.request.get(api + path)).json()
     return overview
 
 

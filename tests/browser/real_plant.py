@@ -14,7 +14,7 @@ from pathlib import Path
 from rigs.command_line import OPEN
 
 from service.api.auth.passwords import Hashing
-from service.api.auth.people import AccountService
+from service.api.auth.service import AccessService
 from service.app.storage import open_store
 from service.cli.accounts import access_of
 from service.cli.offline.demo_history import fill
@@ -98,7 +98,7 @@ class Plant(ExitStack):
     def add_accounts(self) -> None:
         """Add an account of each role, named after it, before anything is started."""
         with access_of(self._plant_here(), creates=True) as access:
-            people = AccountService(access, Hashing())
+            people = AccessService(access, Hashing())
             for role in Role:
                 people.add(role.value, role, PASSWORD, time.time_ns())
 

@@ -11,7 +11,7 @@ from core.stiffness.stiffness_budget import ratio_budget, transfer_budgets
 from core.uncertainty import Budget, coverage_factor, random_line, systematic_line
 
 
-def test_random_and_systematic_half_widths_stay_apart_and_combine_by_squares() -> None:
+def test_random_and_systematic_half_widths_stay_apart_and_combine_by_squares():
     assert systematic_line("gain", 0.05, 100.0).contribution == pytest.approx(5.0 / math.sqrt(3.0))
     assert random_line("statistics", 3.0).contribution == 3.0
     a = systematic_line("a", 4.0 * math.sqrt(3.0), -1.0)
@@ -26,7 +26,7 @@ def test_random_and_systematic_half_widths_stay_apart_and_combine_by_squares() -
     assert Budget(5.0, ()).interval == (5.0, 5.0)
 
 
-def test_few_degrees_of_freedom_widen_the_interval_as_in_the_gums_table() -> None:
+def test_few_degrees_of_freedom_widen_the_interval_as_in_the_gums_table():
     # GUM, table G.2: t_95 of 3, 6 and 20 degrees of freedom
     for freedoms, factor in ((3.0, 3.18), (6.0, 2.45), (20.0, 2.09)):
         found = coverage_factor([random_line("a", 1.0, freedoms)])
@@ -57,9 +57,7 @@ def at_line() -> tuple[Budget, Budget]:
     return ratio, transfer[0]
 
 
-def test_each_estimator_names_what_reaches_it_and_without_motion_has_no_budget(
-    at_line: tuple[Budget, Budget],
-) -> None:
+def test_each_estimator_names_what_reaches_it_and_without_motion_has_no_budget(at_line):
     ratio, transfer = ({line.name for line in budget.lines} for budget in at_line)
     common = {"spectral statistics", "gain of shaft probe", "gain of bearing transducer"}
     common |= {"bracket stiffness", "runout", "cross-coupling not known"}

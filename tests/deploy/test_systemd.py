@@ -1,4 +1,4 @@
-"""The systemd units: hardened, understood by systemd, and running commands that there are."""
+"""The systemd units are hardened and understood; the install guide names what there is."""
 
 import re
 import shlex
@@ -78,6 +78,13 @@ def test_a_service_runs_a_command_that_there_is(name: str) -> None:
     assert all(option in helped.output for option in options if option.startswith("--"))
 
 
+def test_the_end_of_the_serving_process_is_left_to_the_measuring_one() -> None:
+    found = settings("padwatch.service")
+
+    assert found["KillMode"] == ["mixed"]
+    assert found["OOMPolicy"] == ["continue"]
+
+
 @pytest.mark.parametrize("name", [name for name in SERVICES if name != "padwatch-backup.service"])
 def test_the_service_is_watched_and_begins_anew(name: str) -> None:
     found = settings(name)
@@ -95,3 +102,31 @@ def test_the_user_of_the_services_is_made(tmp_path: Path) -> None:
     passwd = tmp_path / "etc" / "passwd"
     assert passwd.exists(), said
     assert "padwatch:x:" in passwd.read_text(encoding="utf-8")
+
+
+ROOT = Path(__file__).parents[2]
+GUIDE = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("where", "folder", "known"),
+    [
+        (r"/opt/padwatch/share/padwatch/([\w./-]+\w)", "deploy", "systemd/padwatch.service"),
+        (r"(?<![\w/])((?:deploy|requirements)/[\w./-]+\w)", "", "requirements/run.txt"),
+    ],
+    ids=["in the package", "in the checkout"],
+)
+def test_every_file_that_is_named_is_there(where: str, folder: str, known: str) -> None:
+    named = set(re.findall(where, GUIDE))
+
+    assert known in named
+    assert [name for name in named if not (ROOT / folder / name).is_file()] == []
+
+
+def test_every_command_that_is_typed_is_one_of_padwatch() -> None:
+    typed = set(re.findall(r"/bin/padwatch ([a-z]+(?: (?:check|example))?)", GUIDE))
+
+    assert {"validate", "config example", "config check", "restore"} <= typed
+    for command in typed:
+        helped = CliRunner().invoke(app, [*command.split(), "--help"])
+        assert helped.exit_code == 0, command

@@ -1,4 +1,4 @@
-"""Command lines in the documentation are ones that padwatch takes."""
+"""Documentation: command lines that work, links that lead somewhere, a complete reference."""
 
 import re
 import shlex
@@ -6,10 +6,16 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
+import pytest
 import typer
+from rigs.command_line import padwatch
 
 from service.cli.commands import app
+from service.settings.alarm_kinds import ALARM_KINDS
+from service.settings.loading import plant_file_schema
+from service.settings.sources.mapping import ImportMapping
 
 FENCE = re.compile(r"^```sh\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 INLINE = re.compile(r"`(?:\.venv/bin/)?padwatch ([a-z][^`]*)`")
@@ -65,3 +71,113 @@ def test_commands_named_in_sentences_exist(page: Path) -> None:
         known = {option for each in getattr(command, "params", ()) for option in each.opts}
         for option in re.findall(r"--[a-z-]+", words):
             assert option in {*known, "--help"}, f"padwatch {words}: no such option as {option}"
+
+
+LINK = re.compile(r"\]\((?!https?:|mailto:|#table-)([^)\s]+)\)")
+ANY_FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
+HEADING = re.compile(r"^#{1,6} +(.+?) *$", re.MULTILINE)
+
+
+def text_of(page: Path) -> str:
+    return ANY_FENCE.sub("", page.read_text(encoding="utf-8"))
+
+
+def anchors_of(page: Path) -> set[str]:
+    """Names of the places on a page, as forges and MyST make them of headings."""
+    headings = HEADING.findall(text_of(page))
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_links_on_pages_lead_somewhere(page: Path) -> None:
+    for link in LINK.findall(text_of(page)):
+        path, _, anchor = unquote(link).partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), f"{link} leads nowhere"
+        if anchor.startswith("table-"):  # of tables that are made when the documentation is built
+            assert target.parent.name == "reference"
+        elif anchor:
+            assert anchor in anchors_of(target), f"{link}: no such heading; {anchors_of(target)}"
+
+
+def test_images_have_words_for_those_who_cannot_see_them(page: Path) -> None:
+    for words, image in re.findall(r"!\[([^\]]*)\]\(([^)]+)\)", text_of(page)):
+        assert words, f"{image} has no words"
+
+
+REFERENCE = Path(__file__).parents[2] / "docs" / "reference"
+
+
+def filled_page(name: str) -> str:
+    from padwatch_reference import filled
+
+    return filled((REFERENCE / name).read_text(encoding="utf-8"))
+
+
+def test_the_page_about_alarms_lists_every_kind() -> None:
+    page = filled_page("../how-to/alarms.md")
+    table = page.partition("| Alarm | Subject |")[2].partition("\n\n")[0]
+    cells = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
+    assert set(re.findall(r"`(\w+)`", " ".join(cells))) == set(ALARM_KINDS)
+
+
+def chapter(page: str, model: str) -> str:
+    """What stands about one table."""
+    found = re.search(rf"^\(table-{model.lower()}\)=\n(.*?)(?=^\(table-|\Z)", page, re.M | re.S)
+    assert found, f"nothing about {model}"
+    return found[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "schema"),
+    [
+        ("configuration.md", plant_file_schema()),
+        ("import-mapping.md", ImportMapping.model_json_schema()),
+    ],
+    ids=["plant file", "import mapping"],
+)
+def test_every_key_is_explained_with_its_limits_and_default(
+    name: str, schema: dict[str, Any]
+) -> None:
+    page = filled_page(name)
+    assert "<!-- made when built" not in page
+    tables = {schema["title"]: schema, **schema["$defs"]}
+    for model, node in tables.items():
+        if "properties" not in node:
+            continue
+        rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", chapter(page, model), re.M))
+        assert set(rows) == set(node["properties"])
+        for key, about in node["properties"].items():
+            meaning, kind, default, _example = re.split(r"(?<!\\) \| ", rows[key] + " ", maxsplit=3)
+            assert meaning.strip(), f"{model}.{key} says nothing"
+            assert kind.strip(), f"{model}.{key} has no type"
+            assert (default == "required") == (key in node.get("required", ()))
+            for limit in ("minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum"):
+                if limit in about:
+                    assert re.search(rf"{about[limit]:,g}".replace("+", r"\+"), kind) or (
+                        f"{int(about[limit]):,}" in kind
+                    )
+
+
+def test_every_command_is_on_the_page_of_commands() -> None:
+    from padwatch_reference.commands import commands
+
+    page = filled_page("commands.md")
+    names = [path for path, _, _ in commands()]
+    assert {"padwatch run", "padwatch config check", "padwatch recording export"} < set(names)
+    for name, command, context in commands():
+        assert f"## `{name}`" in page
+        for parameter in command.get_params(context):
+            record = parameter.get_help_record(context)
+            assert record is None or f"`{record[0]}`".replace("|", "\\|") in page
+
+
+def test_every_command_has_help_in_which_no_word_is_lost() -> None:
+    from padwatch_reference.commands import commands
+
+    for name, command, _ in commands():
+        result = padwatch(*name.split()[1:], "--help")
+        assert result.exit_code == 0, name
+        shown = "".join(result.stdout.split())
+        for parameter in command.params:
+            words = getattr(parameter, "help", None) or ""
+            assert "".join(words.split()) in shown, f"{name} {parameter.name}"

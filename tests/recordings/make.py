@@ -14,9 +14,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.blocks import BlockAssembler, RawBlock
+from acquisition.delivery.blocks import BlockAssembler
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
+from core.samples.blocks import SampleBlock
 from service.app.recordings import recording_writer, replay_source
 from service.cli.offline.reanalysis import refreshes
 from service.measuring.simulated_sources import simulated_feed
@@ -39,7 +40,7 @@ class FirstOfJanuary(SystemClock):
         return START_NS
 
 
-def part_load(unit: UnitSettings) -> Iterator[RawBlock]:
+def part_load(unit: UnitSettings) -> Iterator[SampleBlock]:
     """A gap of 25 slots, a probe not OK, a restart."""
     feed = simulated_feed(unit, FirstOfJanuary())
     for number in range(PART_LOAD_SLOTS):
@@ -47,14 +48,14 @@ def part_load(unit: UnitSettings) -> Iterator[RawBlock]:
         if 150 <= number < 175:
             continue
         if 330 <= number < 354:
-            raw = replace(raw, ok=(True, False, True, True))
+            raw.side.ok[1] = False
         if number >= RESTART_SLOT:
             first = raw.first_index - RESTART_SLOT * SLOT
             raw = replace(raw, epoch=raw.epoch + 1, first_index=first)
         yield raw
 
 
-def full_load(unit: UnitSettings) -> Iterator[RawBlock]:
+def full_load(unit: UnitSettings) -> Iterator[SampleBlock]:
     """The x probe falls to 0 V after 30 s, through a few wild samples."""
     feed = simulated_feed(unit, FirstOfJanuary())
     for number in range(FULL_LOAD_SLOTS):
@@ -76,10 +77,10 @@ def record(unit: UnitSettings) -> Path:
     delivery = BlockAssembler(calibration_of(unit))
     with recording_writer(unit, folder, "tests/recordings/make.py") as writer:
         for raw in run(unit):
-            for block in delivery.take(raw):
-                writer.write_block(block)
+            for block in delivery.take([raw]):
+                writer.write(block)
         for block in delivery.flush():
-            writer.write_block(block)
+            writer.write(block)
     return folder
 
 

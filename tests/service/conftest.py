@@ -27,9 +27,11 @@ from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings
+from service.store.access.tables import AccessStore
 from service.store.postgres.connection import PostgresAddress
 from service.store.postgres.database import PostgresDatabase
 from service.store.sqlite import SqliteStore
+from service.store.sqlite.store import open_access_file
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 
@@ -201,6 +203,21 @@ def database_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def store(database_file: Path, tmp_path: Path) -> Iterator[SqliteStore]:
     """An open, empty store, whose file is ``padwatch.sqlite3`` in the folder of the test."""
     with closing(SqliteStore(copy_database(database_file, tmp_path))) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="session")
+def access_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An empty SQLite file of accounts, for copies."""
+    path = tmp_path_factory.mktemp("access") / "access.sqlite3"
+    open_access_file(path).close()
+    return path
+
+
+@pytest.fixture
+def access_store(access_file: Path, tmp_path: Path) -> Iterator[AccessStore]:
+    """Open accounts without any, whose file is ``access.sqlite3`` in the folder of the test."""
+    with closing(open_access_file(copy_database(access_file, tmp_path))) as opened:
         yield opened
 
 

@@ -6,7 +6,7 @@ import signal
 import ssl
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,9 @@ TLS = ssl.create_default_context()
 """Loaded once: a client for each question would load all certificates for each."""
 
 WIRE = 'kind = "modbus_ring"\nhost = "127.0.0.1"\nport = {port}\n'
+SERVING = "service.app.serving_process"
+"""Part of the command line of a serving process."""
+
 ABSENT: Mapping[str, int] = {"U1": 1, "U2": 1}
 """Ports of two units at which nobody listens."""
 
@@ -192,12 +195,35 @@ def write_plant() -> Callable[..., Path]:
     return write_demo
 
 
+def children_of(pid: int) -> dict[int, str]:
+    """Return the command line of each child of a process, by process id."""
+    found = {}
+    for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+        with suppress(FileNotFoundError, ProcessLookupError):  # it has ended meanwhile
+            found[int(child)] = Path(f"/proc/{child}/cmdline").read_text().replace("\0", " ")
+    return found
+
+
 @pytest.fixture
-def children() -> Callable[[int], list[int]]:
-    """Process ids of the children of a process."""
-    return lambda pid: [
-        int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-    ]
+def daq_of() -> Callable[[int], int]:
+    """Process id of the simulated DAQ of a demo or replay, which is a child of it."""
+
+    def find(pid: int) -> int:
+        [daq] = [child for child, line in children_of(pid).items() if SERVING not in line]
+        return daq
+
+    return find
+
+
+@pytest.fixture
+def serving_of() -> Callable[[int], int]:
+    """Process id of the serving process of a measuring process, whose child it is."""
+
+    def find(pid: int) -> int:
+        [serving] = [child for child, line in children_of(pid).items() if SERVING in line]
+        return serving
+
+    return find
 
 
 @pytest.fixture

@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.delivery.blocks import sample_block
-from acquisition.simulated.plant.films import DAMPING_OVER_STIFFNESS_S, Film
 from acquisition.simulated.plant.scenario import ChannelScenario, Scenario
 from acquisition.simulated.plant.unit import SimulatedUnit
 from core.machine.response import HighPass
@@ -59,7 +57,7 @@ def watch(
     rows = bearing_rows(machine)
     held = np.zeros((len(rows), late), dtype=np.int16)
     for _ in range(int(minutes * 60)):
-        block = sample_block([feed.advance(600)], calibration)
+        block = feed.advance(600)
         delayed = np.concatenate([held, block.counts[rows]], axis=1)
         counts = block.counts.copy()
         counts[rows], held = delayed[:, : block.n_samples], delayed[:, block.n_samples :]
@@ -237,22 +235,3 @@ def test_bearing_channels_one_sample_late_are_noticed_and_put_right_in_the_plant
             assert reading.value == pytest.approx(true, abs=4.0 * reading.u_random)
         assert assessment.readings["stiffness_xx_n_per_m"].quality.level is not Level.GOOD
         assert assessment.readings["dynamic_delay_s"].value == pytest.approx(1 / 600, rel=0.25)
-
-
-def test_the_interval_of_transfer_holds_a_film_with_cross_coupling(
-    plant: PlantFile, base: Scenario
-) -> None:
-    k = (1.2e9, -0.33e9, -0.25e9, 0.7e9)
-    film = Film(*k, *(DAMPING_OVER_STIFFNESS_S * stiffness for stiffness in k))
-    bearings = {name: replace(b, film=film) for name, b in base.bearings.items()}
-    for assessment in watch(plant, plant.unit[0], 4, scenario=replace(base, bearings=bearings)):
-        off = [
-            reading.value / film.k_xx_n_per_m - 1.0
-            for prefix in ("order1", "vortex")
-            for reading in [assessment.readings[f"{prefix}_transfer_k_xx_n_per_m"]]
-            if reading.interval_95[0] <= film.k_xx_n_per_m <= reading.interval_95[1]
-        ]
-        assert len(off) == 2
-        assert min(off) < -0.15
-        # dynamic knows the cross-coupling, and that it explains the difference
-        assert assessment.readings["stiffness_xx_n_per_m"].quality.level is Level.GOOD

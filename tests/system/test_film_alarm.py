@@ -5,14 +5,18 @@ service that reads it in real time; and a year of readings from which a baseline
 minutes after the start the film of U2's LJB loses 30 % of its stiffness (`deploy/demo-life.toml`).
 """
 
+import asyncio
+import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from .conftest import Start
+from .conftest import Program, Start
 
+ROOT = Path(__file__).parents[2]
 LOSS = 0.3
 SOFTENED = {"U2:LJB:stiffness_x", "U2:LJB:stiffness_y"}
 PATIENCE_S = 1200.0
@@ -22,6 +26,24 @@ as averages are over two and a half. A busy machine takes several times as long.
 
 def of_films(found: Any) -> set[str]:
     return {alarm["id"] for alarm in found["alarms"] if alarm["kind"].startswith("stiffness_")}
+
+
+def in_danger(found: Any) -> bool:
+    return of_films({"alarms": [a for a in found["alarms"] if a["level"] == "danger"]}) >= SOFTENED
+
+
+async def acknowledge_as_in_the_tutorial(program: Program) -> None:
+    """Run the tutorial's shell example against a program with the alarm."""
+    text = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+    [example] = [sh for sh in re.findall(r"```sh\n(.*?)```", text, re.DOTALL) if "curl" in sh]
+    curl = "curl() { command curl --fail-with-body --noproxy '*' \"$@\"; }"
+    lines = example.replace("http://127.0.0.1:8080", program.url.rstrip("/"))
+    shell = await asyncio.create_subprocess_exec(
+        *("bash", "-euc", f"{curl}\n{lines}"), stdout=asyncio.subprocess.PIPE
+    )
+    answer, _ = await shell.communicate()
+    assert shell.returncode == 0, answer
+    assert json.loads(answer)["is_acknowledged"]
 
 
 @pytest.mark.long
@@ -37,6 +59,7 @@ async def test_a_film_that_loses_stiffness_in_the_machine_is_an_alarm_at_the_api
         "/api/v1/alarms", lambda found: of_films(found) >= SOFTENED, PATIENCE_S
     )
 
+    await acknowledge_as_in_the_tutorial(program)
     assert of_films(before) == set()
     assert of_films(found) == SOFTENED
     units = await program.get("/api/v1/units")
@@ -48,6 +71,7 @@ async def test_a_film_that_loses_stiffness_in_the_machine_is_an_alarm_at_the_api
             cell = alarm["raised_at"]["cell"]
             assert cell["eccentricity_low"] <= alarm["raised_at"]["eccentricity_ratio"]
             assert alarm["raised_at"]["oil_temperature_c"] < cell["oil_temperature_high_c"]
+    await program.until("/api/v1/alarms", in_danger, PATIENCE_S)  # as the tutorial says
     film = await program.get("/api/v1/units/U2/bearings/LJB/film")
     for direction in ("x", "y"):
         assert film[direction]["deviation"]["percent"] == pytest.approx(-100.0 * LOSS, abs=6.0)

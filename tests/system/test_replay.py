@@ -4,6 +4,7 @@ import asyncio
 import json
 import math
 import os
+import re
 import signal
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -19,6 +20,8 @@ RECORDINGS = Path(__file__).parents[1] / "recordings"
 RUNS = {"U1": "part_load", "U2": "full_load"}
 YEAR = {"start": "2026-01-01T00:00:00Z", "end": "2026-01-02T00:00:00Z"}
 N_ALARM_EVENTS = 3
+FILM_GN_PER_M = 0.69
+"""Film stiffness that was simulated in both directions at part load."""
 MOST_QUANTITIES = 40
 WIRES = [
     "modbus_tcp",
@@ -114,11 +117,10 @@ def test_a_replayed_run_gives_the_known_trends_over_http(straight: dict[str, Any
 
 def test_the_known_stiffness_is_the_films(straight: dict[str, Any]) -> None:
     """The known results are judged by what was simulated, not only by themselves."""
-    film_n_per_m = 0.69e9
     for name in ("dynamic_k_xx_n_per_m", "dynamic_k_yy_n_per_m"):
         mean = straight["trends"]["U1"]["series"][name]["mean"]
         usable = [value for value in mean if value is not None]
-        assert usable[-1] == pytest.approx(film_n_per_m, rel=0.1)
+        assert usable[-1] == pytest.approx(FILM_GN_PER_M * 1e9, rel=0.1)
 
 
 @pytest.mark.parametrize("wire", WIRES)
@@ -140,6 +142,28 @@ async def test_a_run_gives_the_same_results_at_any_speed(
 ) -> None:
     paced = await played(start, "--speed", speed, runs=("U2",))
     assert await trends(paced, "U2") == straight["trends"]["U2"]
+
+
+def test_a_replay_prints_the_stiffness_of_each_film_with_its_uncertainty(tmp_path: Path) -> None:
+    command = ("replay", RECORDINGS / "part_load", "--plant", RECORDINGS / "plant.toml")
+    done = padwatch_program(*command, "--speed", "0", "--out", tmp_path / "results")
+
+    assert done.exit_code == 0, done.stderr
+    assert "padwatch: finished" in done.stdout
+    for axis in ("xx", "yy"):
+        line = rf"U1 UJB film stiffness {axis}: (\d\.\d{{3}}) ± (\d\.\d{{3}}) GN/m"
+        found = re.search(line, done.stdout)
+        assert found is not None, done.stdout
+        assert abs(float(found[1]) - FILM_GN_PER_M) < float(found[2])
+
+
+async def test_the_last_result_stays_when_a_replay_has_ended(start: Start) -> None:
+    program = await played(start, "--speed", "0", runs=("U1",))
+
+    latest = await program.get("/api/v1/units/U1/bearings/UJB/latest")
+
+    reading = latest["readings"]["stiffness_xx_n_per_m"]
+    assert reading["value"] == pytest.approx(FILM_GN_PER_M * 1e9, rel=0.1)
 
 
 def test_a_replay_that_only_shall_be_stored_ends_by_itself_and_is_mixed_with_nothing_else(
@@ -167,16 +191,16 @@ def test_a_replay_that_only_shall_be_stored_ends_by_itself_and_is_mixed_with_not
 
 
 async def test_a_replay_whose_daq_is_killed_ends_and_says_that_results_are_incomplete(
-    start: Start, children: Callable[[int], list[int]]
+    start: Start, daq_of: Callable[[int], int]
 ) -> None:
     program = await start(
         *("replay", str(RECORDINGS / "full_load"), "--plant", str(RECORDINGS / "plant.toml")),
         *("--speed", "0.1", "--through", "modbus_tcp", "--out", "results"),
     )
     await program.wait_for_url()
-    [daq] = children(program.pid)
+    daq = daq_of(program.pid)
     os.kill(daq, signal.SIGKILL)
     async with asyncio.timeout(PATIENCE_S):
         assert await program.process.wait() == 1
     await program.end()
-    assert "ended before its recordings; results are incomplete" in program.errors
+    assert "results are incomplete: the simulated DAQ ended early" in program.errors

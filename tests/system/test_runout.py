@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.delivery.blocks import sample_block
 from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.scenario import (
     BearingScenario,
@@ -106,7 +105,7 @@ def record(
 ) -> list[SampleBlock]:
     calibration = calibration_of(settings)
     feed = SimulatedUnit(machine_of(settings), calibration, scenario(channels), 11, 0)
-    return [sample_block([feed.advance(600)], calibration) for _ in range(seconds)]
+    return [feed.advance(600) for _ in range(seconds)]
 
 
 @pytest.fixture(scope="module")

@@ -28,7 +28,7 @@ FEW = (Link.SWALLOWED, Link.FLIPPED)
 OF_THE_PLANT = {"order1_shaft_x", "order1_shaft_y", "channel_not_ok", "samples_lost"}
 """What the plant's own story raises, of which the ledger of alarms judges the first two."""
 
-OF_A_BUSY_HOST = {"questions_refused", "analysis_late", "blocks_waiting"}
+OF_A_BUSY_HOST = {"analysis_late", "blocks_waiting"}
 
 TWO_H, ONE_H = 7200.0, 3600.0
 SINCE_1970_S = -1_790_000_000.0

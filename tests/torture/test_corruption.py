@@ -2,8 +2,9 @@
 
 import shutil
 from collections import Counter
-from collections.abc import Sequence
-from contextlib import closing
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from harness.corruption import CHANGES, corrupted
 from harness.deeds import Build
-from harness.everything import Rows, fill, served
+from harness.everything import Rows, fill, fill_access, served
 from harness.summary import Torture
 from rigs.recording import recorded
 
@@ -19,14 +20,16 @@ from acquisition.errors import ConfigError
 from acquisition.recordings.reader import open_recording
 from acquisition.recordings.summary import summary_of
 from acquisition.recordings.writer import RecordingWriter
+from service.store.access.tables import AccessStore
 from service.store.port import StoreError
 from service.store.seals import SealedTable
 from service.store.sqlite import SqliteStore
-from service.store.sqlite.checking import findings
+from service.store.sqlite.checking import Finding, findings
+from service.store.sqlite.store import open_access_file
 
 N_STORES, N_RECORDINGS = 1600, 5000
 N_DEEDS = 60
-DATABASE = "padwatch.sqlite3"
+DATABASE, ACCESS = "padwatch.sqlite3", "access.sqlite3"
 TARGETS = (
     DATABASE,
     DATABASE,
@@ -35,6 +38,9 @@ TARGETS = (
     DATABASE + "-wal",
     "padwatch.high-water-mark",
     "padwatch.audit-head.json",
+    ACCESS,
+    ACCESS + "-wal",
+    "access.high-water-mark",
 )
 
 
@@ -44,6 +50,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory, torture_seed: int, assessmen
     folder = tmp_path_factory.mktemp("whole")
     live = folder / "live" / DATABASE
     fill(live, torture_seed, N_DEEDS, assessment)
+    fill_access(live.with_name(ACCESS))
     shutil.copytree(live.parent, folder / "data", ignore=shutil.ignore_patterns("*-shm"))
     return folder / "data"
 
@@ -53,12 +60,27 @@ def truth(whole: Path, tmp_path_factory: pytest.TempPathFactory) -> Rows:
     """What is in it."""
     copied = tmp_path_factory.mktemp("truth") / "data"
     shutil.copytree(whole, copied)
-    with closing(SqliteStore(copied / DATABASE)) as store:
-        rows, errors = served(store)
-        assert store.integrity.n_damaged == 0
+    with opened(copied) as stores:
+        rows, errors = served(*stores)
+        assert not any(store.integrity.n_damaged for store in stores)
     assert not errors
-    assert not list(findings(copied / DATABASE))
+    assert not list(all_findings(copied))
     return rows
+
+
+@contextmanager
+def opened(folder: Path) -> Iterator[tuple[SqliteStore, AccessStore]]:
+    """Both files of a data folder, open."""
+    with (
+        closing(SqliteStore(folder / DATABASE)) as store,
+        closing(open_access_file(folder / ACCESS)) as access,
+    ):
+        yield store, access
+
+
+def all_findings(folder: Path) -> Iterator[Finding]:
+    """What a check of both files finds."""
+    return chain.from_iterable(findings(folder / name) for name in (DATABASE, ACCESS))
 
 
 EMPTY: frozenset[tuple[object, ...]] = frozenset()
@@ -67,19 +89,18 @@ EMPTY: frozenset[tuple[object, ...]] = frozenset()
 
 def outcome(folder: Path, truth: Rows) -> tuple[str, set[str]]:
     """What becomes of a damaged folder, and tables of which something wrong is served."""
-    path = folder / DATABASE
-    try:
-        store = SqliteStore(path)
-    except StoreError:
-        return "refused", set()
-    with closing(store):
-        rows, errors = served(store)
-        is_told = bool(errors or store.integrity.n_damaged or store.integrity.found)
+    with ExitStack() as stack:
+        try:
+            stores = stack.enter_context(opened(folder))
+        except StoreError:
+            return "refused", set()
+        rows, errors = served(*stores)
+        is_told = bool(errors) or any(s.integrity.n_damaged or s.integrity.found for s in stores)
     wrong = {table for table, found in rows.items() if found - truth.get(table, EMPTY)}
     is_missing = any(known - rows.get(table, EMPTY) for table, known in truth.items())
     if not is_missing and not errors:
         return ("told" if is_told else "harmless"), wrong
-    if is_told or any(True for _ in findings(path)):
+    if is_told or any(True for _ in all_findings(folder)):
         return "told", wrong
     return "silent", wrong
 
@@ -140,8 +161,8 @@ def read(folder: Path) -> bytes:
     """Everything that a recording hands out."""
     opened = open_recording(folder)
     blocks = [
-        f"{b.epoch} {b.first_index} {b.start_ns} {b.ok} {b.slow}".encode() + b.counts.tobytes()
-        for b in opened.raw_blocks()
+        f"{b.epoch} {b.first_index} {b.start_ns} {b.side} {b.slow}".encode() + b.counts.tobytes()
+        for b in opened.blocks()
     ]
     told = f"{opened.manifest} {summary_of(opened).n_samples}"
     return told.encode() + b"".join(blocks)

@@ -2,8 +2,9 @@
 
 import csv
 import math
+import re
 from collections.abc import Callable, Iterator, Sequence
-from itertools import compress, islice
+from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO, TypeAlias
 
@@ -19,8 +20,6 @@ from acquisition.recordings.imports.times import TimeArray, from_start, numbers_
 from core.arrays import FloatArray, RawArray
 
 CUT_OFF = "the line has no line end; add it if the file is complete"
-
-OR_BEFORE = " or a line shortly before it"
 
 MAX_LINE_BYTES = 1_000_000
 MAX_COLUMNS = 4096
@@ -51,6 +50,7 @@ class _CsvFile:
     def __init__(self, stream: BinaryIO, job: ImportJob) -> None:
         self._job, self._stream = job, stream
         self._n_lines = self._n_rows = 0
+        self._line_of: list[int] = []  # line numbers of the rows in memory
         for _ in range(job.csv.header_line - 1):
             next(self._lines(), None)
         self._cells = self._parsed()
@@ -79,6 +79,7 @@ class _CsvFile:
                 done=min(self._stream.tell() / n_bytes, 1.0),
             )
             self._n_rows += len(table)
+            self._line_of.clear()
 
     def _lines(self) -> Iterator[str]:
         while line := self._stream.readline(MAX_LINE_BYTES + 1):
@@ -104,6 +105,7 @@ class _CsvFile:
         for row in filter(None, self._cells):  # skips empty lines
             if len(row) != len(self._headings):
                 raise self._wrong(f"expected {len(self._headings)} columns, got {len(row)}")
+            self._line_of.append(self._n_lines)
             yield row
 
     def _column(self, place: ColumnName) -> int:
@@ -126,14 +128,17 @@ class _CsvFile:
             pairs = zip(self._job.channels, values, strict=True)
             return np.stack([engineering_units(v, channel, None) for channel, v in pairs])
         counts = np.stack(values)
-        if not np.all((counts == np.rint(counts)) & (np.abs(counts + 0.5) < 32768)):
-            raise self._wrong("a value is not a count of a 16-bit converter", OR_BEFORE)
+        is_count = np.all((counts == np.rint(counts)) & (np.abs(counts + 0.5) < 32768), axis=0)
+        if not np.all(is_count):
+            line = self._line_of[int(np.argmin(is_count))]
+            raise self._wrong("a value is not a count of a 16-bit converter", line)
         return counts.astype(np.int16)
 
     def _slow_values(self, number: int, columns: _Columns) -> FloatArray:
         column, texts = self._job.slow[number], columns[self._slow[number]]
         is_given = [bool(text.strip()) for text in texts]
-        given = self._numbers(list(compress(texts, is_given))) * column.factor + column.offset
+        numbers = self._numbers([text if text.strip() else "" for text in texts])
+        given = numbers[is_given] * column.factor + column.offset
         found: FloatArray = np.append(self._newest[number], given)[np.cumsum(is_given)]
         self._newest[number] = float(found[-1])
         return found
@@ -142,17 +147,22 @@ class _CsvFile:
         self, texts: Sequence[str], of: Callable[[str], Any] = _number, noun: str = "number"
     ) -> npt.NDArray[Any]:
         """Return the numbers of a column; thousands separators are refused as ambiguous."""
-        decimal, found, text = self._job.csv.decimal, [], ""
+        decimal, found = self._job.csv.decimal, list[Any]()
         for mark in {"_", "."} - {decimal}:
             if mark in "".join(texts):
-                text = next(text for text in texts if mark in text)
-                raise self._wrong(f"number {text[:40]!r} contains {mark!r}", OR_BEFORE)
+                row, text = next((n, text) for n, text in enumerate(texts) if mark in text)
+                raise self._wrong(f"number {text[:40]!r} contains {mark!r}", self._line_of[row])
         try:
             for text in texts:
                 found.append(of(text.replace(decimal, ".")))
         except (ValueError, OverflowError) as error:
-            raise self._wrong(f"{text[:40]!r} is not a valid {noun}", OR_BEFORE) from error
+            text = texts[len(found)]
+            what = f"{text[:40]!r} is not a valid {noun}"
+            if decimal == "." and re.fullmatch(r"\s*[+-]?\d+,\d+\s*", text):
+                what += '; if the comma is the decimal separator, set csv.decimal = ","'
+            raise self._wrong(what, self._line_of[len(found)]) from error
         return np.array(found)
 
-    def _wrong(self, what: str, or_before: str = "") -> ConfigError:
-        return ConfigError(f"line {self._n_lines}{or_before}: {what}")
+    def _wrong(self, what: str, line: int | None = None) -> ConfigError:
+        """Return the error of a line, by default of the line that was read last."""
+        return ConfigError(f"line {line or self._n_lines}: {what}")

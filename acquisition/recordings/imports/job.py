@@ -1,9 +1,15 @@
 """`ImportJob`: mapping of the columns of a file to channels, and time axis of the file."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from core.samples.calibration import BLOCK_SAMPLES
+from core.samples.calibration import (
+    BLOCK_SAMPLES,
+    UNLIMITED,
+    SlowCalibration,
+    UnitCalibration,
+)
 
 Format: TypeAlias = Literal["mdf4", "tdms", "hdf5", "csv", "candump", "blf"]
 TimeKind: TypeAlias = Literal["file", "column", "start"]
@@ -147,3 +153,10 @@ class ImportJob:
     block_samples: int = BLOCK_SAMPLES
     csv: CsvLayout = CsvLayout()
     bus: str = ""
+
+    @property
+    def calibration(self) -> UnitCalibration:
+        """Calibration of the imported blocks, without unit id, gains and limits."""
+        slow = tuple(SlowCalibration(column.id, -math.inf, math.inf) for column in self.slow)
+        channels = (UNLIMITED,) * len(self.channels)
+        return UnitCalibration("", self.rate_hz, channels, slow, self.block_samples)

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob
 from acquisition.recordings.imports.times import TimeArray
 from core.arrays import FloatArray, RawArray
+from core.samples.blocks import SampleBlock, SideValues
 from core.units import NS_PER_S
 
 _PIECE = 512
@@ -171,35 +171,33 @@ class Indexer:
         )
 
 
-def raw_blocks(table: Iterable[Rows], job: ImportJob) -> Iterator[tuple[RawBlock, float]]:
+def sample_blocks(table: Iterable[Rows], job: ImportJob) -> Iterator[tuple[SampleBlock, float]]:
     """Yield the blocks of a file in order, each with the fraction of the file read so far.
 
-    Blocks end at multiples of the unit's block length and at the end of each piece read. The slow
-    values of a block are those valid at its first sample.
+    A block ends at a gap and at the end of each piece read. Its cells begin at multiples of the
+    unit's block length; the slow values of a cell are those valid at its first sample.
 
     Raises
     ------
     ConfigError
         If the times are inconsistent with the sampling rate of the unit.
     """
-    indexer = Indexer(job.rate_hz, job.time.tolerance)
+    indexer, calibration = Indexer(job.rate_hz, job.time.tolerance), job.calibration
     for rows in table:
         for stretch in indexer.stretches(rows.times_ns):
-            for raw in _pieces(rows, stretch, job):
-                yield raw, rows.done
-
-
-def _pieces(rows: Rows, stretch: Stretch, job: ImportJob) -> Iterator[RawBlock]:
-    """Yield blocks of a range of rows, split at multiples of the block length."""
-    to_grid = -stretch.first_index % job.block_samples or job.block_samples
-    starts = [stretch.start, *range(stretch.start + to_grid, stretch.stop, job.block_samples)]
-    for start, stop in zip(starts, [*starts[1:], stretch.stop], strict=True):
-        yield RawBlock(
-            epoch=stretch.epoch,
-            first_index=stretch.first_index + start - stretch.start,
-            start_ns=int(rows.times_ns[start]),
-            rate_hz=job.rate_hz,
-            counts=rows.samples[:, start:stop],
-            ok=(True,) * len(job.channels),
-            slow=tuple(float(values[start]) for values in rows.slow),
-        )
+            length, first_index = job.block_samples, stretch.first_index
+            to_grid = -first_index % length or length
+            starts = np.append(0, np.arange(to_grid, stretch.stop - stretch.start, length))
+            at = stretch.start + starts
+            slow = np.array([values[at] for values in rows.slow]).reshape(-1, len(at))
+            is_ok = np.ones((len(job.channels), len(at)), dtype=np.bool_)
+            yield (
+                SampleBlock(
+                    calibration=calibration,
+                    epoch=stretch.epoch,
+                    first_index=first_index,
+                    counts=rows.samples[:, stretch.start : stretch.stop],
+                    side=SideValues(starts, rows.times_ns[at], is_ok, slow),
+                ),
+                rows.done,
+            )

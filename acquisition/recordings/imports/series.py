@@ -234,7 +234,7 @@ def require_one(found: Sequence[Any], place: ColumnName, known: Sequence[str]) -
 
 
 def counts_are_kept(job: ImportJob, per_count: Sequence[float | None]) -> bool:
-    """Whether all columns hold counts whose gain is that in the calibration of their channel.
+    """Return whether all columns are counts with the gain of their channel's calibration.
 
     Parameters
     ----------

@@ -7,11 +7,11 @@ from typing import TypeAlias
 
 import numpy as np
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.simulated.devices.can_frames import FrameEncoder, FrameKind, WireFrame, shortened
 from acquisition.simulated.devices.can_shape import CanShape
 from acquisition.simulated.feed import FeedEndedError, Ledger, SampleFeed
+from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
 
 Item: TypeAlias = WireFrame | bytes
@@ -26,11 +26,8 @@ _FLOOD = 10
 class FrameFaults:
     """Injector of faults into waveform frames, one fault per frame, in the order of injection.
 
-    Parameters
-    ----------
-    as_line
-        Function that encodes a frame as a line of the slcan text protocol, for faults of lines;
-        None if frames are not sent as text.
+    `as_line` encodes a frame as a line of the slcan text protocol, for faults of lines; None if
+    frames are not sent as text.
     """
 
     def __init__(self, as_line: Callable[[WireFrame], bytes] | None = None) -> None:
@@ -56,7 +53,7 @@ class FrameFaults:
             }
 
     def inject(self, fault: str, count: int) -> None:
-        """Queue a fault, a key of `known`, for `count` waveform frames."""
+        """Queue a fault, a key of `known`, for the next `count` waveform frames without a fault."""
         self._waiting.extend([self.known[fault]] * count)
 
     def applied(self, frames: Iterable[WireFrame]) -> list[Item]:
@@ -107,10 +104,8 @@ class CanDevice:
 
     Parameters
     ----------
-    feed
-        Source of the samples.
     shape
-        Channels and message format.
+        Channels and message format; the channels must be those of `feed`.
     unit
         Name of the unit in the ledger.
     ledger
@@ -131,6 +126,8 @@ class CanDevice:
     ------
     ConfigError
         If feed and shape differ in the number of channels or in the sample type.
+    FeedEndedError
+        If the feed is empty.
     """
 
     def __init__(
@@ -197,7 +194,7 @@ class CanDevice:
         self._n_restarts += 1
         self._index_offset = None
 
-    def _take(self, raw: RawBlock) -> None:
+    def _take(self, raw: SampleBlock) -> None:
         self._pass_time(raw)
         if self._index_offset is None:
             self._index_offset = -raw.first_index
@@ -213,7 +210,7 @@ class CanDevice:
             self._last = self._encoder.frames(sent)
         self._waiting.append(self._last)
 
-    def _pass_time(self, raw: RawBlock) -> None:
+    def _pass_time(self, raw: SampleBlock) -> None:
         """Add the duration of a block, and of a gap before the block, to `elapsed_ns`."""
         epoch, stop = self._stop
         n_passed = raw.stop_index - stop
@@ -223,13 +220,13 @@ class CanDevice:
         self.elapsed_ns += round(n_passed * NS_PER_S / raw.rate_hz)
 
 
-def _require_fit(first: RawBlock, shape: CanShape) -> None:
-    found = (len(first.counts), len(first.slow))
+def _require_fit(first: SampleBlock, shape: CanShape) -> None:
+    found = (len(first.counts), len(first.side.slow))
     expected = (len(shape.channels), len(shape.slow))
     if found != expected:
         raise ConfigError(
-            f"simulated CAN DAQ: numbers of channels and slow channels of the feed are {found},"
-            f" expected {expected}"
+            f"simulated CAN DAQ: the feed has {found[0]} channels and {found[1]} slow channels,"
+            f" expected {expected[0]} and {expected[1]}"
         )
     floats = first.counts.dtype.kind == "f"
     if floats != shape.floats:

@@ -6,8 +6,8 @@ from enum import Enum
 import numpy as np
 from can.util import CAN_FD_DLC
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.simulated.devices.can_shape import CanShape, MessageShape
+from core.samples.blocks import SampleBlock
 
 _NS_PER_US = 1000
 _US_PER_S = 1_000_000
@@ -53,7 +53,7 @@ class FrameEncoder:
         self._waves = shape.waves
         self._shape = shape
 
-    def frames(self, raw: RawBlock) -> list[WireFrame]:
+    def frames(self, raw: SampleBlock) -> list[WireFrame]:
         """Return all frames of a block in transmission order."""
         values = self._head_values(raw)
         frames = [self._head(message, values) for message in self._heads]
@@ -61,19 +61,19 @@ class FrameEncoder:
         frames += [frame for instant in zip(*columns, strict=True) for frame in instant]
         return frames
 
-    def _head_values(self, raw: RawBlock) -> dict[str, float]:
+    def _head_values(self, raw: SampleBlock) -> dict[str, float]:
         seconds, microseconds = divmod(raw.start_ns // _NS_PER_US, _US_PER_S)
         values: dict[str, float] = {
             "index": raw.first_index % _U32,
             "counter": raw.first_index % _U16,
             "epoch": raw.epoch % _U32,
             "n_samples": raw.n_samples,
-            "ok": sum(1 << c for c, ok in enumerate(raw.ok) if ok),
+            "ok": sum(1 << c for c, ok in enumerate(raw.side.ok[:, 0]) if ok),
             "seconds": seconds,
             "microseconds": microseconds,
         }
         names = [f.name for m in self._heads for f in m.fields if f.name not in values]
-        return values | dict(zip(names, raw.slow, strict=True))
+        return values | dict(zip(names, raw.side.slow[:, 0].tolist(), strict=True))
 
     def _head(self, message: MessageShape, values: dict[str, float]) -> WireFrame:
         record = message.records(1)
@@ -81,7 +81,7 @@ class FrameEncoder:
             record[field.name] = values[field.name]
         return self._frame(message, record.tobytes(), wave=False)
 
-    def _wave(self, message: MessageShape, raw: RawBlock) -> list[WireFrame]:
+    def _wave(self, message: MessageShape, raw: SampleBlock) -> list[WireFrame]:
         n_per_frame = self._shape.samples_per_frame
         n_frames = -(-raw.n_samples // n_per_frame)
         first = np.arange(n_frames) * n_per_frame

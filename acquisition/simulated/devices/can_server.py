@@ -33,7 +33,7 @@ class CanDaqServer(DaqServer):
         Whether, with a clock, production waits while no client is connected or the buffer is full,
         so that no block is lost. Otherwise the oldest blocks are lost.
     as_line
-        Function that encodes a frame as a line of a text protocol; None without text protocol.
+        Function that encodes a frame as a line of a text protocol; None without such a protocol.
     """
 
     def __init__(
@@ -126,7 +126,8 @@ class CanBusServer(CanDaqServer):
     """Server that sends the frames of one simulated CAN device on a python-can bus.
 
     The interface "virtual" is limited to one process. "udp_multicast" reaches other processes and
-    hosts over the route to its group, usually the default route; slow readers lose frames.
+    hosts over the route to its group, usually the default route; slow readers lose frames. Other
+    parameters are those of `CanDaqServer`.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Field:
-    """Signal of a CAN message; `offset` is in bytes."""
+    """Signal of a CAN message, `offset` bytes after its start; one count is `factor` in `unit`."""
 
     name: str
     offset: int
@@ -50,12 +50,10 @@ class Field:
 
 @dataclass(frozen=True)
 class MessageShape:
-    """CAN message of the simulated DAQ.
+    """CAN message of the simulated DAQ; `length` is in bytes.
 
-    Parameters
-    ----------
-    first_channel
-        Index of the first channel of a waveform message; None for other messages.
+    `first_channel` is the index of the first channel of a waveform message; None for other
+    messages.
     """
 
     name: str
@@ -88,10 +86,7 @@ class MessageShape:
 class DaqSignal:
     """Channel of the simulated DAQ in the DBC file.
 
-    Parameters
-    ----------
-    unit, factor
-        Unit of the values, and value of one count in this unit; 1 for float32 samples.
+    One count is `factor` in the unit `unit`; `factor` is 1 for float32 samples.
     """
 
     id: str
@@ -105,6 +100,8 @@ class CanShape:
 
     Parameters
     ----------
+    fd, extended
+        Whether the frames are CAN FD frames, and whether their ids have 29 bits.
     floats
         Whether samples are float32 in engineering units rather than int16 counts.
     base_id
@@ -132,8 +129,8 @@ class CanShape:
         highest = (1 << 29) - 1 if self.extended else (1 << 11) - 1
         if not 0 <= self.base_id <= highest - len(self.messages) + 1:
             raise ConfigError(
-                f"simulated CAN DAQ: {len(self.messages)} messages from base_id {self.base_id}"
-                f" exceed the highest CAN id, {highest}"
+                f"simulated CAN DAQ: base_id must be 0 to {highest - len(self.messages) + 1}"
+                f" for {len(self.messages)} messages, got {self.base_id}"
             )
 
     @property
@@ -143,7 +140,7 @@ class CanShape:
 
     @property
     def messages(self) -> tuple[MessageShape, ...]:
-        """All messages in transmission order of a block."""
+        """All messages of a block in transmission order."""
         shapes = [*(self._fd_heads() if self.fd else self._classic_heads()), *self._waves()]
         return tuple(
             MessageShape(
@@ -160,7 +157,7 @@ class CanShape:
 
     @property
     def waves(self) -> tuple[MessageShape, ...]:
-        """Waveform messages, which carry samples."""
+        """Waveform messages, which carry samples, in transmission order."""
         return tuple(m for m in self.messages if m.first_channel is not None)
 
     def _classic_heads(self) -> "list[_Shape]":

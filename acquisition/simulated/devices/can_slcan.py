@@ -72,7 +72,7 @@ class _SlcanServer(CanDaqServer):
 
     @abstractmethod
     def cut(self) -> None:
-        """Close the connection abruptly, like a brief interruption of the cable."""
+        """Close the client's connection abruptly, like a brief interruption of the cable."""
 
     @abstractmethod
     async def _write(self, data: bytes) -> None:
@@ -102,12 +102,10 @@ class _SlcanServer(CanDaqServer):
 
 
 class SlcanTcpServer(_SlcanServer):
-    """slcan adapter on a TCP port; a new client replaces the previous client.
+    """Simulated slcan adapter on a TCP port; a new client replaces the previous client.
 
-    Parameters
-    ----------
-    port
-        TCP port; 0 selects a free port, which is kept when the server is entered again.
+    Port 0 selects a free port, which is kept when the server is entered again. The other parameters
+    are those of `CanDaqServer`.
     """
 
     def __init__(
@@ -136,7 +134,9 @@ class SlcanTcpServer(_SlcanServer):
         try:
             self._server = await asyncio.start_server(self._accept, self._host, self._port)
         except OSError as exc:
-            raise LinkError(f"cannot listen on {where}: {exc.strerror}") from exc
+            raise LinkError(
+                f"cannot listen on {where}: {exc.strerror}; choose another port"
+            ) from exc
         self._port = self._server.sockets[0].getsockname()[1]
 
     async def _pull_out(self) -> None:
@@ -176,12 +176,10 @@ class SlcanTcpServer(_SlcanServer):
 
 
 class SlcanPtyServer(_SlcanServer):
-    """slcan adapter on a pseudo-terminal.
+    """Simulated slcan adapter on a pseudo-terminal.
 
-    Parameters
-    ----------
-    link
-        Path of a symbolic link to the terminal; None for no link.
+    `link` is the path of a symbolic link to the terminal; None for no link. The other parameters
+    are those of `CanDaqServer`.
     """
 
     def __init__(

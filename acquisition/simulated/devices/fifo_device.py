@@ -7,12 +7,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
 from acquisition.simulated.devices.modbus_device import ModbusDevice
 from acquisition.simulated.feed import Ledger, SampleFeed
 from core.arrays import CountArray
+from core.samples.blocks import SampleBlock
 
 _Record: TypeAlias = tuple[int, CountArray]
 """Sample in a queue: counter and counts, (n_channels,) if interleaved, otherwise (1,)."""
@@ -24,14 +24,12 @@ _ON_DEMAND_STEPS = 16
 class FifoDevice(ModbusDevice):
     """Simulated Modbus device of one unit with sample queues; a full queue drops its oldest sample.
 
+    `unit` and `ledger` are those of `ModbusDevice`.
+
     Parameters
     ----------
-    feed
-        Source of the samples.
     layout
         Register addresses and format of the queues.
-    unit
-        Name of the unit in the ledger.
     depth_samples
         Maximum number of samples in a queue.
     step_samples
@@ -69,7 +67,8 @@ class FifoDevice(ModbusDevice):
         self._n_dropped = 0
         first = self._feed.peek()
         if first is None or first.counts.dtype != np.int16:
-            raise ConfigError("simulated FIFO queue: the feed must have 16-bit counts")
+            found = "no samples" if first is None else f"{first.counts.dtype} samples"
+            raise ConfigError(f"simulated FIFO queue: samples must be 16-bit counts, got {found}")
         self._rate_hz, self._feed_epoch = first.rate_hz, first.epoch
         self._position = self._feed.number(first) - 1
         self._offset = first_counter - first.first_index
@@ -99,7 +98,7 @@ class FifoDevice(ModbusDevice):
             self._offset = -ahead.first_index
 
     def read_fifo(self, address: int) -> bytes | None:
-        """Return the registers of the queue at an address; None if no queue has this address."""
+        """Return the queue at an address as big-endian words; None if there is no such queue."""
         if address not in self._layout.addresses:
             return None
         queue = self._queues[self._layout.addresses.index(address)]
@@ -109,7 +108,7 @@ class FifoDevice(ModbusDevice):
             self._look()
         return data
 
-    def _show(self, raw: RawBlock) -> None:
+    def _show(self, raw: SampleBlock) -> None:
         if raw.epoch != self._feed_epoch:
             self._offset = -raw.first_index
         self.ledger.offer(self._unit, raw.epoch, raw.n_samples)

@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.modbus.read_plan import plan_reads
 from acquisition.modbus.register_map import MapValue, RegisterMap
@@ -14,6 +13,7 @@ from acquisition.simulated.devices.modbus_device import ModbusDevice
 from acquisition.simulated.devices.register_image import RegisterImage, no_value
 from acquisition.simulated.feed import Ledger, SampleFeed
 from core.arrays import FloatArray
+from core.samples.blocks import SampleBlock
 from core.samples.calibration import UnitCalibration
 from core.spectra.lines import part_phasors, turning_factors
 from core.spectra.polls import VectorPart, VectorRow
@@ -26,10 +26,10 @@ _SENTINEL, _FLAG = "sentinel", "flag"
 class MapDevice(ModbusDevice):
     """Simulated Modbus device of one unit with the newest sample of each channel in registers.
 
+    `unit` and `ledger` are those of `ModbusDevice`.
+
     Parameters
     ----------
-    feed
-        Source of the samples.
     registers
         Register map. The device writes the values with an id in `rows`, or with the id of a slow
         channel of the calibration; all other values remain zero.
@@ -46,6 +46,11 @@ class MapDevice(ModbusDevice):
         Contents of the registers.
     newest
         Block of `step_samples` samples of the last update.
+
+    Raises
+    ------
+    ConfigError
+        If the feed has no run of `step_samples` samples without a gap.
     """
 
     def __init__(
@@ -67,7 +72,9 @@ class MapDevice(ModbusDevice):
         self._spoilt: Counter[str] = Counter()
         self._beat = 0
         if self._feed.peek() is None:
-            raise ConfigError("simulated Modbus device: the feed has no samples")
+            raise ConfigError(
+                f"simulated Modbus device: the feed has no run of {step_samples} samples"
+            )
         self._take()
 
     @property
@@ -82,12 +89,12 @@ class MapDevice(ModbusDevice):
         return {**super().faults, **spoils}
 
     def read_registers(self, function: int, address: int, count: int) -> bytes | None:
-        """Return registers as big-endian words; None if an address does not exist."""
+        """Return `count` registers as big-endian words; None if an address does not exist."""
         self._look(function, address)
         return self.image.read_registers(function, address, count)
 
     def read_bits(self, function: int, address: int, count: int) -> bytes | None:
-        """Return bits packed in bytes, low bit first; None if an address does not exist."""
+        """Return `count` bits packed in bytes, low bit first; None if an address does not exist."""
         self._look(function, address)
         return self.image.read_bits(function, address, count)
 
@@ -101,7 +108,7 @@ class MapDevice(ModbusDevice):
     def _spoil_values(self, fault: str, count: int) -> None:
         self._spoilt[fault] += count
 
-    def _show(self, raw: RawBlock) -> None:
+    def _show(self, raw: SampleBlock) -> None:
         self.newest = raw
         self.ledger.offer(self._unit, raw.epoch, raw.n_samples)
         self._spoilt, spoilt = self._spoilt - Counter((_SENTINEL, _FLAG)), self._spoilt
@@ -115,14 +122,17 @@ class MapDevice(ModbusDevice):
             self.image.put(self._map.heartbeat, self._beat)
         self.image.put_time(raw.start_ns)
 
-    def _numbers(self, raw: RawBlock, units: FloatArray) -> dict[str, tuple[float, bool]]:
+    def _numbers(self, raw: SampleBlock, units: FloatArray) -> dict[str, tuple[float, bool]]:
         """Return the number in engineering units, and whether its channel is OK, by value id."""
         channels = {
             row: (float(samples[-1]), ok)
-            for row, samples, ok in zip(self._rows, units, raw.ok, strict=True)
+            for row, samples, ok in zip(self._rows, units, raw.side.ok[:, 0].tolist(), strict=True)
         }
-        slow = {c.id: (v, True) for c, v in zip(self._calibration.slow, raw.slow, strict=True)}
-        return channels | slow
+        return channels | self._slow_numbers(raw)
+
+    def _slow_numbers(self, raw: SampleBlock) -> dict[str, tuple[float, bool]]:
+        numbers = raw.side.slow[:, 0].tolist()
+        return {c.id: (n, True) for c, n in zip(self._calibration.slow, numbers, strict=True)}
 
     def _write(self, value: MapValue, number: float, good: bool, is_error: bool) -> None:
         self.image.put_value(value, number)
@@ -132,8 +142,11 @@ class MapDevice(ModbusDevice):
             self.image.put_flag(flag, good)
 
 
-def in_units(raw: RawBlock, calibration: UnitCalibration) -> FloatArray:
-    """Return the samples of a raw block in engineering units, (n_channels, n_samples)."""
+def in_units(raw: SampleBlock, calibration: UnitCalibration) -> FloatArray:
+    """Return the samples of a block in engineering units, (n_channels, n_samples), as float64.
+
+    Samples that are float32 are in engineering units already.
+    """
     if raw.counts.dtype == np.float32:
         return raw.counts.astype(np.float64)
     gain = np.array([channel.unit_per_count for channel in calibration.channels])
@@ -144,7 +157,8 @@ def in_units(raw: RawBlock, calibration: UnitCalibration) -> FloatArray:
 class VectorDevice(MapDevice):
     """Simulated monitoring rack of one unit: amplitudes and phases over a window of samples.
 
-    At constant speed phases refer to a key-phase mark at sample index 0 of the feed.
+    At constant speed, phases refer to a key-phase mark at sample index 0 of the feed. The other
+    parameters are those of `MapDevice`.
 
     Parameters
     ----------
@@ -178,10 +192,10 @@ class VectorDevice(MapDevice):
         self._vector_rows, self._vortex_order = rows, vortex_order
         self._channel = {id_: n for n, id_ in enumerate(channels)}
         self._speed = [slow.id for slow in calibration.slow].index(speed_channel)
-        self._window: deque[RawBlock] = deque(maxlen=window_samples // step_samples)
+        self._window: deque[SampleBlock] = deque(maxlen=window_samples // step_samples)
         super().__init__(feed, registers, (), calibration, unit, step_samples, ledger)
 
-    def _numbers(self, raw: RawBlock, units: FloatArray) -> dict[str, tuple[float, bool]]:  # noqa: ARG002
+    def _numbers(self, raw: SampleBlock, units: FloatArray) -> dict[str, tuple[float, bool]]:  # noqa: ARG002
         if self._window and (self._window[-1].epoch, self._window[-1].stop_index) != (
             raw.epoch,
             raw.first_index,
@@ -189,15 +203,16 @@ class VectorDevice(MapDevice):
             self._window.clear()
         self._window.append(raw)
         samples = np.concatenate([in_units(r, self._calibration) for r in self._window], axis=1)
-        found = self._parts(samples, self._window[0].first_index, raw.slow[self._speed])
-        ok = np.all([r.ok for r in self._window], axis=0)
+        found = self._parts(
+            samples, self._window[0].first_index, float(raw.side.slow[self._speed, 0])
+        )
+        ok = np.all([r.side.ok[:, 0] for r in self._window], axis=0)
         vectors = {
             row.id: (float(found[row.part][n]), bool(ok[n]))
             for row in self._vector_rows
             for n in [self._channel[row.channel]]
         }
-        slow = {c.id: (v, True) for c, v in zip(self._calibration.slow, raw.slow, strict=True)}
-        return vectors | slow
+        return vectors | self._slow_numbers(raw)
 
     def _parts(
         self, samples: FloatArray, first_index: int, speed_rpm: float

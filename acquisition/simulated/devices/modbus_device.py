@@ -7,8 +7,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.simulated.feed import Ledger, SampleFeed, SlotFeed
+from core.samples.blocks import SampleBlock
 
 _ADDRESS_AND_COUNT = struct.Struct(">HH")
 _ADDRESS = struct.Struct(">H")
@@ -30,12 +30,12 @@ class ModbusDevice(ABC):
 
     Parameters
     ----------
-    feed
-        Source of the samples.
     step_samples
         Number of samples per channel in a step, which are produced together.
     unit
-        Name of the unit in the ledger.
+        Name of the unit in `ledger`, which counts the produced samples.
+    ledger
+        Count of the produced samples; a new one if None.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class ModbusDevice(ABC):
 
     @property
     def drained(self) -> bool:
-        """Whether the feed has ended and a client has read all data and read again."""
+        """Whether the feed has ended, and clients have read twice without new data."""
         return self.ended and self._n_looks >= _LAST_LOOKS
 
     @property
@@ -79,7 +79,7 @@ class ModbusDevice(ABC):
         self.faults[fault](count)
 
     def produce(self, n_steps: int = 1) -> None:
-        """Advance the time of the device by `n_steps` steps and produce their data."""
+        """Advance the time of the device by `n_steps` steps, and produce the data unless frozen."""
         for _ in range(0 if self.frozen else n_steps):
             if self._n_frozen:
                 self._n_frozen -= 1
@@ -95,11 +95,11 @@ class ModbusDevice(ABC):
                 self._take()
 
     def read_registers(self, function: int, address: int, count: int) -> bytes | None:  # noqa: ARG002
-        """Return registers as big-endian words; None if an address does not exist."""
+        """Return `count` registers as big-endian words; None if an address does not exist."""
         return None
 
     def read_bits(self, function: int, address: int, count: int) -> bytes | None:  # noqa: ARG002
-        """Return bits packed in bytes, low bit first; None if an address does not exist."""
+        """Return `count` bits packed in bytes, low bit first; None if an address does not exist."""
         return None
 
     def read_fifo(self, address: int) -> bytes | None:  # noqa: ARG002
@@ -107,7 +107,7 @@ class ModbusDevice(ABC):
         return None
 
     @abstractmethod
-    def _show(self, raw: RawBlock) -> None:
+    def _show(self, raw: SampleBlock) -> None:
         """Write the data of a step to the registers or queues."""
 
     def _take(self) -> None:
@@ -117,7 +117,7 @@ class ModbusDevice(ABC):
             self._show(raw)
             self._position, self._feed_epoch = self._feed.number(raw), raw.epoch
 
-    def _must_wait(self, ahead: RawBlock) -> bool:  # noqa: ARG002
+    def _must_wait(self, ahead: SampleBlock) -> bool:  # noqa: ARG002
         """Return whether the step `ahead` must wait until a client has read previous data."""
         return False
 
@@ -212,7 +212,7 @@ class RegisterMemory:
         self._data[:] = bytes(len(self._data))
 
     def read(self, address: int, count: int) -> bytes | None:
-        """Return registers as big-endian words; None if a register does not exist."""
+        """Return `count` registers as big-endian words; None if a register does not exist."""
         if self.before_read is not None:
             self.before_read(address, count)
         offset = 2 * (address - self._start)
@@ -233,11 +233,11 @@ _REGISTER_FUNCTIONS = (3, 4)
 
 
 class HangUpError(Exception):
-    """The device closes the connection instead of sending a reply."""
+    """Error raised if the device closes the connection instead of sending a reply."""
 
 
 def hanging_up(request: bytes, answerer: Answerer) -> bytes:  # noqa: ARG001
-    """Reply fault: close the connection without a reply."""
+    """Raise `HangUpError`, so that the server closes the connection without a reply."""
     raise HangUpError
 
 
@@ -247,13 +247,13 @@ def refusing(code: int) -> ReplyFault:
 
 
 def shifted_map(request: bytes, answerer: Answerer) -> bytes:
-    """Reply fault: reply with the data of the next address, as after a firmware change."""
+    """Return a reply with the data of the next address, as after a firmware change."""
     address = int.from_bytes(request[1:3], "big") + 1
     return answerer(request[:1] + (address & 0xFFFF).to_bytes(2, "big") + request[3:])
 
 
 def swapped_words(request: bytes, answerer: Answerer) -> bytes:
-    """Reply fault: exchange the two words of each pair of registers in the correct reply."""
+    """Return the correct reply with the two words of each pair of registers exchanged."""
     reply = answerer(request)
     n_pairs = (len(reply) - 2) // 4
     if reply[0] not in _REGISTER_FUNCTIONS or not n_pairs:

@@ -27,10 +27,8 @@ _MAX_REQUEST_BYTES = 8
 class ModbusTcpServer(ModbusServer):
     """Modbus TCP server of a simulated device, for any number of clients.
 
-    Parameters
-    ----------
-    port
-        TCP port; 0 selects a free port, which the attribute ``port`` contains after entering.
+    Port 0 selects a free port, which the attribute `port` contains after entering. The other
+    parameters are those of `ModbusServer`.
 
     Raises
     ------
@@ -68,7 +66,10 @@ class ModbusTcpServer(ModbusServer):
         try:
             self._server = await loop.create_server(self._accept, self._host, self.port)
         except OSError as exc:
-            raise LinkError(f"cannot listen on {self._host}:{self.port}: {exc.strerror}") from exc
+            where = f"{self._host}:{self.port}"
+            raise LinkError(
+                f"cannot listen on {where}: {exc.strerror}; choose another port"
+            ) from exc
         self.port = self._server.sockets[0].getsockname()[1]
 
     async def _pull_out(self) -> None:
@@ -131,15 +132,8 @@ class _Connection(asyncio.Protocol):
 class ModbusRtuServer(ModbusServer):
     """Modbus RTU server of a simulated device, for one client on a pseudo-terminal.
 
-    Parameters
-    ----------
-    link
-        Path of a symbolic link to the terminal; None for no link.
-
-    Raises
-    ------
-    LinkError, ConfigError
-        On entering, if the pseudo-terminal or its link cannot be created.
+    `link` is the path of a symbolic link to the terminal; None for no link. The other parameters
+    are those of `ModbusServer`, and the errors on entering are those of `PseudoTerminal.open`.
     """
 
     def __init__(

@@ -78,7 +78,7 @@ class ModbusServer(DaqServer):
         Raises
         ------
         HangUpError
-            If the device closes the connection instead of a reply.
+            If the device closes the connection instead of replying.
         """
         self.function_codes[request[0]] += 1
         self._asked.set()

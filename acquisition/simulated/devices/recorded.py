@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Iterable
 
-from acquisition.delivery.blocks import BlockJoiner, RawBlock, cells_of, sample_block
+from acquisition.delivery.blocks import BlockJoiner
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.source import Selection, all_of
 from acquisition.simulated.feed import FeedEndedError
@@ -16,22 +16,18 @@ class RecordedFeed:
     Blocks begin at multiples of their length and keep epoch, sample index and time of the
     recording. A block before a gap of the recording or a restart of the device is shorter. A block
     joined from several recorded blocks has the slow values of its first sample; a channel is OK if
-    it is OK in all of them. Samples that were rejected during recording are a gap.
-
-    Parameters
-    ----------
-    selection
-        Channels and their order; by default all channels as recorded.
+    it is OK in all of them. Samples that were rejected during recording are a gap. `selection`
+    defines the channels and their order; by default all channels as recorded.
     """
 
     def __init__(self, recording: Recording, selection: Selection | None = None) -> None:
-        self._runs = recording.runs()
+        self._runs = recording.blocks()
         self._selection = selection or all_of(recording.manifest)
         self._joiner = BlockJoiner(self._selection.calibration.block_samples)
         self._length = 0
-        self._ready: deque[RawBlock] = deque()
+        self._ready: deque[SampleBlock] = deque()
 
-    def advance(self, n_samples: int) -> RawBlock:
+    def advance(self, n_samples: int) -> SampleBlock:
         """Return the next block, of at most `n_samples` samples per channel.
 
         Raises
@@ -49,7 +45,8 @@ class RecordedFeed:
             self._cut_to(n_samples)
         while not self._ready:
             run = next(self._runs, None)
-            self._extend(self._joiner.flush() if run is None else self._put(run))
+            found = self._joiner.put([self._selection.of(run)]) if run else self._joiner.flush()
+            self._extend(found)
             if run is None and not self._ready:
                 raise FeedEndedError
         return self._ready.popleft()
@@ -58,16 +55,10 @@ class RecordedFeed:
         """Close the files of the recording."""
         self._runs.close()
 
-    def _put(self, run: SampleBlock) -> list[SampleBlock]:
-        return self._joiner.put(self._selection.of(run))
-
     def _cut_to(self, n_samples: int) -> None:
-        calibration = self._selection.calibration
-        held = [sample_block([raw], calibration) for raw in self._ready] + self._joiner.flush()
+        self._ready, held = deque(), [*self._ready, *self._joiner.flush()]
         self._joiner, self._length = BlockJoiner(n_samples), n_samples
-        self._ready = deque()
-        for block in held:
-            self._extend(self._joiner.put(block))
+        self._extend(self._joiner.put(held))
 
     def _extend(self, blocks: Iterable[SampleBlock]) -> None:
-        self._ready.extend(raw for block in blocks for raw in cells_of(block))
+        self._ready.extend(cell for block in blocks for cell in block.cells())

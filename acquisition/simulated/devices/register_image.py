@@ -23,11 +23,8 @@ _OF_CENTURY = 100
 class RegisterImage:
     """Contents of the registers and bits of a register map; other addresses do not exist.
 
-    Parameters
-    ----------
-    ranges
-        Minimum and maximum by value id, for values whose full scale is stored in registers; -1000
-        and 1000 by default.
+    `ranges` contains minimum and maximum by value id, for values whose full scale is stored in
+    registers; -1000 and 1000 by default.
     """
 
     def __init__(
@@ -48,13 +45,13 @@ class RegisterImage:
             self.put(cell, signature.expected)
 
     def read_registers(self, function: int, address: int, count: int) -> bytes | None:
-        """Return registers as big-endian words; None if an address does not exist."""
+        """Return `count` registers as big-endian words; None if an address does not exist."""
         words = [self._words.get((function, at)) for at in range(address, address + count)]
         found = [word for word in words if word is not None]
         return None if len(found) < count else struct.pack(f">{count}H", *found)
 
     def read_bits(self, function: int, address: int, count: int) -> bytes | None:
-        """Return bits packed in bytes, low bit first; None if an address does not exist."""
+        """Return `count` bits packed in bytes, low bit first; None if an address does not exist."""
         bits = [self._bits.get((function, at)) for at in range(address, address + count)]
         found = [bit for bit in bits if bit is not None]
         return None if len(found) < count else np.packbits(found, bitorder="little").tobytes()

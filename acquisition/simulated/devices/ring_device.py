@@ -7,13 +7,13 @@ from functools import partial
 
 import numpy as np
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.modbus.ring_profile import HEADER_REGISTERS, U32, RingHeader, RingLayout, Slot
 from acquisition.simulated.devices.modbus_device import ModbusDevice, RegisterMemory
 from acquisition.simulated.devices.register_image import encode_header, encode_slot, encode_slow
 from acquisition.simulated.devices.ring_faults import SLOT_FAULTS, ReadingWatch, SlotFault
 from acquisition.simulated.feed import Ledger, SampleFeed
+from core.samples.blocks import SampleBlock
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,18 +44,19 @@ class RingDeviceSettings:
 
 
 class RingDevice(ModbusDevice):
-    """Converter and block ring of one unit; the first slot is available from the start.
+    """Simulated Modbus device with a block ring; the first slot is available from the start.
 
     Slots begin at multiples of their length in the sample index of the feed. In a gap of the feed
-    the device writes no slots; after the gap sequence number, sample index and time continue
-    consistently. A new epoch of the feed restarts the device.
+    the device writes no slots; after the gap, sequence number, sample index and time continue
+    consistently. A new epoch of the feed restarts the device. `unit` and `ledger` are those of
+    `ModbusDevice`.
 
     Parameters
     ----------
     feed
         Source of the samples; defines the number of channels and the sampling rate.
-    unit
-        Name of the unit in the ledger.
+    settings
+        Layout and start values; by default those of `RingDeviceSettings`.
 
     Attributes
     ----------
@@ -73,7 +74,7 @@ class RingDevice(ModbusDevice):
     Raises
     ------
     ConfigError
-        If the ring does not fit, or the feed has less than one slot of int16 counts.
+        If the ring does not fit, or the feed has no complete slot of int16 counts.
     """
 
     def __init__(
@@ -93,7 +94,8 @@ class RingDevice(ModbusDevice):
         self._n_restarts = self._newest = 0
         first = self._feed.take()
         if first is None:
-            raise ConfigError(f"feed has fewer samples than a slot, {settings.samples_per_slot}")
+            n_whole = settings.samples_per_slot
+            raise ConfigError(f"block ring: feed has no slot of {n_whole} samples without a gap")
         self.layout = _layout(first, settings)
         self._watch = ReadingWatch(self.layout)
         base = settings.base_address
@@ -107,12 +109,12 @@ class RingDevice(ModbusDevice):
 
     @property
     def step_s(self) -> float:
-        """Duration of one slot."""
+        """Duration of one slot in seconds."""
         return self.layout.slot_duration_s
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Faults by name: of the next slots, frozen data, and restarts."""
+        """Fault functions by name, which take a count: faulty slots, frozen data, restarts."""
         slot_faults = {**SLOT_FAULTS, "repeat": self._repeated}
         return {
             **super().faults,
@@ -121,18 +123,16 @@ class RingDevice(ModbusDevice):
         }
 
     def produce(self, n_steps: int = 1, fault: SlotFault | None = None) -> None:
-        """Advance the time by `n_steps` slots and write them, with `fault` applied to each."""
+        """Advance the time by `n_steps` slots and write them, each with `fault` applied, if any."""
         self._fault = fault
         super().produce(n_steps)
         self._fault = None
 
     def produce_unpaced(self, n_slots: int) -> None:
-        """Write the next slots without delay, also after a gap, and without overwriting a new slot.
+        """Write the next slots without delay, also after a gap, without overwriting a new slot.
 
-        Parameters
-        ----------
-        n_slots
-            Maximum number of places of the ring, including gaps; at least one slot is written.
+        `n_slots` is the maximum number of places of the ring, including gaps except one before the
+        first slot.
         """
         if self._n_frozen:
             self._n_frozen -= 1
@@ -151,7 +151,10 @@ class RingDevice(ModbusDevice):
                 limit = self._position + n_slots - 1
 
     def restart(self, next_epoch: bool = True) -> None:
-        """Restart the device, by default in the next epoch: clear the ring, reset the counters."""
+        """Restart the device, by default in the next epoch: clear the ring, reset the counters.
+
+        If the feed has ended, the ring is kept and `ended` is set.
+        """
         first = self._feed.take()
         if first is None:
             self.ended = True
@@ -177,7 +180,7 @@ class RingDevice(ModbusDevice):
             self.produce_unpaced(max(1, (self.layout.n_slots - 2) // 2))
         self._n_looks += self.ended
 
-    def _must_wait(self, ahead: RawBlock) -> bool:
+    def _must_wait(self, ahead: SampleBlock) -> bool:
         """Whether a patient device must wait until its client has read previous slots."""
         if not self.patient:
             return False
@@ -188,7 +191,7 @@ class RingDevice(ModbusDevice):
         n_ahead = self._feed.number(ahead) - self._number
         return self._watch.n_unread > max(0, self.layout.n_slots - 2 - n_ahead)
 
-    def _show(self, raw: RawBlock) -> None:
+    def _show(self, raw: SampleBlock) -> None:
         if raw.epoch != self._feed_epoch:
             self._power_up(raw, self._settings.first_index)
             return
@@ -197,7 +200,7 @@ class RingDevice(ModbusDevice):
         faults = [self._waiting_faults.popleft()] if self._waiting_faults else []
         self._write(raw, n_slots, [*faults, self._fault] if self._fault else faults)
 
-    def _power_up(self, first: RawBlock, first_index: int | None) -> None:
+    def _power_up(self, first: SampleBlock, first_index: int | None) -> None:
         self.memory.clear()
         self._watch.clear()
         self._feed_epoch = first.epoch
@@ -206,7 +209,7 @@ class RingDevice(ModbusDevice):
         self._index_offset = 0 if first_index is None else first_index - first.first_index
         self._write(first, 1, [])
 
-    def _write(self, raw: RawBlock, n_slots: int, faults: list[SlotFault]) -> None:
+    def _write(self, raw: SampleBlock, n_slots: int, faults: list[SlotFault]) -> None:
         """Write a slot and the header; the slot is `n_slots` places after the previous slot."""
         self._number = self._position = self._feed.number(raw)
         self._watch.note_written(self._newest)
@@ -220,25 +223,27 @@ class RingDevice(ModbusDevice):
             address = self.layout.slot_address(self._newest)
             self.memory.write(address, encode_slot(slot))
         header = encode_header(RingHeader(self.layout, self.epoch, self._newest))
-        self.memory.write(self._settings.base_address, header + encode_slow(raw.slow))
+        self.memory.write(
+            self._settings.base_address, header + encode_slow(raw.side.slow[:, 0].tolist())
+        )
         self.ledger.offer(self._unit, self.epoch, n_slots * self.layout.samples_per_slot)
 
-    def _slot(self, raw: RawBlock) -> Slot:
+    def _slot(self, raw: SampleBlock) -> Slot:
         seconds, microseconds = divmod(raw.start_ns // 1000, 1_000_000)
         return Slot(
             sequence=self._newest,
             first_index=(raw.first_index + self._index_offset) % U32,
             seconds=seconds,
             microseconds=microseconds,
-            ok_bits=sum(1 << c for c, ok in enumerate(raw.ok) if ok),
+            ok_bits=sum(1 << c for c, ok in enumerate(raw.side.ok[:, 0]) if ok),
             counts=raw.counts.astype(np.int16, copy=False),
             trailer=self._newest & 0xFFFF,
             epoch=self.epoch,
-            slow=raw.slow,
+            slow=tuple(raw.side.slow[:, 0].tolist()),
         )
 
     def _repeated(self, slot: Slot) -> Slot:
-        """Slot fault: samples of the previous slot with the new sequence number."""
+        """Return the previous slot with the new sequence number, as a slot fault."""
         before = self._before or slot
         return replace(before, sequence=slot.sequence, trailer=slot.trailer)
 
@@ -250,14 +255,14 @@ class RingDevice(ModbusDevice):
             self.restart()
 
 
-def _layout(first: RawBlock, settings: RingDeviceSettings) -> RingLayout:
+def _layout(first: SampleBlock, settings: RingDeviceSettings) -> RingLayout:
     """Return the layout of a ring for the channels of the first slot.
 
     Raises `ConfigError` if the slot has no int16 counts or the ring does not fit.
     """
     if first.counts.dtype != np.int16:
         raise ConfigError(f"block ring: samples must be 16-bit counts, got {first.counts.dtype}")
-    n_slow = len(first.slow)
+    n_slow = len(first.side.slow)
     layout = RingLayout(
         n_channels=len(first.counts),
         samples_per_slot=settings.samples_per_slot,

@@ -13,32 +13,32 @@ SlotFault: TypeAlias = Callable[[Slot], Slot | None]
 
 
 def dropped(slot: Slot) -> None:
-    """Slot fault: the slot is not written; the sequence number continues."""
+    """Return None: the slot is not written, and the sequence number continues."""
 
 
 def torn(slot: Slot) -> Slot:
-    """Slot fault: a trailer that does not match the sequence number, as in a torn write."""
+    """Return the slot with a trailer that does not match its sequence number: a torn write."""
     return replace(slot, trailer=slot.trailer ^ 0x5A5A)
 
 
 def damaged(slot: Slot) -> Slot:
-    """Slot fault: a wrong checksum."""
+    """Return the slot with a wrong checksum."""
     return replace(slot, damage=slot.damage ^ 0x5A5A5A5A)
 
 
 def wrong_sequence(slot: Slot) -> Slot:
-    """Slot fault: the sequence number of the next slot."""
+    """Return the slot with the sequence number of the next slot."""
     sequence = (slot.sequence + 1) % U32
     return replace(slot, sequence=sequence, trailer=sequence & 0xFFFF)
 
 
 def wrong_index(slot: Slot) -> Slot:
-    """Slot fault: the sample index is too high by one."""
+    """Return the slot with a sample index that is too high by one."""
     return replace(slot, first_index=(slot.first_index + 1) % U32)
 
 
 def wrong_time(slot: Slot) -> Slot:
-    """Slot fault: a time stamp in the year 2106."""
+    """Return the slot with a time stamp in the year 2106."""
     return replace(slot, seconds=U32 - 1)
 
 
@@ -78,7 +78,7 @@ class ReadingWatch:
         self.waiting = False
 
     def clear(self) -> None:
-        """Remove all slots, after the ring is cleared."""
+        """Discard the records of all slots, because the ring has been cleared."""
         self._unread.clear()
         self._shown, self._shown_was_read = None, False
 
@@ -109,5 +109,5 @@ class ReadingWatch:
 
     @property
     def n_unread(self) -> int:
-        """Number of places of the ring from the oldest unread slot to the newest slot."""
+        """Number of places of the ring from the oldest unread slot to the newest; 0 if all read."""
         return (self._newest - self._unread[0]) % U32 + 1 if self._unread else 0

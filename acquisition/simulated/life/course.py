@@ -51,7 +51,7 @@ class LifeCourse:
     ValueError
         If damage has an unknown bearing, or `start_ns` is outside the life.
     KeyError
-        If a bearing of the machine is missing in the life.
+        If a bearing of the machine is missing from the life.
     """
 
     def __init__(
@@ -121,7 +121,8 @@ class LifeCourse:
         row = int(np.searchsorted(grid_ns, time_ns, side="right")) - 1
         if not 0 <= row < self._n_rows - 1:
             seed = self._inputs.unit_seed
-            raise ValueError(f"time {time_ns} ns is outside the life of unit {seed}")
+            span = f"from {grid_ns[0]} to before {grid_ns[-1]} ns"
+            raise ValueError(f"time {time_ns} ns is outside the life of unit {seed}, {span}")
         return row, float(time_ns - grid_ns[row]) / float(grid_ns[row + 1] - grid_ns[row])
 
     def _moment(
@@ -188,10 +189,7 @@ class LifePlan:
 def history_until(plan: LifePlan, now_ns: int, years: float = 1.0) -> UnitLife:
     """Return the readings and the true state of a life until `now_ns`.
 
-    Parameters
-    ----------
-    years
-        Length of the history; up to one year is always available.
+    `years` is the length of the history; up to one year is always available.
 
     Raises
     ------
@@ -202,7 +200,9 @@ def history_until(plan: LifePlan, now_ns: int, years: float = 1.0) -> UnitLife:
     inputs = _inputs(plan, now_ns)
     time_ns, from_ns = inputs.operation.time_ns, now_ns - ns_from_s(years * YEAR_S)
     if from_ns < time_ns[0] - DAY_NS:
-        raise ValueError(f"years = {years:g} is longer than the life of unit {plan.seed}")
+        raise ValueError(
+            f"years = {years:g} is longer than the life of unit {plan.seed}; use 1 or less"
+        )
     selected = inputs.operation.is_turning & (time_ns >= from_ns) & (time_ns < now_ns)
     return life_of(inputs, plan.damage, np.asarray(selected))
 
@@ -212,12 +212,8 @@ def course_from(
 ) -> LifeCourse:
     """Return the life of `history_until` from `now_ns` to the end of next year, as scenarios.
 
-    Raises
-    ------
-    ValueError
-        If damage has an unknown bearing.
-    KeyError
-        If a bearing of the machine is missing in the life.
+    Raises `ValueError` if damage has an unknown bearing, and `KeyError` if a bearing of the machine
+    is missing from the life.
     """
     return LifeCourse(_inputs(plan, now_ns), plan.damage, machine, now_ns, noise)
 

@@ -57,11 +57,13 @@ class Damage:
     def __post_init__(self) -> None:
         minimum = -1.0 if self.kind in GAINS else 0.0
         if not (minimum < self.size < 1.0 and self.size != 0.0):
-            raise ValueError(f"size = {self.size:g} of {self.kind} must be {minimum:g} to 1")
+            limits = f"between {minimum:g} and 1, and not 0"
+            raise ValueError(f"size = {self.size:g} of {self.kind} must be {limits}")
         if not self.ramp_days >= 0.0:
             raise ValueError(f"ramp_days = {self.ramp_days:g} must be 0 or more")
         if not self.directions or not set(self.directions) <= set(DIRECTIONS):
-            raise ValueError(f"directions = {self.directions} must be among {DIRECTIONS}")
+            found = " and ".join(self.directions) or "none"
+            raise ValueError(f"directions must be x, y or both, got {found}")
 
     def extent(self, time_ns: TimeArray) -> FloatArray:
         """Return the fraction of `size` that the damage has reached, (n,)."""
@@ -78,7 +80,7 @@ class Alteration:
     Parameters
     ----------
     stiffness, clearance, viscosity, bracket : (n,)
-        Factors.
+        Factors of film stiffness, pad clearance, oil viscosity and bracket stiffness.
     pivot_share : (n,)
         Recession of the worn pad divided by the configured clearance; 0 without damage.
     probe_gain, accelerometer_gain : (2, n)
@@ -95,7 +97,7 @@ class Alteration:
 
 
 def alteration(damage: tuple[Damage, ...], bearing: str, time_ns: TimeArray) -> Alteration:
-    """Return the combined effect of all damage on one bearing."""
+    """Return the effect of all damage on one bearing: losses of a kind add up, gains multiply."""
     lost = {
         kind: sum(
             (d.size * d.extent(time_ns) for d in damage if d.bearing == bearing and d.kind is kind),

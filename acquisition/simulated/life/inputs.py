@@ -80,6 +80,8 @@ def draw_inputs(
     ----------
     start_ns
         Time of the first row: midnight in the time zone of the plant.
+    changes
+        Changes of the operating condition without damage.
     held
         Operation at constant load; None for random starts and stops.
 
@@ -92,7 +94,7 @@ def draw_inputs(
     time_ns = time_grid_ns(start_ns, years)
     operation = draw_operation(random.operation, time_ns, rated_speed_rpm(unit_seed), held)
     if not operation.is_turning.any():
-        raise ValueError(f"unit {unit_seed} does not run in {years} years")
+        raise ValueError(f"unit {unit_seed} never runs in {years:g} years; use a longer time")
     water_c = draw_water_c(random.water, operation)
     positions_um = draw_positions_um(random.position, operation, bearings, changes)
     drawn = (

@@ -136,10 +136,8 @@ def live(
 
     Parameters
     ----------
-    start_ns
-        Start of the life: midnight in the time zone of the plant.
-    held
-        Operation at constant load; None for random starts and stops.
+    start_ns, changes, held
+        As in `draw_inputs`.
 
     Raises
     ------
@@ -153,13 +151,7 @@ def live(
 
 
 def require_known_bearings(damage: tuple[Damage, ...], bearings: tuple[LifeBearing, ...]) -> None:
-    """Check that the bearings of all damage exist.
-
-    Raises
-    ------
-    ValueError
-        If a bearing is unknown; the message contains its id.
-    """
+    """Check the bearings of all damage; raise `ValueError` with the id of an unknown bearing."""
     known = {bearing.id for bearing in bearings}
     for one in damage:
         if one.bearing not in known:
@@ -171,10 +163,7 @@ def life_of(
 ) -> UnitLife:
     """Return the true state and the readings of the life with the given inputs and damage.
 
-    Parameters
-    ----------
-    turns : (n,)
-        Mask of the selected rows, at which the shaft must turn.
+    `turns` (n,) is the mask of the selected rows, at which the shaft must turn.
     """
     turning, grade_mm_s = rows_of(inputs.operation, turns), inputs.grade_mm_s[turns]
     lives = [_bearing_life(one, turns, turning, damage) for one in inputs.bearings]

@@ -49,7 +49,7 @@ def scenario_at(
     ValueError
         If the time is before the first reading, or the unit is not at rated speed.
     KeyError
-        If a bearing of the machine is missing in the life.
+        If a bearing of the machine is missing from the life.
     """
     row, grow = row_at(life, time_ns), growing(machine)
     operation = life.operation
@@ -88,7 +88,7 @@ def row_at(life: UnitLife, time_ns: int) -> int:
     if row < 0:
         raise ValueError(f"the life of unit {life.unit_seed} begins after {time_ns} ns")
     if not life.operation.is_at_speed[row]:
-        raise ValueError(f"unit {life.unit_seed} is not at speed at {time_ns} ns")
+        raise ValueError(f"unit {life.unit_seed} is not at rated speed at {time_ns} ns")
     return row
 
 
@@ -135,7 +135,7 @@ def bearing_at(
 def channels_at(
     truth: BearingMoments, row: int, bearing: Bearing
 ) -> Iterator[tuple[str, ChannelScenario]]:
-    """Yield id and true transducer properties of each channel of a bearing at one row."""
+    """Yield id and true transducer properties of each channel and opposite probe of a bearing."""
     probe_gain, accelerometer_gain = _probe_gain(truth, row), _accelerometer_gain(truth, row)
     near, far = bearing.channels[:2], (bearing.opposite_x, bearing.opposite_y)
     for axis in range(2):

@@ -19,13 +19,7 @@ YEAR_S = YEAR_DAYS * DAY_S
 
 @dataclass(frozen=True, eq=False)
 class Operation:
-    """Time series of speed and power of a unit; all (n,).
-
-    Parameters
-    ----------
-    time_ns
-        Times of the rows.
-    """
+    """Time series of speed and power of a unit at the times `time_ns`; all (n,)."""
 
     time_ns: TimeArray
     speed_rpm: FloatArray
@@ -78,19 +72,10 @@ def time_grid_ns(start_ns: int, years: float, step_s: float = STEP_S) -> TimeArr
 
 @dataclass(frozen=True)
 class HeldLoad:
-    """Operation at constant load without a stop, from a given time.
+    """Operation at constant load without a stop, from the time `from_ns`.
 
-    Parameters
-    ----------
-    from_ns
-        Start time; earlier operation is unchanged.
-    load
-        Load as a share of rated power.
-
-    Raises
-    ------
-    ValueError
-        If the load is not above 0, or is above 1.
+    Earlier operation is unchanged. `load` is a share of rated power. Raises `ValueError` if it is
+    not above 0, or is above 1.
     """
 
     from_ns: int
@@ -104,7 +89,7 @@ class HeldLoad:
 def wander(
     random: np.random.Generator, n: int, step_s: float, time_s: float, rms: float
 ) -> FloatArray:
-    """Return a first-order Gauss-Markov process with zero mean, stationary from row 0, (n,)."""
+    """Draw a stationary Gauss-Markov process (n,): mean 0, given rms, time constant `time_s`."""
     import scipy.signal  # slow import, not needed at start-up
 
     memory = math.exp(-step_s / time_s)
@@ -116,18 +101,12 @@ def wander(
 def change_rows(
     random: np.random.Generator, n: int, step_s: float, interval_s: float
 ) -> FloatArray:
-    """Return the index of the current level at each row, (n,); levels change at random times.
-
-    Parameters
-    ----------
-    interval_s
-        Mean time between two changes of level.
-    """
+    """Draw the level index of each row, (n,); it rises by 1 every `interval_s` on average."""
     return np.cumsum(random.random(n) < step_s / interval_s).astype(np.float64)
 
 
 def held(levels: FloatArray, which: FloatArray) -> FloatArray:
-    """Return the current level at each row, selected by the indices `which`."""
+    """Return the level at each row, selected from `levels` by the indices `which` (n,)."""
     return np.asarray(levels[which.astype(np.int64)])
 
 
@@ -189,7 +168,10 @@ def draw_operation(
     rated_speed_rpm: float,
     held: HeldLoad | None = None,
 ) -> Operation:
-    """Draw the operation of a unit at times every 10 min; the first time is midnight."""
+    """Draw the operation of a unit at times every 10 min; the first time is midnight.
+
+    `held` is a period of constant load; None for random starts and stops.
+    """
     first_day = int(time_ns[0] // DAY_NS)
     n_weeks = math.ceil(time_ns.size / STEPS_PER_DAY / 7)
     load = np.concatenate([_week(random, first_day + 7 * week) for week in range(n_weeks)])

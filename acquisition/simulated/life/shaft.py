@@ -66,7 +66,7 @@ def four_fold(
 def cooling_failure(
     start_ns: int, days: float = 5.0, oil_offset_c: float = 12.0
 ) -> ConditionChange:
-    """Return a condition change by a failed cooler: oil warmer than in any healthy history."""
+    """Return the change caused by a failed cooler: oil warmer than in any healthy history."""
     return ConditionChange(start_ns, start_ns + round(days * DAY_NS), oil_offset_c=oil_offset_c)
 
 

@@ -55,12 +55,14 @@ class Chain:
 
     Parameters
     ----------
-    probe_gain, accelerometer_gain : (2,)
-        Ratio of true to configured sensitivity, without damage.
+    probe_gain, gap_gain, accelerometer_gain : (2,)
+        Ratio of true to configured sensitivity, without damage; `gap_gain` is for mean gaps.
     ln_k_error : (2, n)
         Logarithmic stiffness error, correlated over hours and days.
     position_error_um : (2, n)
+        Error of the shaft position measured by the gaps.
     oil_error_c : (n,)
+        Error of the oil temperature.
     runout_um_pk : (2,)
         Phasors of the residual runout.
     evidence : (2, n)
@@ -131,11 +133,10 @@ class BearingMoments:
 
     Parameters
     ----------
-    clearance_um : (n,)
-        Mean clearance of the pads.
+    clearance_um, oil_temperature_c : (n,)
+        Mean clearance of the pads, and oil temperature.
     centre_um : (2, n)
         Position of the shaft centre relative to the bearing centre.
-    oil_temperature_c : (n,)
     altered
         Effect of damage on film, bracket and transducers.
     chain
@@ -152,7 +153,7 @@ class BearingMoments:
 
 @dataclass(frozen=True, eq=False)
 class BearingLifeTruth(BearingMoments):
-    """True state of one bearing at the rows of its readings, with stiffness and 1x response.
+    """True state of one bearing at the rows of its readings, with stiffness and 1× response.
 
     Parameters
     ----------

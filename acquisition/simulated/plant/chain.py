@@ -45,12 +45,8 @@ class KeyPhasePulses:
     def add_to(self, readings: FloatArray, turns: FloatArray) -> None:
         """Add the pulses to the readings of the key-phase channels, in place.
 
-        Parameters
-        ----------
-        readings
-            (n_channels, n_samples)
-        turns
-            (n_samples,) angle of the shaft in turns, at nearly constant speed.
+        `readings` are (n_channels, n_samples); `turns` (n_samples,) is the angle of the shaft in
+        turns, at nearly constant speed.
         """
         if not self._directions:
             return
@@ -85,7 +81,7 @@ class AccelerometerNoise:
     integrated
         (n_channels,) true for velocity channels in mm/s, false for acceleration in m/s².
     density_g_per_sqrt_hz
-        One-sided amplitude density above the corner frequency.
+        One-sided amplitude density above `corner_hz`, the corner frequency of the 1/f noise.
     """
 
     def __init__(
@@ -154,10 +150,8 @@ def _pink(corner_hz: float, rate_hz: float) -> FloatArray:
 class TransducerChain:
     """Transducers of all channels of one unit: converts motion of the rotor to readings.
 
-    Parameters
-    ----------
-    white, own
-        Random generators of the white noise and of the sensor noise of the accelerometers.
+    `white` and `own` are the random generators of the white noise and of the sensor noise of the
+    accelerometers.
 
     Raises
     ------
@@ -214,7 +208,7 @@ class TransducerChain:
         return motion
 
     def add_white_noise(self, readings: FloatArray) -> None:
-        """Add the white noise of the electronics after the transducers, in place."""
+        """Add the white noise of the electronics to readings (n_channels, n_samples), in place."""
         noise = self._white.standard_normal(readings.shape, dtype=np.float32)
         readings += noise * self._white_rms[:, np.newaxis]
 

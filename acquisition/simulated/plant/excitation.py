@@ -30,7 +30,7 @@ class FollowedRotation:
         self._start, self._stop = 1.0, 1.0
 
     def follow(self, first: int, n_samples: int, start_rpm: float, stop_rpm: float) -> None:
-        """Begin a chunk, in which the speed changes linearly from `start_rpm` to `stop_rpm`."""
+        """Begin a chunk at sample `first`, with a linear speed from `start_rpm` to `stop_rpm`."""
         self._turns = float(self.turns(np.array([float(first)]))[0])
         self._first, self._n_samples = first, n_samples
         self._start = start_rpm / self._rated_speed_rpm
@@ -55,8 +55,8 @@ class Rotation:
 
     Parameters
     ----------
-    speed_wander
-        Maximum relative deviation from the mean speed.
+    turn_hz, speed_wander
+        Mean frequency of rotation, and maximum relative deviation from it.
     wander_time_s
         Period of the largest sine, in seconds.
     """
@@ -101,10 +101,7 @@ Turning: TypeAlias = FollowedRotation | Rotation
 class UnbalanceForce:
     """Unbalance force: rotates with the shaft and is proportional to the square of the speed.
 
-    Parameters
-    ----------
-    force_n
-        Force at a relative speed of 1.
+    `force_n` is the force at a relative speed of 1.
     """
 
     def __init__(self, force_n: float, rotation: Turning) -> None:
@@ -261,7 +258,7 @@ class Forces:
 
 
 def straight(start: float, stop: float, n_samples: int) -> FloatArray | float:
-    """Return a linear ramp over a chunk, (n_samples,), without its end; one number if constant."""
+    """Return a linear ramp (n_samples,) from `start` to just before `stop`; a number if equal."""
     if start == stop:
         return start
     return np.linspace(start, stop, n_samples, endpoint=False)

@@ -34,10 +34,7 @@ class FaultKind(StrEnum):
 class Fault:
     """Permanent fault of a channel.
 
-    Parameters
-    ----------
-    from_sample
-        Index of the first faulty sample.
+    `from_sample` is the index of the first faulty sample.
     """
 
     kind: FaultKind
@@ -47,10 +44,8 @@ class Fault:
 class FaultInjector:
     """Injector of permanent channel faults into the converter counts of one unit.
 
-    Parameters
-    ----------
-    faults
-        Faults by channel row of the counts; those of one channel are applied in sequence.
+    `faults` contains the faults by channel row of the counts; those of one channel are applied in
+    sequence.
     """
 
     def __init__(self, random: np.random.Generator, faults: Mapping[int, Sequence[Fault]]) -> None:
@@ -58,7 +53,7 @@ class FaultInjector:
         self._running = [(row, _Running(fault)) for row, found in faults.items() for fault in found]
 
     def spoil(self, counts: CountArray, first_index: int) -> None:
-        """Apply the faults to the next counts, (n_channels, n_samples), in place."""
+        """Apply the faults to counts (n_channels, n_samples) from `first_index` on, in place."""
         for row, running in self._running:
             jitter = self._random.integers(-1, 2, (counts.shape[1],))
             running.spoil(counts[row], first_index, jitter)
@@ -107,10 +102,7 @@ def _broken(
 def to_counts(readings: FloatArray, calibration: UnitCalibration) -> CountArray:
     """Convert readings to int16 counts, rounded and clipped to the range of the converter.
 
-    Parameters
-    ----------
-    readings
-        (n_channels, n_samples) in engineering units.
+    `readings` are (n_channels, n_samples) in engineering units.
     """
     per_unit = np.array([1.0 / channel.unit_per_count for channel in calibration.channels])
     counts: FloatArray = np.rint(readings * per_unit[:, np.newaxis])

@@ -120,7 +120,8 @@ def _film_between(start: Film, stop: Film, share: float) -> Film:
 def _lifted_rotor(machine: Unit, scenario: Scenario) -> LiftedRotor:
     missing = {b.bearing for b in scenario.rotor.brackets} - scenario.bearings.keys()
     if missing:
-        raise ConfigError(f"the scenario of unit {machine.id!r} lacks {', '.join(sorted(missing))}")
+        names = ", ".join(sorted(missing))
+        raise ConfigError(f"add {names} to the scenario of unit {machine.id!r}: its rotor has them")
     films = {name: bearing.film for name, bearing in scenario.bearings.items()}
     parameters = scenario.true_rotor
     matrices = rotor_matrices(parameters, films, scenario.speed_rpm)

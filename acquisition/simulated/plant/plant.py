@@ -30,10 +30,8 @@ class Chunk:
     ----------
     readings
         (n_channels, CHUNK_SAMPLES) in engineering units.
-    start
-        Conditions at the first sample.
-    stop
-        Conditions one sample after the last.
+    start, stop
+        Conditions at the first sample, and one sample after the last.
     first_index
         Index of the first sample, counted from the start of the warm-up.
     scenario
@@ -50,10 +48,7 @@ class Chunk:
 class SimulatedPlant:
     """Simulation of rotor, forces and transducers of one unit, chunk by chunk.
 
-    Parameters
-    ----------
-    course
-        A `Scenario` for steady operation, or a course of scenarios.
+    `course` is a `Scenario` for steady operation, or a course of scenarios.
 
     Raises
     ------

@@ -26,12 +26,10 @@ class Probe:
 
     Parameters
     ----------
-    row
-        Index of the probe's channel in the unit.
+    row, bearing
+        Indices of the probe's channel and of its bearing in the unit.
     slow_channel
         Id of the slow channel of the mean gap; None if the unit has no such channel.
-    bearing
-        Index of the bearing in the unit.
     axis
         Axis of the probe: 0 is x, 1 is y.
     opposite
@@ -114,7 +112,7 @@ class ShaftRunout:
     def add_to(self, readings: FloatArray, turns: FloatArray) -> None:
         """Add the runout to the readings of the probe channels, in place.
 
-        `turns` is the angle of the shaft in turns, (n_samples,).
+        `readings` is (n_channels, n_samples); `turns` (n_samples,) is the shaft angle in turns.
         """
         if not self._phasors:
             return
@@ -141,8 +139,8 @@ def output_map(machine: Unit, parameters: RotorParameters, matrices: RotorMatric
     Raises
     ------
     ConfigError
-        If a bearing is missing in the rotor, a channel belongs to no bearing, or a channel has
-        a measurand that does not exist at a shaft or at a bearing.
+        If a bearing is missing from the rotor, a channel belongs to no bearing, or a channel has
+        a measurand that does not exist at its part, shaft or bearing.
     """
     maps, places = _motion_maps(parameters, matrices), _places(machine, parameters)
     rows = []
@@ -186,7 +184,7 @@ def _places(machine: Unit, parameters: RotorParameters) -> dict[str, tuple[str, 
     for bearing in machine.bearings:
         if bearing.id not in names:
             raise ConfigError(
-                f"the bearings of a simulated unit are {', '.join(names)}, got {bearing.id!r}"
+                f"unknown bearing {bearing.id!r}; the simulated rotor has {', '.join(names)}"
             )
         row = 2 * names.index(bearing.id)
         places[bearing.bearing_x] = (BEARING, row)

@@ -31,7 +31,7 @@ class ResponseFilter:
     Raises
     ------
     ConfigError
-        If the response cannot be simulated to `TOLERANCE` within `EXACT_BAND_HZ`.
+        If the response is a table, or cannot be simulated to `TOLERANCE` within `EXACT_BAND_HZ`.
     """
 
     def __init__(self, response: Response, rate_hz: float) -> None:
@@ -42,8 +42,9 @@ class ResponseFilter:
         off = np.abs(self.response_at(band_hz, rate_hz) - wanted) / np.abs(wanted).clip(1e-3)
         if not off.max() <= TOLERANCE:
             raise ConfigError(
-                f"a simulated transducer deviates from {response} by {off.max():.2g} at"
-                f" {band_hz[off.argmax()]:.3g} Hz, allowed are {TOLERANCE:g}"
+                f"a simulated transducer deviates from its response by {off.max():.2g} at"
+                f" {band_hz[off.argmax()]:.3g} Hz, at most {TOLERANCE:g} is allowed; change the"
+                " response or the sampling rate"
             )
 
     def advance(self, samples: FloatArray) -> FloatArray:

@@ -1,4 +1,7 @@
-"""10-DOF rotor model of Brito et al.: parameters, matrices and harmonic response."""
+"""10-DOF rotor model of Brito et al.: parameters, matrices and harmonic response.
+
+The shapes of arrays are given for three bearings.
+"""
 
 import math
 from collections.abc import Mapping
@@ -138,7 +141,7 @@ def rotor_matrices(
 
 
 def relative_motion(parameters: RotorParameters) -> FloatArray:
-    """Return the matrix from coordinates to u_x, u_y of each bearing (Table 3), (6, 10).
+    """Return the matrix (6, 10) from coordinates to u_x, u_y of bearings (Brito et al., Table 3).
 
     u is shaft minus bracket motion.
     """
@@ -179,16 +182,9 @@ def receptance(matrices: RotorMatrices, frequency_hz: float) -> ComplexArray:
 def bearing_response(
     parameters: RotorParameters, matrices: RotorMatrices, frequency_hz: float, force: ComplexArray
 ) -> dict[str, ComplexArray]:
-    """Return the displacement phasors of each bearing in metres, the signals of Table 3.
+    """Return the phasors (4,) of u_x, u_y, x_b and y_b in metres, by bearing id.
 
-    Parameters
-    ----------
-    force
-        (10,) phasor of the generalized force.
-
-    Returns
-    -------
-    (4,) by bearing: u_x, u_y, x_b, y_b.
+    They are the signals of Table 3 of Brito et al. `force` (10,) is the generalized force phasor.
     """
     coordinates = receptance(matrices, frequency_hz) @ force
     shaft = (relative_motion(parameters) @ coordinates).reshape(-1, 2)

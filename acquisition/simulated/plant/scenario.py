@@ -62,6 +62,8 @@ class HydraulicNoise:
     cutoff_hz
         Upper limit of the flat spectrum, with a steep roll-off; None is white noise up to half the
         sampling rate.
+    plane
+        Plane of the rotor on which the force acts.
     """
 
     rms_n: float = 0.0
@@ -94,10 +96,11 @@ class KeyPhasePulse:
 
     Parameters
     ----------
-    mark_turns
-        Angle from the passage of the mark to the zero angle of unbalance and runout.
-    height_v
-        Height above `rest_v`; below `rest_v` on a channel with direction -1.
+    width_turns, mark_turns
+        Width of the pulse, and angle from the passage of the mark to the zero angle of unbalance
+        and runout, in turns.
+    rest_v, height_v
+        Voltage between the pulses, and height of a pulse above it (below, if direction is -1).
     """
 
     width_turns: float = 6.0 / 360.0
@@ -144,6 +147,8 @@ class ChannelScenario:
         probe itself, so the gain applies to the difference from the reference gap.
     runout_um_pk
         Additional runout of this probe only, 1×, 2×, …: phasors of motion along its axis.
+    faults
+        Permanent faults, applied in sequence.
     """
 
     response: Response | None = None
@@ -228,6 +233,6 @@ class Course(Protocol):
     def at(self, elapsed_s: float) -> Scenario:
         """Return the scenario at `elapsed_s` seconds after the first sample.
 
-        The times of successive calls increase.
+        The time must increase from call to call.
         """
         ...

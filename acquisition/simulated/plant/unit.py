@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.simulated.plant.conditions import Conditions, between
 from acquisition.simulated.plant.faults import FaultInjector, to_counts
@@ -15,6 +14,7 @@ from acquisition.simulated.plant.plant import CHUNK_SAMPLES, SimulatedPlant
 from acquisition.simulated.plant.probes import probes
 from acquisition.simulated.plant.scenario import Course, Scenario
 from core.machine.unit import Unit
+from core.samples.blocks import SampleBlock, SideValues
 from core.samples.calibration import UnitCalibration
 from core.units import NS_PER_S, rad_s_from_rpm
 
@@ -132,7 +132,7 @@ class SimulatedUnit:
         self._index = 0
         self._next_chunk()
 
-    def advance(self, n_samples: int) -> RawBlock:
+    def advance(self, n_samples: int) -> SampleBlock:
         """Return the next `n_samples` consecutive samples.
 
         Raises
@@ -152,18 +152,17 @@ class SimulatedUnit:
             self._index += part.shape[1]
             if self._index % CHUNK_SAMPLES == 0:
                 self._next_chunk()
-        return RawBlock(
+        start_ns = self._start_ns + round(first_index * NS_PER_S / self._machine.rate_hz)
+        return SampleBlock(
+            calibration=self._calibration,
             epoch=self._start_ns // NS_PER_S,
             first_index=first_index,
-            start_ns=self._start_ns + round(first_index * NS_PER_S / self._machine.rate_hz),
-            rate_hz=self._machine.rate_hz,
             counts=np.concatenate(parts, axis=1),
-            ok=(True,) * len(self._machine.channels),
-            slow=slow,
+            side=SideValues.of(start_ns, (True,) * len(self._machine.channels), slow),
         )
 
     def begin_at(self, start_ns: int) -> None:
-        """Set the time of sample 0 again, for example after the slow set-up of many units."""
+        """Change the time of sample 0, which sets the times and the epoch of the next blocks."""
         self._start_ns = start_ns
 
     def truth(self) -> UnitTruth:
@@ -195,13 +194,13 @@ class SimulatedUnit:
 def _check(machine: Unit, calibration: UnitCalibration) -> None:
     if len(calibration.channels) != len(machine.channels):
         raise ConfigError(
-            f"unit {machine.id!r} has {len(machine.channels)} channels,"
-            f" but its calibration has {len(calibration.channels)}"
+            f"the calibration of unit {machine.id!r} must have {len(machine.channels)} channels,"
+            f" got {len(calibration.channels)}"
         )
     if calibration.rate_hz != machine.rate_hz:
         raise ConfigError(
-            f"unit {machine.id!r} samples at {machine.rate_hz} Hz,"
-            f" but its calibration has {calibration.rate_hz} Hz"
+            f"the calibration of unit {machine.id!r} must be for {machine.rate_hz} Hz,"
+            f" got {calibration.rate_hz} Hz"
         )
 
 
@@ -218,12 +217,14 @@ def _exchanged(machine: Unit, calibration: UnitCalibration, scenario: Scenario) 
     rows = {channel.id: row for row, channel in enumerate(machine.channels)}
     pairs = []
     for pair in scenario.exchanged:
+        names = " and ".join(pair)
         if not rows.keys() >= set(pair):
-            raise ConfigError(f"unit {machine.id!r} has no channels {pair} to exchange")
+            raise ConfigError(f"the exchanged channels {names} must both be in unit {machine.id!r}")
         first, second = (calibration.channels[rows[id_]].full_scale_v for id_ in pair)
         if first != second:
             raise ConfigError(
-                f"channels {pair} cannot be exchanged: their scales are {first} V and {second} V"
+                f"channels {names} cannot be exchanged: their full scales must be"
+                f" equal, but are {first} V and {second} V"
             )
         pairs.append([rows[id_] for id_ in pair])
     return pairs

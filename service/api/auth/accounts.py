@@ -11,7 +11,6 @@ from service.api.auth.authenticator import Authenticator
 from service.api.auth.declared import Reach, subject_router
 from service.api.auth.gate import identity_of, name_caller
 from service.api.auth.passwords import MAX_LENGTH, PasswordRefusedError, TooManyLoginsError
-from service.api.auth.people import create_key
 from service.api.context import Context
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel, Time
@@ -23,7 +22,7 @@ from service.store.access.identities import (
     Permission,
     Role,
 )
-from service.store.access.tables import AccessRefusedError, Account
+from service.store.access.tables import AccessRefusedError, Account, UnknownAccountError
 
 RoleName = Literal["viewer", "operator", "engineer", "admin"]
 
@@ -156,6 +155,8 @@ def refusals_as_problems(password: str = "password") -> Iterator[None]:  # noqa:
         raise ProblemError(422, "Wrong parameter", str(error), "name") from error
     except PasswordRefusedError as error:
         raise ProblemError(422, "Wrong parameter", str(error), password) from error
+    except UnknownAccountError as error:
+        raise ProblemError(404, "Unknown account", "the account does not exist") from error
     except AccessRefusedError as error:
         raise ProblemError(409, "Conflict", str(error)) from error
     except TooManyLoginsError as error:
@@ -180,35 +181,37 @@ CHANGE_PROBLEMS = problem_responses(
 
 def account_router(authenticator: Authenticator) -> APIRouter:
     """Return the router for accounts."""
-    stored, people, work, now_ns = (
-        authenticator.store.accounts,
-        authenticator.people,
-        authenticator.work,
-        authenticator.clock.now_ns,
-    )
+    stored, service = authenticator.store.accounts, authenticator.service
+    now_ns, change = authenticator.clock.now_ns, authenticator.change
     router = subject_router("/accounts", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
     router.dependencies.append(Depends(name_caller))
+
+    async def one(name: str) -> AccountModel:
+        found = await authenticator.work.run(lambda: stored.get(name))
+        if found is None:
+            raise ProblemError(404, "Unknown account", "the account does not exist")
+        return account_model(found)
 
     @router.get("", summary="Accounts", responses=problem_responses(503))
     async def accounts() -> list[AccountModel]:
         """List all accounts, sorted by name."""
-        return [account_model(account) for account in await work.run(stored.all)]
+        return [account_model(account) for account in await authenticator.work.run(stored.all)]
 
     @router.post("", summary="Add an account", status_code=201, responses=CHANGE_PROBLEMS)
     async def add(asked: NewAccountModel) -> AccountModel:
         """Add an account; its password must be changed at the first login."""
         new = asked.name, Role(asked.role), asked.password
         with refusals_as_problems():
-            name = await work.run_hashing(lambda: people.add(*new, now_ns(), must_change=True))
-        return await _one(authenticator, name)
+            return await one(
+                await change(lambda: service.add(*new, now_ns(), must_change=True), hashes=True)
+            )
 
     @router.put("/{name}/role", summary="Change a role", responses=CHANGE_PROBLEMS)
     async def set_role(name: AccountName, asked: SetRoleModel) -> AccountModel:
         """Change the role of an account, effective from the next request of the person."""
-        await _one(authenticator, name)
         with refusals_as_problems():
-            await work.run(lambda: stored.set_role(name, Role(asked.role), now_ns()))
-        return await _one(authenticator, name)
+            await change(lambda: stored.set_role(name, Role(asked.role), now_ns()))
+        return await one(name)
 
     @router.put("/{name}/password", summary="Set a password", responses=CHANGE_PROBLEMS)
     async def set_password(
@@ -218,40 +221,32 @@ def account_router(authenticator: Authenticator) -> APIRouter:
 
         The person must change this password at the next login.
         """
-        if _is_own(request, name):
-            detail = "use POST /session/password to change your own password"
-            raise ProblemError(409, "Conflict", detail)
-        await _one(authenticator, name)
+        _require_other(request, name, "use POST /session/password to change your own password")
+        await one(name)  # before hashing, which is slow
         new = name, asked.password
         with refusals_as_problems():
-            await work.run_hashing(lambda: people.set_password(*new, now_ns(), must_change=True))
-        return await _one(authenticator, name)
+            await change(
+                lambda: service.set_password(*new, now_ns(), must_change=True), hashes=True
+            )
+        return await one(name)
 
     @router.delete(
         "/{name}", summary="Remove an account", status_code=204, responses=CHANGE_PROBLEMS
     )
     async def remove(request: Request, name: AccountName) -> None:
         """Remove the account of another person, and end the sessions of the account."""
-        if _is_own(request, name):
-            raise ProblemError(409, "Conflict", "you cannot remove your own account")
-        await _one(authenticator, name)
+        _require_other(request, name, "you cannot remove your own account")
         with refusals_as_problems():
-            await work.run(lambda: stored.remove(name, now_ns()))
+            await change(lambda: stored.remove(name, now_ns()))
 
     return router
 
 
-def _is_own(request: Request, name: str) -> bool:
-    """Whether the caller has logged in with the account `name`."""
+def _require_other(request: Request, name: str, detail: str) -> None:
+    """Raise a problem of status 409 if the caller has logged in with the account `name`."""
     identity = identity_of(request)
-    return identity.means is Means.SESSION and identity.name == name
-
-
-async def _one(authenticator: Authenticator, name: str) -> AccountModel:
-    found = await authenticator.work.run(lambda: authenticator.store.accounts.get(name))
-    if found is None:
-        raise ProblemError(404, "Unknown account", "the account does not exist")
-    return account_model(found)
+    if identity.means is Means.SESSION and identity.name == name:
+        raise ProblemError(409, "Conflict", detail)
 
 
 KeyId = Annotated[
@@ -261,14 +256,14 @@ KeyId = Annotated[
 
 def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
     """Return the router for API keys."""
-    stored, work, clock = authenticator.store.keys, authenticator.work, authenticator.clock
+    stored, clock = authenticator.store.keys, authenticator.clock
     router = subject_router("/keys", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
     router.dependencies.append(Depends(name_caller))
 
     @router.get("", summary="Keys", responses=problem_responses(503))
     async def keys() -> list[KeyModel]:
         """List all API keys, also expired and revoked keys, oldest first, without their secrets."""
-        keys, now_ns = await work.run(stored.all), clock.now_ns()
+        keys, now_ns = await authenticator.work.run(stored.all), clock.now_ns()
         return [KeyModel.of(key, state=key.state(now_ns)) for key in keys]
 
     @router.post("", summary="Create a key", status_code=201, responses=CHANGE_PROBLEMS)
@@ -276,18 +271,20 @@ def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
         """Create an API key for a machine; only this answer contains the secret of the key."""
         for unit in asked.units:
             if unit not in context.units:
-                detail = "unknown unit"
+                detail = f"unknown unit {unit!r}; known units: {', '.join(context.units)}"
                 raise ProblemError(422, "Wrong parameter", detail, "units")
         new, now_ns = (asked.name, Role(asked.role), asked.units, asked.days), clock.now_ns()
         with refusals_as_problems():
-            made, shown = await work.run(lambda: create_key(authenticator.store, *new, now_ns))
+            made, shown = await authenticator.change(
+                lambda: authenticator.service.create_key(*new, now_ns)
+            )
         return CreatedKeyModel.of(made, state=made.state(now_ns), key=shown)
 
     @router.delete("/{key}", summary="Revoke a key", status_code=204, responses=CHANGE_PROBLEMS)
     async def revoke(key: KeyId) -> None:
         """Revoke an API key permanently; the request is idempotent."""
-        if await work.run(lambda: stored.get(key)) is None:
+        if await authenticator.work.run(lambda: stored.get(key)) is None:
             raise ProblemError(404, "Unknown key", "the key does not exist")
-        await work.run(lambda: stored.revoke(key, clock.now_ns()))
+        await authenticator.change(lambda: stored.revoke(key, clock.now_ns()))
 
     return router

@@ -45,22 +45,16 @@ PEER_RULE = WaitRule(n_free=10, longest_s=900.0)
 """Backoff for an address; more failures are free, since a control room may share one address."""
 
 
-@dataclass(frozen=True)
-class Failures:
-    """Number of consecutive failed logins, and monotonic time of the newest one, ns."""
-
-    number: int
-    newest_ns: int
-
-
 class Backoff:
-    """Thread-safe backoff of logins by account and by client address; all times are monotonic.
+    """Thread-safe backoff of logins by account and by client address; times are monotonic, ns.
 
     If an account has logged in from an address since the service started, failures at other
     addresses do not delay its next login from this address.
 
     Parameters
     ----------
+    of_account, of_peer
+        Rules for the failures of an account, and of a client address.
     max_remembered
         Maximum number of accounts, and of addresses, whose failures are stored.
     """
@@ -109,7 +103,7 @@ class Backoff:
         place = client_of(peer)
         with self._lock:
             self._accounts.forget(name)
-            self._peers.revoke_again(place)
+            self._peers.subtract(place)
             self._known[name, place] = None
             self._known.move_to_end((name, place))
             if len(self._known) > self._max_remembered:
@@ -121,45 +115,43 @@ class FailureCounts:
 
     def __init__(self, rule: WaitRule, max_remembered: int) -> None:
         self._rule, self._max_remembered = rule, max_remembered
-        self._failures: OrderedDict[Hashable, Failures] = OrderedDict()
+        self._failures: OrderedDict[Hashable, tuple[int, int]] = OrderedDict()
 
     def __len__(self) -> int:
         return len(self._failures)
 
     def wait(self, key: Hashable, now_ns: int) -> int:
-        """Return the time until an attempt by an account or address is allowed, ns; 0 if now."""
-        found = self._recent(key, now_ns)
-        if found is None:
-            return 0
-        return max(0, found.newest_ns + self._rule.wait_ns(found.number) - now_ns)
+        """Return the time until an account or address may attempt a login, ns; 0 if it may now."""
+        number, newest_ns = self._recent(key, now_ns)
+        return max(0, newest_ns + self._rule.wait_ns(number) - now_ns)
 
     def add(self, key: Hashable, now_ns: int) -> None:
         """Add one failure of an account or address."""
-        before = self._recent(key, now_ns)
-        self._failures[key] = Failures((before.number if before else 0) + 1, now_ns)
+        number, _ = self._recent(key, now_ns)
+        self._failures[key] = number + 1, now_ns
         self._failures.move_to_end(key)
         if len(self._failures) > self._max_remembered:
             self._failures.popitem(last=False)
 
-    def revoke_again(self, key: Hashable) -> None:
-        """Subtract one failure of an account or address."""
-        found = self._failures.pop(key, None)
-        if found is not None and found.number > 1:
-            self._failures[key] = Failures(found.number - 1, found.newest_ns)
+    def subtract(self, key: Hashable) -> None:
+        """Subtract one failure of an account or address, if it has any."""
+        number, newest_ns = self._failures.pop(key, (0, 0))
+        if number > 1:
+            self._failures[key] = number - 1, newest_ns
 
     def forget(self, key: Hashable) -> None:
-        """Delete all failures of an account or address."""
+        """Delete all failures of an account or address, if it has any."""
         self._failures.pop(key, None)
 
-    def _recent(self, key: Hashable, now_ns: int) -> Failures | None:
-        found = self._failures.get(key)
-        if found is None or now_ns - found.newest_ns >= self._rule.forget_s * NS_PER_S:
-            return None
-        return found
+    def _recent(self, key: Hashable, now_ns: int) -> tuple[int, int]:
+        """Return the number of consecutive failures, and the time of the newest one, ns."""
+        number, newest_ns = self._failures.get(key, (0, now_ns))
+        is_old = now_ns - newest_ns >= self._rule.forget_s * NS_PER_S
+        return (0, now_ns) if is_old else (number, newest_ns)
 
 
 def client_of(peer: str) -> str:
-    """Return the client of a network address: IPv4 address, IPv6 network, or the text itself."""
+    """Return the client of an address: IPv4 address, IPv6 /64 network, or the text if invalid."""
     try:
         address = ip_address(peer.partition("%")[0])
     except ValueError:

@@ -35,6 +35,8 @@ class Needs:
     ----------
     permission
         Required permission; None for an open route, which requires no login.
+    reach
+        Units that the route concerns, if its path contains no unit; default: all units.
     """
 
     permission: Permission | None
@@ -45,7 +47,7 @@ class Needs:
 
 
 def needs(permission: Permission, reach: Reach = Reach.PLANT) -> Any:
-    """Return a dependency that declares the permission for a route or a whole router."""
+    """Return a FastAPI dependency that declares the requirements of a route or a whole router."""
     return Depends(Needs(permission, reach))
 
 
@@ -61,7 +63,7 @@ def subject_router(
 
 
 class UndeclaredRouteError(Exception):
-    """Raised if a route declares no permission or occurs twice; the message names the route."""
+    """Raised if a route declares neither permission nor `OPEN`, or if an operation occurs twice."""
 
 
 @dataclass(frozen=True)
@@ -85,13 +87,13 @@ class Declared:
 
     @cached_property
     def query_parameters(self) -> Sequence[str]:
-        """Names of the query parameters of the operation."""
+        """Names of the query parameters, also of dependencies; empty without an `APIRoute`."""
         if not isinstance(self.route, APIRoute):
             return ()
         return tuple(dict.fromkeys(_query_names(self.route.dependant)))
 
     def matches(self, path: str) -> bool:
-        """Whether a path matches the route."""
+        """Whether a path matches the path template of the operation, for any HTTP method."""
         return isinstance(self.route, Route) and self.route.path_regex.match(path) is not None
 
 
@@ -108,7 +110,7 @@ def declared(app: FastAPI) -> Mapping[str, Declared]:
     found: dict[str, Declared] = {}
     for one in _all(app):
         if one.operation in found:
-            raise UndeclaredRouteError(f"{one.operation}: operation is declared twice")
+            raise UndeclaredRouteError(f"{one.operation}: the operation occurs twice; remove one")
         found[one.operation] = one
     return found
 
@@ -135,14 +137,13 @@ def _all(app: FastAPI) -> Iterator[Declared]:
 def _needs_of(app: FastAPI, method: str, path: str, context: Any, route: BaseRoute) -> Needs:
     if isinstance(route, Route) and not isinstance(route, APIRoute) and path == app.openapi_url:
         return Needs(None, Reach.NO_UNIT)
-    found = _needs_in(context.dependencies) if isinstance(route, APIRoute) else []
+    dependencies = context.dependencies if isinstance(route, APIRoute) else []
+    found = [each.dependency for each in dependencies if isinstance(each.dependency, Needs)]
     if not found:
-        raise UndeclaredRouteError(f"{method} {path}: route needs a permission or OPEN")
+        raise UndeclaredRouteError(
+            f"{method} {path}: route without declaration; add needs(...) or OPEN"
+        )
     return found[-1]
-
-
-def _needs_in(dependencies: Sequence[Any]) -> list[Needs]:
-    return [each.dependency for each in dependencies if isinstance(each.dependency, Needs)]
 
 
 def _query_names(dependant: Dependant) -> Iterator[str]:

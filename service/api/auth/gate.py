@@ -1,59 +1,51 @@
 """Authentication of callers by middleware, and check of the permission for each route."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from urllib.parse import urlsplit
 
 from fastapi import Request
+from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.api.auth.authenticator import Authenticator, Caller, Kind
 from service.api.auth.declared import Declared, Reach
-from service.api.problems import ProblemError, problem_answer
+from service.api.auth.refusals import SAFE
+from service.api.problems import STORE_FAILS, ProblemError, problem_answer
 from service.store.access.audit_entries import acting, name_actor
 from service.store.access.identities import LOCAL, Identity
 from service.store.port import StoreError
 
-SAFE = ("GET", "HEAD", "OPTIONS")
-"""Safe HTTP methods, which change no state."""
-
-OWN_SITES = (b"same-origin", b"none")
+OWN_SITES = ("same-origin", "none")
 """Accepted values of the header `Sec-Fetch-Site`: own pages, and addresses typed by the user."""
 
 
-def is_foreign(scheme: str, headers: Iterable[tuple[bytes, bytes]], requires_origin: bool) -> bool:
+def is_foreign(scope: Scope, *, requires_origin: bool) -> bool:
     """Whether a request may come from a page of another origin (cross-site request forgery).
 
     Browsers send cookies with requests of pages of any site, and let these pages reach loopback.
 
     Parameters
     ----------
-    scheme
-        Scheme of the request, "http" or "https".
     requires_origin
         Whether a request without headers ``Origin`` and ``Sec-Fetch-Site`` counts as foreign.
     """
-    found = list(headers)
-    hosts = _all(found, b"host")
-    origins, sites = _all(found, b"origin"), _all(found, b"sec-fetch-site")
+    headers = Headers(scope=scope)
+    hosts, origins = headers.getlist("host"), headers.getlist("origin")
+    sites = headers.getlist("sec-fetch-site")
     if not origins and not sites:
         return requires_origin
     if any(site not in OWN_SITES for site in sites):
         return True
-    return any(not _is_own(origin, scheme, hosts) for origin in origins)
+    return any(not _is_own(origin, scope["scheme"], hosts) for origin in origins)
 
 
-def _all(headers: list[tuple[bytes, bytes]], wanted: bytes) -> list[bytes]:
-    return [value for name, value in headers if name == wanted]
-
-
-def _is_own(origin: bytes, scheme: str, hosts: list[bytes]) -> bool:
+def _is_own(origin: str, scheme: str, hosts: list[str]) -> bool:
     try:
-        given = urlsplit(origin.decode("ascii"))
+        given = urlsplit(origin)
     except ValueError:
         return False
     # behind a proxy that terminates TLS, the page uses https and the request http
-    is_scheme = given.scheme in (scheme, "https")
-    return is_scheme and len(hosts) == 1 and given.netloc.encode() == hosts[0]
+    return given.scheme in (scheme, "https") and [given.netloc] == hosts
 
 
 BEARER_ONLY = {"WWW-Authenticate": 'Bearer realm="padwatch"'}
@@ -96,7 +88,7 @@ class Gate:
         self._app, self._declared, self._desk = app, declared, authenticator
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request, or answer with a problem document if the caller is not admitted."""
+        """Forward a request with its caller in the state; answer 401, 403 or 503 if refused."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -111,8 +103,7 @@ class Gate:
         try:
             caller = await self._desk.caller(scope)
         except StoreError as error:
-            detail = "the store cannot be read now"
-            raise ProblemError(503, "Store not available", detail) from error
+            raise ProblemError(503, "Store not available", STORE_FAILS) from error
         scope.setdefault("state", {})[CALLER] = caller
         if caller.identity is None and not self._is_open(scope):
             raise not_logged_in()
@@ -131,8 +122,7 @@ def _require_own_page(scope: Scope, caller: Caller) -> None:
     """Raise a problem of status 403 if a page of another origin requests a change."""
     if scope["method"] in SAFE or caller.shown.kind is Kind.KEY:
         return
-    requires_origin = caller.shown.kind is not Kind.NOTHING
-    if is_foreign(scope["scheme"], scope["headers"], requires_origin):
+    if is_foreign(scope, requires_origin=caller.shown.kind is not Kind.NOTHING):
         detail = "requests from pages of other sites are rejected"
         raise ProblemError(403, "Cross-site request", detail)
 
@@ -150,7 +140,7 @@ async def require_declared(request: Request) -> None:
     ------
     ProblemError
         With status 401 if the caller is not authenticated; 403 if the role or units of the caller
-        are not sufficient.
+        are not sufficient, or if the caller must first change the password.
     """
     operation = f"{request.method} {request.scope['route'].path}"
     needed = request.app.declared[operation].needs

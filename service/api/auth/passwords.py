@@ -9,11 +9,8 @@ from functools import cached_property
 from threading import BoundedSemaphore
 from typing import TypeVar
 
-import structlog
 from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
-
-from service.store.port import StoreError
 
 MIN_LENGTH = 12
 MAX_LENGTH = 256
@@ -56,7 +53,8 @@ def new_password(written: str, name: str) -> str:
             f"a password must have {MIN_LENGTH} to {MAX_LENGTH} characters, got {len(password)}"
         )
     if len(set(password.casefold())) < MIN_DIFFERENT:
-        raise PasswordRefusedError(f"a password must have {MIN_DIFFERENT} different characters")
+        detail = f"a password must have at least {MIN_DIFFERENT} different characters"
+        raise PasswordRefusedError(detail)
     if len(name) > 2 and name in password.casefold():
         raise PasswordRefusedError("a password must not contain the name of the account")
     return password
@@ -68,16 +66,13 @@ class Hashing:
     Parameters
     ----------
     hasher
-        Argon2id hasher for new hashes; stored hashes with other parameters are verified too.
+        Argon2id hasher for new hashes; default: `plant_hasher`. Stored hashes with other parameters
+        are verified too.
     """
 
     def __init__(self, hasher: PasswordHasher | None = None) -> None:
         self._hasher = hasher or plant_hasher()
         self._places = BoundedSemaphore(MAX_AT_ONCE)
-
-    def prepare(self) -> None:
-        """Compute in advance the hash that `verify` uses for unknown accounts."""
-        _ = self._unused_hash
 
     def hash(self, password: str) -> str:
         """Return a salted argon2id hash of a password."""
@@ -93,8 +88,9 @@ class Hashing:
         # normalise before truncation: one character may have several encodings
         tried = _bytes(_normal(password)[: MAX_LENGTH + 1])
         with self._places:
+            unused = self._unused_hash  # computed once, whether the account is known or not
             try:
-                self._hasher.verify(self._unused_hash if stored is None else stored, tried)
+                self._hasher.verify(unused if stored is None else stored, tried)
             except (VerificationError, InvalidHashError):
                 return False
         return stored is not None
@@ -118,8 +114,6 @@ def _bytes(password: str) -> bytes:
     return _normal(password).encode("utf-8", "surrogatepass")
 
 
-log = structlog.get_logger()
-
 MAX_WAITING = 16
 """Maximum number of running and queued hash computations; each takes about 0.3 s."""
 
@@ -127,9 +121,6 @@ MAX_KNOWN_WAITING = 8
 """Number of further queue places for accounts that have logged in from the same address."""
 
 LOOKUP_THREADS = 2
-
-MAX_NOTES = 64
-"""Maximum number of queued writes of last-use times; further writes are dropped."""
 
 T = TypeVar("T")
 
@@ -139,15 +130,13 @@ class TooManyLoginsError(Exception):
 
 
 class AccessThreads:
-    """Thread pools for store access, password hashing, and writes of last-use times."""
+    """Thread pools for access to the store and for password hashing."""
 
     def __init__(self) -> None:
         self._lookups = ThreadPoolExecutor(LOOKUP_THREADS, "access")
         self._hashes = ThreadPoolExecutor(MAX_AT_ONCE, "passwords")
         self._places = BoundedSemaphore(MAX_WAITING)
         self._known_places = BoundedSemaphore(MAX_KNOWN_WAITING)
-        self._notes = ThreadPoolExecutor(1, "notes")
-        self._note_places = BoundedSemaphore(MAX_NOTES)
 
     async def run(self, look: Callable[[], T]) -> T:
         """Run a short database operation in a thread; return its result."""
@@ -177,18 +166,5 @@ class AccessThreads:
 
     def close(self) -> None:
         """Shut down the thread pools without waiting; cancel queued work."""
-        for threads in (self._lookups, self._hashes, self._notes):
+        for threads in (self._lookups, self._hashes):
             threads.shutdown(wait=False, cancel_futures=True)
-
-    def note(self, write: Callable[[], None]) -> None:
-        """Queue a write of a last-use time without waiting; drop it if the queue is full."""
-        if self._note_places.acquire(blocking=False):
-            running = self._notes.submit(_tried, write)
-            running.add_done_callback(lambda _: self._note_places.release())
-
-
-def _tried(write: Callable[[], None]) -> None:
-    try:
-        write()
-    except StoreError as error:
-        log.warning("the time of use of a session or key was not stored", reason=str(error))

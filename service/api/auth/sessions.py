@@ -1,14 +1,11 @@
 """Routes for login, logout, password change, and creation of the first account."""
 
-import asyncio
-from contextlib import suppress
 from math import ceil
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
-from acquisition.clock import Clock
 from service.api.auth.accounts import LoginName, Password, RoleName, refusals_as_problems
 from service.api.auth.authenticator import (
     COOKIE,
@@ -16,18 +13,13 @@ from service.api.auth.authenticator import (
     Authenticator,
     Caller,
     Kind,
-    LoggedIn,
-    NotLoggedIn,
 )
 from service.api.auth.declared import OPEN, Reach, needs
 from service.api.auth.gate import BEARER_ONLY, caller_of, identity_of
-from service.api.context import Context
+from service.api.auth.service import LoggedIn, NotLoggedIn
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel
-from service.store.access.audit_entries import AuditAction, acting, name_actor
-from service.store.access.identities import Identity, Means, Permission, Role
-from service.store.audit import AuditStore
-from service.store.port import StoreError
+from service.store.access.identities import Means, Permission, Role
 
 PermissionName = Literal["read", "act_on_alarms", "change_measuring", "read_audit", "change_access"]
 
@@ -66,7 +58,7 @@ class LoginModel(RequestModel):
 
 
 class NewPasswordModel(RequestModel):
-    """Request of a person to change the password of the own account."""
+    """Request to change the password of the caller."""
 
     password: Password
     """Current password."""
@@ -86,30 +78,6 @@ class SetUpModel(RequestModel):
 
     password: Password
     """Password of the account: 12 to 256 characters, at least 6 of them different."""
-
-
-BEGUN, ENDED = "session.begun", "session.ended"
-
-
-async def record(audit: AuditStore, clock: Clock, action: str, name: str) -> None:
-    """Record a login or logout in the audit trail.
-
-    Parameters
-    ----------
-    action
-        `BEGUN` or `ENDED`.
-    name
-        Name of the account.
-
-    Raises
-    ------
-    StoreError
-        If the entry cannot be stored.
-    """
-    name_actor(name)
-    who = acting()
-    deed = AuditAction(clock.now_ns(), name, action, name, source=who.source, peer=who.peer)
-    await asyncio.to_thread(audit.record, [deed])
 
 
 LOGIN_PROBLEMS = problem_responses(
@@ -133,7 +101,7 @@ SET_UP_PROBLEMS = problem_responses(
 )
 
 
-def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
+def session_router(authenticator: Authenticator) -> APIRouter:
     """Return the router for sessions and for the creation of the first account."""
     router = APIRouter(prefix="/api/v1", tags=["access"])
 
@@ -151,18 +119,19 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
     )
     async def log_in(request: Request, response: Response, asked: LoginModel) -> SessionModel:
         """Log in: start a session and set its cookie; an earlier session of the browser ends."""
-        logged_in = await _log_in(authenticator, request, asked.name, asked.password)
-        await _end(authenticator, caller_of(request))
-        await _record_login(context, authenticator, logged_in)
+        with refusals_as_problems():
+            found = await authenticator.log_in(asked.name, asked.password, _peer(request))
+        logged_in, shown = _logged_in(found), caller_of(request).shown
+        if shown.kind is Kind.SESSION:
+            await authenticator.log_out(shown.secret, is_replaced=True)
         return await _begun(authenticator, request, response, logged_in)
 
     @router.delete("/session", summary="Log out", status_code=204, dependencies=[OPEN])
     async def log_out(request: Request, response: Response) -> None:
         """Log out: end the session of the browser, if any, and delete the session cookie."""
-        caller = caller_of(request)
-        await _end(authenticator, caller)
-        if caller.identity is not None and caller.identity.means is Means.SESSION:
-            await record(context.store.audit, context.clock, ENDED, caller.identity.name)
+        shown = caller_of(request).shown
+        if shown.kind is Kind.SESSION:
+            await authenticator.log_out(shown.secret)
         response.delete_cookie(COOKIE, secure=True, httponly=True, samesite="strict")
         response.delete_cookie(PLAIN_COOKIE, httponly=True, samesite="strict")
 
@@ -177,16 +146,15 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
         request: Request, response: Response, asked: NewPasswordModel
     ) -> SessionModel:
         """Change the password of the caller; all earlier sessions end, and a new one starts."""
-        identity = _person(identity_of(request))
-        await _log_in(authenticator, request, identity.name, asked.password)
-        new = identity.name, asked.new_password
+        identity = identity_of(request)
+        if identity.means is not Means.SESSION:
+            detail = "this identity has no password; log in with an account first"
+            raise ProblemError(409, "No password", detail)
+        given = identity.name, asked.password, asked.new_password, _peer(request)
+        change, times = authenticator.service.change_password, authenticator.now
         with refusals_as_problems("new_password"):
-            await authenticator.work.run_hashing(
-                lambda: authenticator.people.set_password(*new, authenticator.clock.now_ns())
-            )
-        logged_in = await _log_in(authenticator, request, identity.name, asked.new_password)
-        await _record_login(context, authenticator, logged_in)
-        return await _begun(authenticator, request, response, logged_in)
+            found = await authenticator.change(lambda: change(*given, *times), hashes=True)
+        return await _begun(authenticator, request, response, _logged_in(found))
 
     @router.post(
         "/set-up",
@@ -197,8 +165,11 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
     )
     async def set_up(request: Request, asked: SetUpModel) -> SessionModel:
         """Create the first account, an administrator, with the token that the service printed."""
+        given, now_ns = (asked.token, asked.name, asked.password), authenticator.clock.now_ns()
         with refusals_as_problems():
-            is_made = await authenticator.set_up(asked.token, asked.name, asked.password)
+            is_made = await authenticator.work.run_hashing(
+                lambda: authenticator.service.set_up(*given, now_ns), is_known=False
+            )
         if not is_made:
             detail = "the token is wrong or was used, or an account exists already"
             raise ProblemError(403, "Setup rejected", detail)
@@ -207,32 +178,20 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
     return router
 
 
-async def _log_in(
-    authenticator: Authenticator, request: Request, name: str, password: str
-) -> LoggedIn:
-    peer = request.client.host if request.client else ""
-    with refusals_as_problems():
-        found = await authenticator.log_in(name, password, peer)
-    if isinstance(found, NotLoggedIn):
-        if not found.wait_s:
-            detail = "the name or the password is wrong"
-            raise ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
-        wait = {"Retry-After": str(max(1, ceil(found.wait_s)))}
-        detail = "too many failed logins; wait before the next one"
-        raise ProblemError(429, "Wait", detail, headers=wait)
-    return found
+def _peer(request: Request) -> str:
+    return request.client.host if request.client else ""
 
 
-async def _record_login(
-    context: Context, authenticator: Authenticator, logged_in: LoggedIn
-) -> None:
-    """Record a login in the audit trail; if recording fails, end the new session."""
-    try:
-        await record(context.store.audit, context.clock, BEGUN, logged_in.identity.name)
-    except StoreError:
-        with suppress(StoreError):
-            await authenticator.log_out(logged_in.token)
-        raise
+def _logged_in(found: LoggedIn | NotLoggedIn) -> LoggedIn:
+    """Return a successful login; raise a problem of status 401 or 429 for a failed one."""
+    if isinstance(found, LoggedIn):
+        return found
+    if not found.wait_s:
+        detail = "the name or the password is wrong"
+        raise ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
+    wait = {"Retry-After": str(max(1, ceil(found.wait_s)))}
+    detail = f"too many failed logins; try again after {wait['Retry-After']} s"
+    raise ProblemError(429, "Wait", detail, headers=wait)
 
 
 async def _begun(
@@ -250,18 +209,6 @@ async def _begun(
 def _is_secure(request: Request) -> bool:
     """Whether the browser uses HTTPS, even if a proxy forwards its requests over HTTP."""
     return "https" in (request.url.scheme, request.headers.get("origin", "").partition(":")[0])
-
-
-async def _end(authenticator: Authenticator, caller: Caller) -> None:
-    if caller.shown.kind is Kind.SESSION:
-        await authenticator.log_out(caller.shown.secret)
-
-
-def _person(identity: Identity) -> Identity:
-    if identity.means is not Means.SESSION:
-        detail = "this identity has no password; log in with an account first"
-        raise ProblemError(409, "No password", detail)
-    return identity
 
 
 async def session_model(caller: Caller, authenticator: Authenticator) -> SessionModel:

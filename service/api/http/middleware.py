@@ -1,4 +1,4 @@
-"""ASGI middleware between HTTP server and application: checks of hosts, bodies and load."""
+"""ASGI middleware between HTTP server and application: headers, hosts, bodies and deadlines."""
 
 import asyncio
 import re
@@ -6,86 +6,12 @@ from collections.abc import Iterable, Sequence
 from ipaddress import ip_address
 
 from starlette.datastructures import MutableHeaders
-from starlette.requests import ClientDisconnect
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.http.refusals import (
-    BODY_TOO_LARGE,
-    BUSY,
-    NO_ANSWER,
-    NO_HOST,
-    NOT_UTF8,
-    TOO_DEEP,
-    WRONG_HOST,
-    Refusal,
-)
+from service.api.problems import ProblemError, problem_answer
 from service.runtime.asker import ASKER, Asker
-from service.settings.processes import HttpLimitSettings
-
-
-class HeadRequests:
-    """ASGI middleware that handles HEAD as GET without a body (RFC 9110, 9.3.2)."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request; drop the body of the answer to a HEAD request."""
-        if scope.get("method") != "HEAD":
-            await self._app(scope, receive, send)
-            return
-
-        async def without_body(message: Message) -> None:
-            if message["type"] == "http.response.body":
-                message = {**message, "body": b""}
-            await send(message)
-
-        await self._app({**scope, "method": "GET"}, receive, without_body)
-
-
-HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(?::[0-9]{1,5})?")
-"""Pattern of a Host header: name, IPv4 address or bracketed IPv6 address, and optional port."""
-
-LOOPBACK = ("localhost", "127.0.0.1", "::1")
-
-
-class KnownHosts:
-    """ASGI middleware that refuses requests with an unknown host in the Host header.
-
-    This prevents DNS rebinding, by which another site resolves its own host name to 127.0.0.1; its
-    requests contain that host name.
-
-    Parameters
-    ----------
-    hosts
-        Accepted host names and addresses without port, in addition to loopback and the address of
-        the server.
-    """
-
-    def __init__(self, app: ASGIApp, hosts: Iterable[str]) -> None:
-        self._app = app
-        self._known = {host.lower().strip("[]").rstrip(".") for host in (*LOOPBACK, *hosts)}
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request if its Host header names this service; otherwise refuse it."""
-        asked = [value for name, value in scope["headers"] if name == b"host"]
-        if len(asked) != 1 or not asked[0]:
-            await NO_HOST.send(scope, send)
-        elif self._is_known(_name(asked[0].decode("latin-1")), scope):
-            await self._app(scope, receive, send)
-        else:
-            await WRONG_HOST.send(scope, send)
-
-    def _is_known(self, name: str, scope: Scope) -> bool:
-        address, _ = scope.get("server") or ("", None)
-        return name in self._known or (bool(name) and name == address.removeprefix("::ffff:"))
-
-
-def _name(host: str) -> str:
-    """Return the host name of a Host header, without port; empty if the header is malformed."""
-    found = HOST.fullmatch(host)
-    return found[1].strip("[]").rstrip(".").lower() if found else ""
-
 
 SECURITY_HEADERS = (
     ("x-content-type-options", "nosniff"),
@@ -122,7 +48,11 @@ FOR, PROTO = b"x-forwarded-for", b"x-forwarded-proto"
 
 
 class TrustedProxy:
-    """ASGI middleware that takes client address and scheme from the headers of a trusted proxy."""
+    """ASGI middleware that takes client address and scheme from the headers of a trusted proxy.
+
+    The proxy adds the last value of a header. Uvicorn takes the first, which the client may have
+    sent, and accepts any text as an address.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -148,130 +78,40 @@ def _client(address: str) -> tuple[str, int] | None:
         return None
 
 
-TOKEN = re.compile(rb'"(?:[^"\\]++|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)
-"""Pattern of a JSON string, terminated or not, or of a bracket; matching never backtracks."""
+HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(?::[0-9]{1,5})?")
+"""Pattern of a Host header: name, IPv4 address or bracketed IPv6 address, and optional port."""
+
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
+
+MAX_BODY_BYTES = 16 * 1024
+"""Maximum size of a request body, bytes. Valid bodies are smaller, and 16 kB of unknown members
+take 1 ms to refuse."""
 
 
-def is_deeper_than(limit: int, text: bytes) -> bool:
-    """Whether arrays and objects in a JSON text, even an invalid one, exceed a nesting depth."""
-    if text.count(b"[") + text.count(b"{") <= limit:
-        return False  # true for all usual requests, and faster than scanning strings
-    depth = 0
-    for match in TOKEN.finditer(text):
-        first = text[match.start()]
-        if first in b"[{":
-            depth += 1
-            if depth > limit:
-                return True
-        elif first in b"]}":
-            depth -= 1
-    return False
+class CheckedRequests:
+    """ASGI middleware that refuses foreign hosts and large bodies, and ends late answers.
 
+    The check of the Host header prevents DNS rebinding, by which another site resolves its own host
+    name to 127.0.0.1. HEAD is handled as GET; the server omits the body of the answer.
 
-class TooLargeError(Exception):
-    """Raised if a request body exceeds the size limit."""
-
-
-class WholeBodies:
-    """ASGI middleware that receives and checks the whole request body before the application runs.
-
-    The deadlines of `GuardedProtocol` limit the duration of receiving.
+    Parameters
+    ----------
+    hosts
+        Accepted host names and addresses without port, in addition to loopback and the address of
+        the server.
+    answer_s
+        Time from the head of the request to the start of its answer, s.
     """
 
-    def __init__(self, app: ASGIApp, limits: HttpLimitSettings) -> None:
-        self._app, self._limits = app, limits
+    def __init__(self, app: ASGIApp, hosts: Iterable[str], answer_s: float) -> None:
+        self._app, self._answer_s = app, answer_s
+        self._hosts = {host.lower().strip("[]").rstrip(".") for host in (*LOOPBACK, *hosts)}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Receive and check the body, then forward the request, or refuse it."""
-        try:
-            body = await self._body(scope, receive)
-        except TooLargeError:
-            await BODY_TOO_LARGE.send(scope, send)
-            return
-        except ClientDisconnect:
-            return
-        refusal = self._wrong(body)
-        if refusal is not None:
-            await refusal.send(scope, send)
-            return
-        await self._app(scope, _replayed(body, receive), send)
-
-    async def _body(self, scope: Scope, receive: Receive) -> bytes:
-        limit = 1024 * self._limits.max_body_kb
-        if any(
-            _declares_more(value, limit)
-            for name, value in scope["headers"]
-            if name == b"content-length"
-        ):
-            raise TooLargeError
-        body = bytearray()
-        while True:
-            message = await receive()
-            if message["type"] == "http.disconnect":
-                raise ClientDisconnect
-            body += message.get("body", b"")
-            if len(body) > limit:
-                raise TooLargeError
-            if not message.get("more_body", False):
-                return bytes(body)
-
-    def _wrong(self, body: bytes) -> Refusal | None:
-        try:
-            body.decode()
-        except UnicodeDecodeError:
-            return NOT_UTF8
-        return TOO_DEEP if is_deeper_than(self._limits.max_json_depth, body) else None
-
-
-def _declares_more(length: bytes, limit: int) -> bool:
-    digits = length.strip().lstrip(b"0")
-    # int() is slow for very long numbers, and fails for more than 4300 digits
-    return len(digits) > 18 or int(digits or b"0") > limit
-
-
-def _replayed(body: bytes, receive: Receive) -> Receive:
-    """Return a `receive` function that gives the whole body first, then messages from `receive`."""
-    whole: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
-
-    async def given() -> Message:
-        return whole.pop() if whole else await receive()
-
-    return given
-
-
-class BoundedAnswers:
-    """ASGI middleware that limits the number and duration of concurrent requests.
-
-    Both limits apply until the answer starts; then the deadlines of `GuardedProtocol` apply.
-    """
-
-    def __init__(self, app: ASGIApp, limits: HttpLimitSettings) -> None:
-        self._app, self._limits = app, limits
-        self._n_running = 0
-        self._deadlines: set[asyncio.Timeout] = set()
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request; answer 503 above the limit, or if no answer starts in time."""
-        if self._n_running >= self._limits.max_requests:
-            await BUSY.send(scope, send)
-            return
-        asker = Asker()
-        before = ASKER.set(asker)
-        try:
-            is_answered = await self._answered(scope, receive, send)
-        finally:
-            asker.has_gone = True  # cancels store reads that still run in a thread
-            ASKER.reset(before)
-        if not is_answered:
-            await NO_ANSWER.send(scope, send)
-
-    def give_up(self) -> None:
-        """Cancel all requests whose answers have not started."""
-        for deadline in self._deadlines:
-            deadline.reschedule(0.0)
-
-    async def _answered(self, scope: Scope, receive: Receive, send: Send) -> bool:
-        has_begun = False
+        """Forward a request, or answer with a problem document."""
+        if scope["method"] == "HEAD":
+            scope = {**scope, "method": "GET"}
+        has_begun, refusal = False, None
 
         async def watched(message: Message) -> None:
             nonlocal has_begun
@@ -279,31 +119,68 @@ class BoundedAnswers:
                 return  # sent while the application is cancelled
             if not has_begun:
                 has_begun = True
-                self._n_running -= 1
-                self._deadlines.discard(deadline)
                 deadline.reschedule(None)
             await send(message)
 
-        self._n_running += 1
+        asker = Asker()
+        before = ASKER.set(asker)
         try:
-            async with asyncio.timeout(self._limits.answer_s) as deadline:
-                self._deadlines.add(deadline)
-                await self._app(scope, receive, watched)
+            self._require_known_host(scope)
+            _require_small_body(scope)
+            async with asyncio.timeout(self._answer_s) as deadline:
+                await self._app(scope, _limited(receive), watched)
+        except ProblemError as error:
+            refusal = error
         except TimeoutError:
             if not deadline.expired():
                 raise
-            return False
+            refusal = _too_late("the request timed out; request a shorter range")
+        except asyncio.CancelledError:
+            refusal = _too_late("the service is stopping")  # cancelled by the server only
         finally:
-            self._deadlines.discard(deadline)
-            if not has_begun:
-                self._n_running -= 1
-        return True
+            asker.has_gone = True  # cancels store reads that still run in a thread
+            ASKER.reset(before)
+        if refusal is not None and not has_begun:
+            await problem_answer(Request(scope), refusal)(scope, receive, send)
+
+    def _require_known_host(self, scope: Scope) -> None:
+        hosts = [value for name, value in scope["headers"] if name == b"host"]
+        if len(hosts) != 1 or not hosts[0]:
+            raise ProblemError(400, "No host", "a request must have exactly one Host header")
+        found = HOST.fullmatch(hosts[0].decode("latin-1"))
+        name = found[1].strip("[]").rstrip(".").lower() if found else ""
+        address, _ = scope.get("server") or ("", None)
+        if not name or (name not in self._hosts and name != address.removeprefix("::ffff:")):
+            detail = "the requested host is not a name of this service"
+            raise ProblemError(421, "Wrong host", detail)
 
 
-def guarded(answers: BoundedAnswers, limits: HttpLimitSettings, hosts: Iterable[str]) -> ASGIApp:
-    """Return `answers` inside the middleware for bodies, hosts, headers and HEAD requests.
+TOO_LARGE = f"the body is larger than {MAX_BODY_BYTES // 1024} KiB"
 
-    Bodies are read before requests are counted, so that slow clients do not exhaust the limit.
-    """
-    bodies = WholeBodies(answers, limits)
-    return HeadRequests(AddedHeaders(KnownHosts(bodies, hosts), SECURITY_HEADERS))
+
+def _require_small_body(scope: Scope) -> None:
+    # the server accepts digits only; int() is slow for very many
+    lengths = [value for name, value in scope["headers"] if name == b"content-length"]
+    if any(len(value) > 18 or int(value) > MAX_BODY_BYTES for value in lengths):
+        raise ProblemError(413, "Body too large", TOO_LARGE)
+
+
+def _limited(receive: Receive) -> Receive:
+    """Return a `receive` function that raises HTTPException above the maximum body size."""
+    n_bytes = 0
+
+    async def limited() -> Message:
+        nonlocal n_bytes
+        message = await receive()
+        n_bytes += len(message.get("body", b""))
+        if n_bytes > MAX_BODY_BYTES:
+            raise HTTPException(413, TOO_LARGE)
+        return message
+
+    return limited
+
+
+def _too_late(detail: str) -> ProblemError:
+    # the client may still be sending the body
+    headers = {"Retry-After": "5", "Connection": "close"}
+    return ProblemError(503, "No answer in time", detail, headers=headers)

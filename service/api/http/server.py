@@ -1,85 +1,81 @@
-"""HTTP server: uvicorn with deadlines, heartbeats and a shutdown in bounded time."""
+"""HTTP server: uvicorn, configured through its public options."""
 
-import asyncio
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from ssl import SSLContext
+from typing import Any, cast
 
 import uvicorn
+from starlette.types import ASGIApp
 
-from service.api.http.protocol import STOP_S, Connections, GuardedConfig, GuardedProtocol
+from service.api.http.middleware import SECURITY_HEADERS, AddedHeaders, CheckedRequests
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.settings.processes import HttpLimitSettings
 
-SHUTDOWN_S = 1.0
-"""Time after which unfinished requests are cancelled when the server stops, s."""
+BEAT_S = 1
+"""Period of the heartbeats, s."""
 
-SWEEP_TICKS = 5
-"""Period of the checks of connection deadlines, in uvicorn ticks of 0.1 s."""
+KEEP_ALIVE_S = 10
+"""Time after an answer after which an idle connection is closed, s; longer than in the shipped
+nginx configuration, so that the proxy closes first."""
+
+STOP_S = 1
+"""Time for unfinished requests when the server stops, s."""
 
 
-class GuardedServer(uvicorn.Server):
-    """Uvicorn server with deadlines for connections and without signal handlers."""
+class HttpServer(uvicorn.Server):
+    """Uvicorn server that sends heartbeats and leaves signals to the program."""
 
-    def __init__(self, config: GuardedConfig) -> None:
-        super().__init__(config)
-        self._guarded = config
-        self._pulse: Pulse = UNHEARD
+    async def run_on(self, listener: socket.socket, pulse: Pulse = UNHEARD) -> None:
+        """Serve requests on a listening socket until stopped; send a heartbeat every `BEAT_S`."""
 
-    async def run_on(self, listener: socket.socket, pulse: Pulse) -> None:
-        """Serve requests on a listening socket until stopped; send heartbeats to `pulse`."""
-        self._pulse = pulse
+        async def beat() -> None:
+            pulse.beat(BEAT_S)
+
+        self.config.callback_notify = beat
         await self.serve([listener])
-
-    @property
-    def open(self) -> Connections:
-        """Open connections of the server."""
-        return self._guarded.connections
-
-    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Listen with a time limit for TLS handshakes, which uvicorn does not set."""
-        if self.config.ssl is None:
-            await super().startup(sockets)
-            return
-        await self.lifespan.startup()
-        loop = asyncio.get_running_loop()
-        self.servers = [
-            await loop.create_server(
-                self._connection,
-                sock=listener,
-                ssl=self.config.ssl,
-                backlog=self.config.backlog,
-                ssl_handshake_timeout=self.open.limits.head_s,
-                ssl_shutdown_timeout=STOP_S,
-            )
-            for listener in sockets or ()
-        ]
-        self.started = True
-
-    def _connection(self) -> asyncio.Protocol:
-        return GuardedProtocol(self._guarded, self.server_state, self.lifespan.state)
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
         """Install no signal handlers; the program handles signals and stops all its parts."""
         yield
 
-    async def on_tick(self, counter: int) -> bool:
-        """Send a heartbeat, check connection deadlines; return whether the server must stop."""
-        self._pulse.beat()
-        if counter % SWEEP_TICKS == 0:
-            self.open.sweep()
-        return await super().on_tick(counter)
 
-    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Stop the server; after `SHUTDOWN_S`, cancel requests and abort all connections."""
-        # give up before uvicorn cancels the tasks, which logs a traceback for each
-        patience = asyncio.get_running_loop().call_later(SHUTDOWN_S, self._give_up)
-        try:
-            await super().shutdown(sockets)
-        finally:
-            patience.cancel()
-            self.open.abort_all()
+def http_server(
+    app: ASGIApp,
+    limits: HttpLimitSettings,
+    hosts: Iterable[str],
+    headers: Sequence[tuple[str, str]] = (),
+    tls: SSLContext | None = None,
+) -> HttpServer:
+    """Return the server of an application.
 
-    def _give_up(self) -> None:
-        self._guarded.answers.give_up()
-        self.open.abort_all()
+    Parameters
+    ----------
+    hosts
+        Accepted host names and addresses, in addition to loopback.
+    headers
+        Headers of all answers, in addition to `SECURITY_HEADERS`.
+    tls
+        TLS context; None for plain HTTP.
+    """
+    checked = CheckedRequests(app, hosts, limits.answer_s)
+    complete = AddedHeaders(checked, [*SECURITY_HEADERS, *headers])
+    return HttpServer(
+        uvicorn.Config(
+            cast(Any, complete),  # Starlette and uvicorn declare different types
+            http="httptools",
+            ws="none",
+            lifespan="off",
+            log_level="error",  # a warning for each malformed request would fill the disk
+            access_log=False,
+            server_header=False,
+            proxy_headers=False,  # see TrustedProxy
+            limit_concurrency=limits.max_connections,
+            timeout_keep_alive=KEEP_ALIVE_S,
+            timeout_graceful_shutdown=STOP_S,
+            timeout_notify=BEAT_S,
+            ssl_context_factory=None if tls is None else lambda *_: tls,
+        )
+    )

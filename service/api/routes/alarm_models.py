@@ -1,31 +1,28 @@
 """API models of alarms and alarm events."""
 
+from collections.abc import Hashable
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState
 from core.alarms.kinds import FILM_KINDS
+from core.change.film_judge import FilmNews
 from core.condition.cells import CellGrid, OperatingPoint
-from core.limits import AlarmLevel
-from service.api.context import FilmState
 from service.api.values import (
     ApiModel,
     ByName,
     CellModel,
-    DatedAnswer,
     FilmConditionModel,
     OperatingStateName,
     Time,
     cell_of,
     condition_model,
 )
-from service.live.alarm_list import AlarmList
-from service.settings.alarm_kinds import AlarmKindName, value_unit
+from service.live.current_state import LiveAlarms, LiveFilms
+from service.settings.alarm_kinds import AlarmKindName, AlarmLevelName, value_unit
 from service.settings.storage import Origin
 from service.store.port import StoredEvent
-
-AlarmLevelName = Literal["alert", "danger"]
 
 AlarmStateName = Literal[
     "normal",
@@ -138,7 +135,7 @@ class AlarmModel(ApiModel):
     alarm is raised or rises in level."""
 
     raised: Time | None
-    """Start of the newest occurrence."""
+    """Start of the newest occurrence; null if the alarm was never raised."""
 
     raised_at: RaisedAtModel | None
     """Operating condition when the alarm was last raised; null if unknown or never raised."""
@@ -193,7 +190,7 @@ class AlarmCountModel(ApiModel):
     """Number of alarms that are neither active nor hidden and whose condition is unknown."""
 
 
-class AlarmListModel(DatedAnswer):
+class AlarmListModel(ApiModel):
     """List of alarms that are not normal, and of normal alarms whose condition is unknown."""
 
     origin: OriginName
@@ -261,7 +258,7 @@ class AlarmEventModel(ApiModel):
     """Person or key that caused the event; empty for an automatic change."""
 
     reason: str
-    """Reason for the event."""
+    """Reason or comment given by the actor, or reason for an automatic change; may be empty."""
 
     raised_at: RaisedAtModel | None
     """Operating condition when the alarm was raised; null if unknown."""
@@ -280,23 +277,26 @@ class AlarmEventsModel(ApiModel):
     """Value of the parameter ``before`` for the next page; null on the last page."""
 
 
-def alarm_list_model(
-    engine: AlarmList, films: FilmState, origin: Origin, now_ns: int
-) -> AlarmListModel:
+def alarm_list_model(alarms: LiveAlarms, films: LiveFilms, origin: Origin) -> AlarmListModel:
     """Return the API model of the alarm list."""
-    alarms = engine.alarms
-    listed = [alarm for alarm in alarms if alarm.state is not AlarmState.NORMAL]
-    unjudged = [a for a in alarms if a.state is AlarmState.NORMAL and not engine.is_judged(a)]
+    shown = alarms.shown
+    listed = sorted((a for a in shown if a.state is not AlarmState.NORMAL), key=_urgency)
+    unjudged = (alarm for alarm in shown if alarm.state is AlarmState.NORMAL)
     return AlarmListModel.of(
-        time=now_ns,
         origin=origin,
-        count=engine.count(),
-        alarms=[alarm_model(engine, films, alarm) for alarm in sorted(listed, key=_urgency)],
-        unjudged=[alarm_model(engine, films, alarm) for alarm in unjudged],
+        count=alarms.count(),
+        alarms=[alarm_model(alarms, films, alarm) for alarm in listed],
+        unjudged=[alarm_model(alarms, films, alarm) for alarm in unjudged],
     )
 
 
-def alarm_model(engine: AlarmList, films: FilmState, alarm: Alarm) -> AlarmModel:
+def alarm_list_revision(alarms: LiveAlarms, films: LiveFilms) -> Hashable:
+    """Return a value that changes with every change of the alarm list."""
+    found = (_film_news(films, alarm.identity) for alarm in alarms.shown)
+    return alarms.revision, tuple(news.reading.time_ns for news in found if news is not None)
+
+
+def alarm_model(engine: LiveAlarms, films: LiveFilms, alarm: Alarm) -> AlarmModel:
     """Return the API model of an alarm with its current state."""
     identity, condition = alarm.identity, alarm.condition
     is_judged = engine.is_judged(alarm)
@@ -316,20 +316,23 @@ def alarm_model(engine: AlarmList, films: FilmState, alarm: Alarm) -> AlarmModel
     )
 
 
-def _film(films: FilmState, identity: AlarmIdentity) -> FilmConditionModel | None:
+def _film(films: LiveFilms, identity: AlarmIdentity) -> FilmConditionModel | None:
     """Return the operating condition at the newest reading of the film of an alarm.
 
     None if the alarm is not about a film, and before the first reading.
     """
-    if identity.kind not in FILM_KINDS:
-        return None
-    news, rules = films.newest(identity.unit, identity.subject), films.rules(identity.unit)
+    news, rules = _film_news(films, identity), films.rules(identity.unit)
     if news is None or rules is None:
         return None
     return condition_model(news.reading.time_ns, news.reading.condition, rules.grid)
 
 
-def grid_of(films: FilmState) -> CellGrid:
+def _film_news(films: LiveFilms, identity: AlarmIdentity) -> FilmNews | None:
+    is_film = identity.kind in FILM_KINDS
+    return films.newest(identity.unit, identity.subject) if is_film else None
+
+
+def grid_of(films: LiveFilms) -> CellGrid:
     """Return the grid of operating-condition cells, which is common to all units."""
     return films.settings.baseline.settings().grid
 
@@ -357,9 +360,3 @@ def _urgency(alarm: Alarm) -> tuple[bool, bool, int, int]:
     """Return the sort key of an alarm: unacknowledged, danger, newest first; hidden alarms last."""
     shown = alarm.shelf is None and alarm.outage is None and alarm.suppressed_by is None
     return (not shown, alarm.is_acknowledged, -(alarm.level or 0), -(alarm.raised_ns or 0))
-
-
-LEVEL_NAMES: dict[AlarmLevel, AlarmLevelName] = {
-    AlarmLevel.ALERT: "alert",
-    AlarmLevel.DANGER: "danger",
-}

@@ -16,14 +16,9 @@ from service.api.auth.declared import Reach, subject_router
 from service.api.context import Context
 from service.api.parameters import Moment, OnlyUnit, ns_from_datetime, require_order, time_query
 from service.api.problems import ProblemError, problem_responses
-from service.api.routes.alarm_models import (
-    LEVEL_NAMES,
-    AlarmIdText,
-    AlarmLevelName,
-    AlarmModel,
-    alarm_model,
-)
+from service.api.routes.alarm_models import AlarmIdText, AlarmModel, alarm_model
 from service.api.values import ApiModel, Time
+from service.settings.alarm_kinds import LEVEL_NAMES, AlarmLevelName
 from service.store.port import AlarmQuery
 from service.store.store import Store
 
@@ -169,7 +164,7 @@ def alarm_rate_router(context: Context) -> APIRouter:
         start: Annotated[Moment | None, time_query(*START)] = None,
         end: Annotated[Moment | None, time_query(*END)] = None,
     ) -> AlarmRatesModel:
-        """Count alarms per ten minutes and per day; list frequent, chattering and stale alarms.
+        """Count alarms per ten minutes and day; list frequent, chattering and long-active alarms.
 
         The numbers are given by unit and for all units together, over at most 400 days.
         """

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from pydantic import Field
@@ -20,11 +20,10 @@ from core.alarms.operation import (
 )
 from core.condition.cells import CellGrid
 from core.units import ns_from_s
-from service.api.answers import SharedAnswer, in_thread, rendered
+from service.api.answers import in_thread, rendered
 from service.api.auth.declared import Reach, needs, subject_router
 from service.api.auth.gate import actor_or, identity_of
 from service.api.context import Context
-from service.api.load import TokenBucket
 from service.api.parameters import (
     Attitude,
     Eccentricity,
@@ -43,11 +42,13 @@ from service.api.routes.alarm_models import (
     AlarmModel,
     RaisedAtModel,
     alarm_list_model,
+    alarm_list_revision,
     alarm_model,
     event_model,
     grid_of,
 )
 from service.api.tables import Column, Format, kind_of, table_content, table_response
+from service.api.token_bucket import TokenBucket
 from service.api.values import ActorModel, ApiModel, NoteText, ReasonText, states_named
 from service.settings.alarm_kinds import AlarmKindName
 from service.store.access.identities import Permission
@@ -147,17 +148,43 @@ COMMENT_PROBLEMS = ACTION_PROBLEMS | problem_responses(
 def alarm_router(context: Context) -> APIRouter:
     """Return the router that reads alarms; it must follow other routers for ``/alarms/...``."""
     router = subject_router("/alarms", "alarms")
-    engine, films, origin, clock = context.alarms, context.films, context.origin, context.clock
-    listed = SharedAnswer(
-        lambda: alarm_list_model(engine, films, origin, clock.now_ns()),
-        lambda: engine.revision,
-        clock,
-    )
+    engine, films = context.alarms, context.films
 
     @router.get("", summary="All alarms that are not normal", response_model=AlarmListModel)
-    async def alarms() -> Response:
-        """List alarms that are not normal, most urgent first; then those of unknown condition."""
-        return await listed.answer()
+    async def alarms(
+        request: Request,
+        unit: OnlyUnit = None,
+        subject: Annotated[str | None, only("bearing or other subject", "LJB", 64)] = None,
+        kind: Annotated[AlarmKindName | None, only("kind", "stiffness_x")] = None,
+        level: Annotated[Literal["alert", "danger"] | None, only("level", "danger")] = None,
+        acknowledged: Annotated[
+            bool | None,
+            Query(description="Only alarms that are acknowledged, or are not.", examples=[False]),
+        ] = None,
+    ) -> Response:
+        """List alarms that are not normal, most urgent first; then those of unknown condition.
+
+        The parameters select alarms; `count` is that of the whole plant.
+        """
+        wanted = {
+            "unit": unit,
+            "subject": subject,
+            "kind": kind,
+            "level": level,
+            "is_acknowledged": acknowledged,
+        }
+        asked = {name: value for name, value in wanted.items() if value is not None}
+
+        def make() -> AlarmListModel:
+            found = alarm_list_model(engine, films, context.origin)
+            return found.model_copy(
+                update={
+                    name: [a for a in listed if asked.items() <= dict(a).items()]
+                    for name, listed in (("alarms", found.alarms), ("unjudged", found.unjudged))
+                }
+            )
+
+        return await context.answers.of(request, alarm_list_revision(engine, films), make)
 
     @router.get(
         "/events",
@@ -261,7 +288,7 @@ def operation_router(context: Context) -> APIRouter:
         now_s = context.clock.monotonic_s()
         new = TokenBucket(N_COMMENTS, S_PER_COMMENT, now_s)
         if not allowances.setdefault(identity_of(request).actor, new).take(now_s):
-            detail = f"after {N_COMMENTS} comments, one is accepted every {S_PER_COMMENT:g} s"
+            detail = f"too many comments; try again after {S_PER_COMMENT:g} s"
             wait = {"Retry-After": f"{S_PER_COMMENT:.0f}"}
             raise ProblemError(429, "Wait", detail, headers=wait)
         return await _done(context, alarm, Comment(actor_or(asked.actor), asked.text))

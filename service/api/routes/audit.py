@@ -1,7 +1,7 @@
 """Route for the audit trail: recorded actions of persons, machines and the service."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Query, Response
@@ -10,13 +10,13 @@ from pydantic import Field
 from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import Context
-from service.api.parameters import OptionalTimeRange, before_number, only
+from service.api.parameters import OptionalTimeRange, only
 from service.api.problems import problem_responses
 from service.api.tables import Column, Format, table_content, table_response
 from service.api.values import ApiModel, Time
 from service.store.access.audit_entries import MAX_NAME, AuditEntry
 from service.store.access.identities import Permission
-from service.store.audit import AuditQuery
+from service.store.audit import AuditQuery, AuditStore, by_time
 
 SourceName = Literal["api", "command_line", "padwatch"]
 
@@ -24,8 +24,12 @@ SourceName = Literal["api", "command_line", "padwatch"]
 class AuditEntryModel(ApiModel):
     """Entry of the audit trail: one action with its actor and object."""
 
+    chain: Annotated[str, Field(examples=["access"])]
+    """Chain of the entry. With SQLite, `access` has logins, accounts, keys and refused requests,
+    and `padwatch` has everything else; with PostgreSQL, the only chain is `postgresql`."""
+
     number: Annotated[int, Field(examples=[117])]
-    """Number of the entry, from 1 without gaps."""
+    """Number of the entry in its chain, from 1 without gaps."""
 
     time: Time
     """Time of the action."""
@@ -55,7 +59,7 @@ class AuditEntryModel(ApiModel):
     """Reason given by the actor; may be empty."""
 
     previous_hash: str
-    """Hash of the previous entry, 64 hexadecimal digits."""
+    """Hash of the previous entry of the chain, 64 hexadecimal digits."""
 
     hash: str
     """SHA-256 hash of the other fields of this entry, including the previous hash."""
@@ -65,13 +69,13 @@ class AuditModel(ApiModel):
     """One page of the audit trail."""
 
     entries: list[AuditEntryModel]
-    """Entries of the audit trail, newest first."""
+    """Entries of all chains of the audit trail, newest first."""
 
-    next_before: int | None
+    next_before: Annotated[str | None, Field(examples=["padwatch:117,access:45"])]
     """Value of the parameter ``before`` for the next page; null on the last page."""
 
     head_error: str | None
-    """Reason why the file with the newest hash could not be written; null if it was written. The
+    """Reason why a file with the newest hash could not be written; null if all were written. The
     entries themselves are stored in both cases."""
 
 
@@ -81,9 +85,15 @@ TEXTS = (
 )
 
 
-def audit_table(entries: Sequence[AuditEntry]) -> list[Column]:
+Page = Sequence[tuple[str, AuditEntry]]
+"""Entries with the names of their chains."""
+
+
+def audit_table(page: Page) -> list[Column]:
     """Return audit entries as table columns; states before and after the action are JSON texts."""
+    entries = [entry for _, entry in page]
     return [
+        Column("chain", "text", [chain for chain, _ in page]),
         Column("number", "count", [entry.number for entry in entries]),
         Column("time_utc", "time", [entry.time_ns for entry in entries]),
         *(Column(name, "text", [getattr(entry, name) for entry in entries]) for name in TEXTS),
@@ -92,10 +102,48 @@ def audit_table(entries: Sequence[AuditEntry]) -> list[Column]:
 
 MAX_ENTRIES = 1000
 
+NUMBER = "[a-z]{1,16}:[1-9][0-9]{0,14}"
+Cursor = Annotated[
+    str | None,
+    Query(
+        pattern=f"^{NUMBER}(,{NUMBER})?$",
+        max_length=80,
+        description="Only entries after `next_before` of the previous page.",
+        examples=["padwatch:117,access:45"],
+    ),
+]
+
+
+def read_page(
+    chains: Mapping[str, AuditStore], query: AuditQuery, before: Mapping[str, int]
+) -> tuple[Page, str | None]:
+    """Return one page of the entries of all chains, newest first, and the cursor of the next page.
+
+    Parameters
+    ----------
+    query
+        Query for the entries of each chain; its limit is that of the page.
+    before
+        Number of each chain above which its entries were on earlier pages.
+    """
+    found = {}
+    for name, audit in chains.items():
+        limits = {"limit": query.limit + 1, "before": before.get(name, query.before)}
+        found[name] = audit.entries(AuditQuery(**{**vars(query), **limits}))
+    merged = list(by_time(found.items(), newest_first=True))
+    page = merged[: query.limit]
+    if len(merged) == len(page):
+        return page, None
+    # a chain without an entry on this page continues with its newest entry
+    numbers = {name: entries[0].number + 1 for name, entries in found.items() if entries}
+    numbers |= {name: entry.number for name, entry in page}
+    return page, ",".join(f"{name}:{number}" for name, number in numbers.items())
+
 
 def audit_router(context: Context) -> APIRouter:
     """Return the router for the audit trail."""
     router = subject_router("/audit", "audit", Permission.READ_AUDIT)
+    chains = {each.chain: each for each in (context.store.audit, context.access.store.audit)}
 
     @router.get(
         "",
@@ -103,24 +151,26 @@ def audit_router(context: Context) -> APIRouter:
         response_model=AuditModel,
         responses={**problem_responses(422, 503), **table_content("Audit trail")},
     )
-    async def audit(query: Annotated[AuditQuery, Depends(audit_query)], wanted: Format) -> Response:
+    async def audit(
+        query: Annotated[AuditQuery, Depends(audit_query)],
+        wanted: Format,
+        before: Cursor = None,
+    ) -> Response:
         """List audit entries with actor, action, object and state, newest first, in pages.
 
         As CSV or Parquet: one row per entry; states before and after the action are JSON texts.
         """
-        one_more = AuditQuery(**{**vars(query), "limit": query.limit + 1})
-        found = await in_thread(lambda: context.store.audit.entries(one_more))
-        page = list(found[: query.limit])
-        next_before = page[-1].number if len(found) > query.limit else None
+        page, cursor = await in_thread(lambda: read_page(chains, query, numbers_of(before)))
         if wanted == "json":
+            own = (each.head_error for each in chains.values())
+            errors = [each for each in (context.plant().audit_error, *own) if each]
             return await rendered(
-                lambda: AuditModel.of(
-                    context.store.audit,
-                    entries=[_model(entry) for entry in page],
-                    next_before=next_before,
+                lambda: AuditModel(
+                    entries=[_model(*each) for each in page],
+                    next_before=cursor,
+                    head_error="; ".join(errors) or None,
                 )
             )
-        cursor = None if next_before is None else str(next_before)
         return table_response(wanted, audit_table(page), "audit", cursor)
 
     return router
@@ -133,7 +183,6 @@ async def audit_query(
     object: Annotated[  # noqa: A002  the name that callers know
         str | None, only("object", "U1:ujb_shaft_x:channel_not_ok", MAX_NAME)
     ] = None,
-    before: Annotated[int | None, before_number("Only entries below this number.")] = None,
     limit: Annotated[
         int, Query(ge=1, le=MAX_ENTRIES, description="Maximum number of entries in the answer.")
     ] = 100,
@@ -141,7 +190,6 @@ async def audit_query(
     """Return the query for audit entries from the checked query parameters."""
     start_ns, end_ns = times
     return AuditQuery(
-        before=AuditQuery.before if before is None else before,
         limit=limit,
         actor=actor,
         action=action,
@@ -151,9 +199,15 @@ async def audit_query(
     )
 
 
-def _model(entry: AuditEntry) -> AuditEntryModel:
+def numbers_of(cursor: str | None) -> dict[str, int]:
+    """Return the numbers in a cursor, by name of the chain; empty for None, the first page."""
+    pairs = (each.partition(":") for each in cursor.split(",")) if cursor else ()
+    return {name: int(number) for name, _, number in pairs}
+
+
+def _model(chain: str, entry: AuditEntry) -> AuditEntryModel:
     before, after = _document(entry.before), _document(entry.after)
-    return AuditEntryModel.of(entry, before=before, after=after)
+    return AuditEntryModel.of(entry, chain=chain, before=before, after=after)
 
 
 def _document(text: str | None) -> dict[str, Any] | None:

@@ -1,16 +1,17 @@
 """Routes for guide bearings: configuration, newest result, uncertainty budgets."""
 
+from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import BY_NAME
 from core.stiffness.estimators import ESTIMATORS
-from service.api.answers import rendered
 from service.api.auth.declared import subject_router
-from service.api.context import BearingId, Context, LiveState, QuantityName, UnitId
+from service.api.context import BearingId, Context, QuantityName, UnitId
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import (
     PLACES,
@@ -27,7 +28,8 @@ from service.api.values import (
     reading_model,
     window_model,
 )
-from service.live.live_view import CurrentBearing
+from service.live.current_state import LiveUnits
+from service.live.status import CurrentBearing
 from service.store.references import GapReference
 
 MicrometrePair = Annotated[
@@ -86,20 +88,34 @@ class BearingModel(ApiModel):
     """Identifiers of the channels, by place: shaft_x, shaft_y, bearing_x and bearing_y."""
 
 
-class LatestModel(BearingAnswer):
+class ResultModel(ApiModel):
     """Newest result of a bearing; if it is not current, its readings are null and give a reason."""
+
+    bearing: str
+    """Identifier of the bearing."""
 
     time: Time | None
     """End of the samples of the newest result, even if it is not current; null without a result."""
 
-    age_s: float | None
-    """Age of the newest result, s; null without a result."""
+    received: Time | None
+    """Arrival time of these samples by the clock of the service, from which the age of the result
+    counts; null without a result."""
 
     quality: QualityModel
     """Quality of the result: the worst of its 1× amplitudes and its preferred stiffness."""
 
     speed_source: SpeedSourceName | None
     """Source of the running speed of the newest result; null without a result."""
+
+    estimators: dict[str, EstimatorName | None]
+    """Estimator of the preferred stiffness, by axes "xx" and "yy"; null without a stiffness."""
+
+    readings: dict[str, ReadingModel]
+    """Readings by name of the quantity in the catalogue, which gives their units."""
+
+
+class LatestModel(ResultModel, BearingAnswer):
+    """Newest result of a bearing with the readings of all quantities of the catalogue."""
 
     runout: Annotated[
         dict[str, RunoutName | None],
@@ -119,12 +135,6 @@ class LatestModel(BearingAnswer):
 
     window: WindowModel | None
     """Averaging window of the newest result; null without a result."""
-
-    estimators: dict[str, EstimatorName | None]
-    """Estimator of the preferred stiffness, by axes "xx" and "yy"; null without a stiffness."""
-
-    readings: dict[str, ReadingModel]
-    """Readings of all quantities of the catalogue, by name of the quantity."""
 
 
 class BudgetLineModel(ApiModel):
@@ -155,6 +165,9 @@ class BudgetModel(ApiModel):
     quantity: Annotated[str, Field(examples=["dynamic_k_xx_n_per_m"])]
     """Name of the quantity in the catalogue."""
 
+    label: Annotated[str, Field(examples=["Stiffness xx, dynamic"])]
+    """Description of the quantity in words."""
+
     unit: Annotated[str, Field(examples=["N/m"])]
     """Unit of the value and of the uncertainties."""
 
@@ -178,22 +191,33 @@ def reference_model(reference: GapReference | None) -> ReferenceModel:
     return ReferenceModel.of(reference, note=reference.note or None)
 
 
-def latest_model(live: LiveState, unit: str, bearing: str) -> LatestModel:
+def result_model(
+    current: CurrentBearing, bearing: str, readings: Mapping[str, ReadingModel]
+) -> ResultModel:
+    """Return the API model of the newest result of a bearing, with the given readings of it."""
+    newest = current.assessment
+    shown = newest if current.is_current else None
+    return ResultModel.of(
+        current,
+        bearing=bearing,
+        time=newest and newest.time_ns,
+        speed_source=newest and newest.speed_source,
+        estimators=estimator_names(shown) if shown else {"xx": None, "yy": None},
+        readings=readings,
+    )
+
+
+def latest_model(live: LiveUnits, unit: str, bearing: str) -> LatestModel:
     """Return the API model of the newest result; readings are null if the result is not current."""
     current = live.current(unit, bearing)
     newest = current.assessment
     shown = newest if current.is_current else None
     return LatestModel.of(
-        current,
+        result_model(current, bearing, {n: reading_model(r) for n, r in current.readings.items()}),
         unit=unit,
-        bearing=bearing,
-        time=newest and newest.time_ns,
-        speed_source=newest and newest.speed_source,
         window=newest and window_model(newest.window),
-        estimators=estimator_names(shown) if shown else {"xx": None, "yy": None},
         runout=runout_names(shown) if shown else {"shaft_x": None, "shaft_y": None},
         clipped_share=shown.clipped_share if shown else {},
-        readings={name: reading_model(name, r) for name, r in current.readings.items()},
     )
 
 
@@ -229,23 +253,36 @@ def bearing_router(context: Context) -> APIRouter:
         response_model=LatestModel,
         responses=unknown,
     )
-    async def latest(unit: UnitId, bearing: BearingId) -> Response:
+    async def latest(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the newest result of a bearing; readings are null if the result is not current."""
         context.bearing(unit, bearing)
-        return await rendered(lambda: latest_model(context.live, unit, bearing))
+        revision = context.live.revision(unit)
+        make = partial(latest_model, context.live, unit, bearing)
+        return await context.answers.of(request, revision, make)
 
-    @router.get("/{bearing}/budgets/{quantity}", summary="Uncertainty budget", responses=no_result)
-    async def budget(unit: UnitId, bearing: BearingId, quantity: QuantityName) -> BudgetModel:
+    @router.get(
+        "/{bearing}/budgets/{quantity}",
+        summary="Uncertainty budget",
+        response_model=BudgetModel,
+        responses=no_result,
+    )
+    async def budget(
+        request: Request, unit: UnitId, bearing: BearingId, quantity: QuantityName
+    ) -> Response:
         """Return the uncertainty budget of a quantity in the newest result."""
         context.bearing(unit, bearing)
         if quantity not in BY_NAME or not BY_NAME[quantity].has_uncertainty:
             detail = f"quantity {quantity!r} has no uncertainty budget; see /api/v1/quantities"
             raise ProblemError(404, "No uncertainty budget", detail)
-        found = _budget(context.live.current(unit, bearing), quantity)
-        if found is None:
-            detail = f"{quantity} has no uncertainty budget; it has no value or too few segments"
-            raise ProblemError(409, "No result", detail)
-        return found
+
+        def make() -> BudgetModel:
+            found = _budget(context.live.current(unit, bearing), quantity)
+            if found is None:
+                detail = f"{quantity} has no uncertainty budget: no value or too few segments"
+                raise ProblemError(409, "No result", detail)
+            return found
+
+        return await context.answers.of(request, context.live.revision(unit), make)
 
     return router
 
@@ -282,8 +319,8 @@ def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
     lines = sorted(budget.lines, key=lambda line: line.contribution, reverse=True)
     return BudgetModel.of(
         budget,
+        BY_NAME[quantity],
         quantity=quantity,
-        unit=BY_NAME[quantity].unit,
         time=assessment.time_ns,
         uncertainty=UncertaintyModel.of(budget, low_95=low, high_95=high),
         lines=[BudgetLineModel.of(line) for line in lines],
@@ -292,5 +329,5 @@ def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
 
 def no_result(unit: str, bearing: str) -> ProblemError:
     """Return the error with status 409 for a bearing without a result."""
-    detail = f"unit {unit!r} bearing {bearing!r} has no result yet; the first takes one segment"
+    detail = f"unit {unit!r} bearing {bearing!r} has no result yet: no segment is complete"
     return ProblemError(409, "No result yet", detail)

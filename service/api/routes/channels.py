@@ -13,12 +13,13 @@ from core.quality import Level, Quality, Reason, bad, missing, worst
 from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
 from service.api.auth.declared import subject_router
-from service.api.context import Context, LiveState, UnitId
+from service.api.context import Context, UnitId
 from service.api.parameters import duration
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, QualityModel, SampleRange, Time, listed
-from service.live.live_view import HELD_S
+from service.live.current_state import LiveUnits
 from service.live.samples import SampleWindow, newest_blocks, sample_window
+from service.live.status import HELD_S
 from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS
 from service.settings.channels import ChannelSettings, SlowChannelSettings
 from service.settings.sources.devices import ModbusVectorSettings
@@ -131,8 +132,8 @@ class ChannelsModel(ApiModel):
     time: Time | None
     """End of the newest block of samples, even if it is not current; null without a block."""
 
-    age_s: float | None
-    """Age of the newest block of samples, s; null without a block."""
+    received: Time | None
+    """Arrival time of this block by the clock of the service; null without a block."""
 
     waveform: list[WaveformChannelModel]
     """Waveform channels, in the order of the plant file."""
@@ -163,8 +164,8 @@ class WaveformModel(SampleRange):
     time: Time
     """Time of the first sample."""
 
-    age_s: float
-    """Age of the newest sample, s; it increases while the link is lost."""
+    received: Time
+    """Arrival time of the newest sample by the clock of the service."""
 
     n_samples: int
     """Number of samples per channel."""
@@ -189,9 +190,11 @@ UNIT_USES = ("speed_channel", "power_channel", "key_phase")
 """Keys of a unit in the plant file that contain channel identifiers."""
 
 
-def channels_model(live: LiveState, settings: UnitSettings) -> ChannelsModel:
+async def channels_model(live: LiveUnits, settings: UnitSettings) -> ChannelsModel:
     """Return the API model of all channels of a unit, with their state in the newest block."""
-    newest, why_not = live.newest_block(settings.id), live.why_no_samples(settings.id)
+    why_not = live.why_no_samples(settings.id)
+    blocks = await live.blocks(settings.id) if live.can_ask else ()
+    newest = blocks[-1] if blocks else None
     shown = newest if why_not is None else None
     why = why_not or Reason.WAITING_FOR_DATA
     uses = _uses(settings)
@@ -199,7 +202,7 @@ def channels_model(live: LiveState, settings: UnitSettings) -> ChannelsModel:
         unit=settings.id,
         rate_hz=settings.sampling_hz,
         time=newest and newest.stop_ns,
-        age_s=live.data_age_s(settings.id),
+        received=live.status(settings.id).received_ns,
         waveform=[
             _waveform(settings, channel, uses.get(channel.id, []), shown, why)
             for channel in settings.channel
@@ -272,7 +275,7 @@ def _uses(settings: UnitSettings) -> dict[str, list[str]]:
 
 
 def waveform_model(
-    settings: UnitSettings, channels: Sequence[str], window: SampleWindow, age_s: float
+    settings: UnitSettings, channels: Sequence[str], window: SampleWindow, received_ns: int
 ) -> WaveformModel:
     """Return the API model of the samples in a window.
 
@@ -280,15 +283,15 @@ def waveform_model(
     ----------
     channels
         Identifiers of the channels in the window, at least one.
-    age_s
-        Age of the newest sample, s.
+    received_ns
+        Arrival time of the newest sample, UTC nanoseconds since 1970.
     """
     units = {each.id: UNITS[each.measurand] for each in settings.channel}
     return WaveformModel.of(
         window,
         unit=settings.id,
         time=window.start_ns,
-        age_s=age_s,
+        received=received_ns,
         n_samples=window.samples[channels[0]].size,
         channels={
             id_: ChannelSamplesModel.of(
@@ -316,7 +319,7 @@ def channel_router(context: Context) -> APIRouter:
 
         The state is that of the newest block of samples; the values of a bad channel are null.
         """
-        return channels_model(context.live, context.unit(unit))
+        return await channels_model(context.live, context.unit(unit))
 
     @router.get(
         "/waveform",
@@ -342,14 +345,14 @@ def channel_router(context: Context) -> APIRouter:
         """
         settings = context.unit(unit)
         chosen = _chosen(settings, channel)
-        blocks, age_s = held_blocks(context.live, unit)
+        blocks, received_ns = await held_blocks(context.live, unit)
         n_samples = _n_samples(seconds, blocks[-1].rate_hz, len(chosen))
         rows = {each: rows_of(settings, each)[0] for each in chosen}
 
         def model() -> WaveformModel:
             held, first, n_held = newest_blocks(blocks, n_samples)
             window = sample_window(held, rows, first, n_held, held[-1])
-            return waveform_model(settings, chosen, window, age_s)
+            return waveform_model(settings, chosen, window, received_ns)
 
         return await rendered(model)
 
@@ -359,16 +362,19 @@ def channel_router(context: Context) -> APIRouter:
 def require_samples(settings: UnitSettings) -> None:
     """Raise a problem of status 409 if the source of a unit delivers no samples."""
     if isinstance(settings.source, ModbusVectorSettings):
-        detail = f"unit {settings.id!r} has no samples; its rack reports amplitudes"
+        detail = f"unit {settings.id!r} has no samples, because its device sends only amplitudes"
         raise ProblemError(409, "No samples", detail)
 
 
-def held_blocks(live: LiveState, unit: str) -> tuple[Sequence[SampleBlock], float]:
-    """Return the buffered blocks of a unit and the age of the newest, s; without any, raise 409."""
-    blocks, age_s = live.blocks(unit), live.data_age_s(unit)
-    if not blocks or age_s is None:
+async def held_blocks(live: LiveUnits, unit: str) -> tuple[Sequence[SampleBlock], int]:
+    """Return the buffered blocks of a unit, oldest first, and the arrival time of the newest, ns.
+
+    Raises a problem of status 409 without a block.
+    """
+    blocks, received_ns = await live.blocks(unit), live.status(unit).received_ns
+    if not blocks or received_ns is None:
         raise ProblemError(409, "No samples", f"no sample of unit {unit!r} has arrived yet")
-    return blocks, age_s
+    return blocks, received_ns
 
 
 def _chosen(settings: UnitSettings, channels: list[str] | None) -> list[str]:
@@ -376,7 +382,7 @@ def _chosen(settings: UnitSettings, channels: list[str] | None) -> list[str]:
     known = [channel.id for channel in settings.channel]
     for each in channels or ():
         if each not in known:
-            detail = f"unit {settings.id!r} has no waveform channel {each!r}; see its channels"
+            detail = f"unknown waveform channel {each!r}; known channels: {', '.join(known)}"
             raise ProblemError(422, "Wrong parameter", detail, "channel")
     return list(dict.fromkeys(channels or known))
 

@@ -5,13 +5,13 @@ from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 import numpy.typing as npt
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Query, Request, Response
 
 from core.baseline.history import ReadingOutcome
 from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
 from core.units import NS_PER_S
-from service.api.answers import in_thread, rendered
+from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange
@@ -143,12 +143,12 @@ def rows_shown(n_found: int, max_points: int, is_thinned: bool) -> Rows:
 
 
 def film_readings_model(query: FilmQuery, found: FilmHistory, rows: Rows) -> FilmReadingsModel:
-    """Return the API model of selected readings of a film.
+    """Return the API model of selected readings of a film, oldest first.
 
     Parameters
     ----------
     rows
-        Numbers of the selected rows of the history.
+        Numbers of the selected rows of the history, ascending; may be empty.
     """
     history, first = found.history, int(rows[0]) if rows.size else 0
     x, y = (_series(found, direction, rows) for direction in range(2))
@@ -256,6 +256,7 @@ def film_history_router(context: Context) -> APIRouter:
         responses={**READING_PROBLEMS, **table_content("Readings, by column")},
     )
     async def readings(
+        request: Request,
         unit: UnitId,
         bearing: BearingId,
         times: TimeRange,
@@ -304,7 +305,8 @@ def film_history_router(context: Context) -> APIRouter:
             return film_table(*read())
 
         if wanted == "json":
-            return await rendered(lambda: read()[0])
+            revision = (times, context.live.past_revision(unit, query.end_ns))
+            return await context.answers.of(request, revision, lambda: read()[0])
         return table_response(wanted, await in_thread(read_columns), f"film-{unit}-{bearing}")
 
     return router

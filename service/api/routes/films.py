@@ -2,9 +2,10 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Literal, cast
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
@@ -13,7 +14,6 @@ from core.change.decision import Decision, Verdict
 from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading
 from core.change.settings import FilmRules
-from service.api.answers import rendered
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import ProblemError, problem_responses
@@ -27,7 +27,7 @@ from service.api.values import (
     condition_model,
 )
 from service.live.commands import FilmPlace
-from service.live.live_view import CurrentBearing
+from service.live.status import CurrentBearing
 
 VerdictName = Literal[
     "normal",
@@ -202,9 +202,6 @@ class FilmWordModel(ApiModel):
 class FilmBriefModel(ApiModel):
     """Summary of the oil film of a bearing."""
 
-    bearing: str
-    """Identifier of the bearing."""
-
     why_not: str | None
     """Reason why the film is not watched; null if it is watched."""
 
@@ -230,6 +227,10 @@ class WatchedFilm:
 
     Parameters
     ----------
+    rules
+        Rules by which the films of the unit are judged.
+    current
+        Newest result of the bearing.
     news
         Newest reading with its findings; None without a reading since the service started.
     baseline
@@ -279,7 +280,7 @@ def film_brief(context: Context, unit: str, bearing: str) -> FilmBriefModel:
     """Return the API model of the film summary of a bearing."""
     seen = _seen(context, unit, bearing)
     x, y = (_word(found) for found in _directions(seen)) if seen else (None, None)
-    return FilmBriefModel(bearing=bearing, why_not=why_unwatched(context, unit, bearing), x=x, y=y)
+    return FilmBriefModel(why_not=why_unwatched(context, unit, bearing), x=x, y=y)
 
 
 def _word(found: FilmDirectionModel) -> FilmWordModel:
@@ -405,7 +406,7 @@ def percent_of(ln: float) -> float:
 
 
 def interval_percent(ln: float, std: float) -> tuple[float, float]:
-    """Return the ends of the 95 % interval, %, of a relative change.
+    """Return the lower and upper end of the 95 % interval of a relative change, %.
 
     `std` is the standard uncertainty of the change `ln` of the natural logarithm.
     """
@@ -418,7 +419,7 @@ def verdict_name(verdict: Verdict) -> VerdictName:
 
 
 def level_name(level: int | None) -> LevelHeldName | None:
-    """Return the name of an alarm level in the API; None without a level."""
+    """Return the name of an alarm level in the API; None for None."""
     return None if level is None else cast("LevelHeldName", Verdict(int(level)).name.lower())
 
 
@@ -439,12 +440,13 @@ def film_router(context: Context) -> APIRouter:
     @router.get(
         "", summary="A film now", response_model=FilmModel, responses=problem_responses(404)
     )
-    async def film(unit: UnitId, bearing: BearingId) -> Response:
+    async def film(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return verdict, change of stiffness and cause in x and y, and the operating condition.
 
         A film that cannot be judged is never reported as normal; its verdict states the reason.
         """
         context.bearing(unit, bearing)
-        return await rendered(lambda: film_model(context, unit, bearing))
+        make = partial(film_model, context, unit, bearing)
+        return await context.answers.of(request, context.now_revision(unit), make)
 
     return router

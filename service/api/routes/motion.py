@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
 from acquisition.errors import ConfigError
@@ -12,7 +12,7 @@ from core.arrays import FloatArray
 from core.machine.unit import Bearing
 from core.monitor.assessment import OrbitTrace
 from core.samples.blocks import SampleBlock
-from service.api.answers import Renderings, rendered
+from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import duration
@@ -26,8 +26,8 @@ from service.api.routes.recordings import (
     library_of,
 )
 from service.api.values import ApiModel, BearingAnswer, SampleRange, Time, listed
-from service.live.live_view import HELD_S
 from service.live.samples import newest_blocks, sample_window
+from service.live.status import HELD_S
 from service.recordings.library import RecordingEntry
 from service.recordings.motion import (
     NoMotionError,
@@ -89,8 +89,8 @@ class MotionModel(SampleRange, BearingAnswer):
     total_s: float | None
     """Duration of the recording including gaps, s; null for the newest samples."""
 
-    age_s: float | None
-    """Age of the newest sample, s; null for a recording."""
+    received: Time | None
+    """Arrival time of the newest sample by the clock of the service; null for a recording."""
 
     n_samples: int
     """Number of samples in each direction."""
@@ -152,16 +152,16 @@ def motion_model(
     unit: str,
     bearing: Bearing,
     motion: ShaftMotion,
-    age_s: float | None = None,
+    received_ns: int | None = None,
     recording: str | None = None,
     recorded: RecordedMotion | None = None,
 ) -> MotionModel:
-    """Return the API model of the motion of a shaft.
+    """Return the API model of the motion of a shaft in a bearing of a unit.
 
     Parameters
     ----------
-    age_s
-        Age of the newest sample, s; None for a recording.
+    received_ns
+        Arrival time of the newest sample, UTC nanoseconds since 1970; None for a recording.
     recording
         Name of the recording; None for the newest samples.
     recorded
@@ -176,7 +176,7 @@ def motion_model(
         recording=recording,
         offset_s=recorded and recorded.offset_s,
         total_s=recorded and recorded.total_s,
-        age_s=age_s,
+        received=received_ns,
         n_samples=motion.x_um.size,
         shaft_x_um=_rounded(motion.x_um),
         shaft_y_um=_rounded(motion.y_um),
@@ -228,7 +228,6 @@ RECORDING_PROBLEMS = problem_responses(
 def motion_router(context: Context) -> APIRouter:
     """Return the router for the newest orbit and motion."""
     router = subject_router("/units/{unit}/bearings", "bearing")
-    orbits = Renderings()
 
     @router.get(
         "/{bearing}/orbit",
@@ -236,13 +235,18 @@ def motion_router(context: Context) -> APIRouter:
         response_model=OrbitModel,
         responses=problem_responses(404, 409),
     )
-    async def orbit(unit: UnitId, bearing: BearingId) -> Response:
+    async def orbit(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the orbit of the shaft relative to the bearing in the newest turns."""
         context.bearing(unit, bearing)
-        assessment = context.live.assessment(unit, bearing)
-        if assessment is None or assessment.orbit is None:
-            raise no_result(unit, bearing)
-        return await orbits.of((unit, bearing), assessment.orbit, orbit_model)
+
+        async def make() -> OrbitModel:
+            assessment = await context.live.assessment(unit, bearing)
+            orbit = None if assessment is None else assessment.orbit
+            if orbit is None:
+                raise no_result(unit, bearing)
+            return await in_thread(lambda: orbit_model(orbit))
+
+        return await context.answers.of(request, context.live.revision(unit), make)
 
     @router.get(
         "/{bearing}/motion",
@@ -259,9 +263,9 @@ def motion_router(context: Context) -> APIRouter:
         context.bearing(unit, bearing)
         settings, watched = context.unit(unit), context.references.bearing(unit, bearing)
         require_samples(settings)
-        blocks, age_s = held_blocks(context.live, unit)
+        blocks, received_ns = await held_blocks(context.live, unit)
         _require_few(seconds, blocks[-1].rate_hz)
-        return await rendered(lambda: _newest(settings, watched, blocks, seconds, age_s))
+        return await rendered(lambda: _newest(settings, watched, blocks, seconds, received_ns))
 
     return router
 
@@ -320,7 +324,7 @@ def _newest(
     bearing: Bearing,
     blocks: Sequence[SampleBlock],
     seconds: float,
-    age_s: float,
+    received_ns: int,
 ) -> MotionModel:
     machine = machine_of(settings)
     ids = [channel.id for channel in machine.channels]
@@ -328,7 +332,7 @@ def _newest(
     n_wanted = max(1, round(seconds * blocks[-1].rate_hz))
     held, first_index, n_samples = newest_blocks(blocks, n_wanted)
     found = motion_of(sample_window(held, rows, first_index, n_samples), machine, bearing)
-    return motion_model(settings.id, bearing, found, age_s)
+    return motion_model(settings.id, bearing, found, received_ns)
 
 
 def _recorded(

@@ -5,12 +5,12 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from service.api.answers import rendered_now
+from service.api.answers import rendered
 from service.api.auth.declared import Reach, subject_router
 from service.api.context import Context
 from service.api.problems import problem_responses
-from service.api.values import ApiModel, DatedAnswer, Time
-from service.notifications.sender import ReceiverView, SenderStatus
+from service.api.values import ApiModel, Time
+from service.live.receivers import ReceiverView, SenderStatus
 from service.settings.notifications import ChannelKind
 from service.store.outbox import Backlog, MessageState, StoredMessage
 
@@ -81,7 +81,7 @@ class ReceiverModel(ApiModel):
     """Time of the newest successful delivery; null without a delivery."""
 
 
-class DeliveryModel(DatedAnswer):
+class DeliveryModel(ApiModel):
     """State of all receivers of alarm messages."""
 
     origin: Literal["live", "replay"]
@@ -113,7 +113,7 @@ def delivery_router(context: Context) -> APIRouter:
     async def delivery() -> Response:
         """List the receivers of alarm messages with their waiting and failed messages."""
         receivers = [_receiver(view) for view in await context.receivers()]
-        return await rendered_now(lambda: _delivery(context, receivers))
+        return await rendered(lambda: _delivery(context, receivers))
 
     return router
 
@@ -121,7 +121,6 @@ def delivery_router(context: Context) -> APIRouter:
 def _delivery(context: Context, receivers: list[ReceiverModel]) -> DeliveryModel:
     return DeliveryModel.of(
         context,
-        time=context.clock.now_ns(),
         n_waiting=sum(receiver.n_waiting for receiver in receivers),
         n_failing=sum(receiver.is_failing for receiver in receivers),
         receivers=receivers,
@@ -130,14 +129,14 @@ def _delivery(context: Context, receivers: list[ReceiverModel]) -> DeliveryModel
 
 def _receiver(view: ReceiverView) -> ReceiverModel:
     receiver, backlog = view.receiver, view.backlog or NO_BACKLOG
-    status = view.status or SenderStatus()
+    status = receiver.status if receiver else SenderStatus()
     return ReceiverModel.of(
         status,
         backlog,
         id=view.name,
-        kind=receiver and receiver.settings.kind,
-        address=receiver and receiver.channel.address,
-        state=status.state if view.status else "not_in_the_plant_file",
+        kind=receiver and receiver.kind,
+        address=receiver and receiver.address,
+        state=status.state if receiver else "not_in_the_plant_file",
         is_failing=status.n_failures > 0,
         waiting_since=backlog.oldest_ns,
         last_dead=_dead(backlog.last_dead),

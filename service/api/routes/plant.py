@@ -11,11 +11,11 @@ from core.monitor.catalogue import CATALOGUE
 from core.samples.gaps import Gap
 from core.units import ns_from_s
 from service.api.auth.declared import Reach, needs, subject_router
-from service.api.context import Context, LiveState, UnitId
+from service.api.context import Context, UnitId
 from service.api.parameters import TimeRange
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, Time
-from service.runtime.metrics import HistogramState
+from service.live.current_state import LiveUnits
 from service.settings.loading import plant_file_schema
 from service.settings.units import UnitSettings
 from service.store.access.identities import Permission
@@ -41,8 +41,8 @@ class DeviceClockModel(ApiModel):
     """Fault of the newest time stamp; null without a fault."""
 
 
-class SourceModel(ApiModel):
-    """State of the data source of a unit, and counts of its samples."""
+class LinkModel(ApiModel):
+    """State of the link to the data source of a unit."""
 
     state: Literal["connecting", "connected", "not_connected", "ended"]
     """State of the link to the source; only the replay of a recording can be "ended"."""
@@ -53,8 +53,13 @@ class SourceModel(ApiModel):
     since: Time | None
     """Start of the present state of the link; null if unknown."""
 
-    data_age_s: float | None
-    """Age of the newest sample, s; null without a sample."""
+
+class SourceModel(LinkModel):
+    """State of the data source of a unit, and counts of its samples."""
+
+    received: Time | None
+    """Arrival time of the newest samples by the clock of the service, from which the age of the
+    data counts; null without a sample."""
 
     last_sample_time: Time | None
     """Time of the newest sample by the device clock; null without a sample."""
@@ -127,8 +132,8 @@ class SourceHealthModel(SourceModel):
     """Number of CAN frames rejected since the service started, by reason."""
 
 
-def source_model(live: LiveState, unit: str) -> SourceModel:
-    """Return the API model of the source of a unit."""
+def source_model(live: LiveUnits, unit: str) -> SourceModel:
+    """Return the API model of the data source of a unit: link, counts of samples, and clock."""
     status = live.status(unit)
     clock = status.clock and DeviceClockModel.of(
         status.clock,
@@ -139,7 +144,6 @@ def source_model(live: LiveState, unit: str) -> SourceModel:
     return SourceModel.of(
         status,
         status.account,
-        data_age_s=live.data_age_s(unit),
         last_sample_time=status.last_sample_ns,
         clock=clock,
     )
@@ -169,7 +173,7 @@ class GapModel(ApiModel):
 
 
 class BasicUnitModel(ApiModel):
-    """Generating unit with the state of its data source."""
+    """Generating unit."""
 
     id: str
     """Stable identifier of the unit."""
@@ -180,12 +184,12 @@ class BasicUnitModel(ApiModel):
     rated_speed_rpm: float
     """Rated speed, r/min."""
 
-    source: SourceModel
-    """State of the data source of the unit."""
-
 
 class UnitModel(BasicUnitModel):
     """Generating unit with the state of its data source and its guide bearings."""
+
+    source: SourceModel
+    """State of the data source of the unit."""
 
     bearing_ids: list[str]
     """Identifiers of the guide bearings of the unit."""
@@ -305,7 +309,8 @@ def _unit(context: Context, unit: str) -> UnitModel:
 
 
 def _health(context: Context, settings: UnitSettings) -> SourceHealthModel:
-    arriving, source = source_model(context.live, settings.id), context.sources.get(settings.id)
+    arriving = source_model(context.live, settings.id)
+    source = context.plant().sources.get(settings.id)
     return SourceHealthModel.of(
         arriving,
         unit=settings.id,
@@ -313,16 +318,11 @@ def _health(context: Context, settings: UnitSettings) -> SourceHealthModel:
         n_failed=context.live.status(settings.id).n_failed,
         rate_hz=settings.sampling_hz,
         poll_period_s=getattr(settings.source, "poll_period_s", None),
-        polls=None if source is None else _polls(source.polls.state()),
+        polls=None
+        if source is None or not source.n_polls
+        else PollsModel.of(source, n=source.n_polls),
         refused_frames={} if source is None else source.refused_frames,
     )
-
-
-def _polls(state: HistogramState) -> PollsModel | None:
-    if state.newest_s is None:
-        return None
-    n_polls = state.n_up_to[-1]
-    return PollsModel(n=n_polls, newest_s=state.newest_s, mean_s=state.sum_s / n_polls)
 
 
 def _gap_model(gap: Gap, rate_hz: float) -> GapModel:

@@ -246,13 +246,14 @@ def recording_router(context: Context) -> APIRouter:
         if unit is not None:
             context.unit(unit)
         found = await in_thread(lambda: library_of(context).newest(limit, unit, kind))
-        running = sorted(context.captures.being_made)
+        plant = context.plant()
+        running = sorted(plant.captures.being_made)
         return RecordingsModel(
             recordings=[recording_model(kept) for kept in found],
             being_made=[RunningRecordingModel(alarm=a, occurrence=n) for a, n in running],
-            error=context.captures.trouble,
-            continuous=sorted(context.tape.units) if context.tape else [],
-            continuous_error=context.tape.trouble if context.tape else None,
+            error=plant.captures.trouble,
+            continuous=sorted(plant.continuous),
+            continuous_error=plant.continuous_trouble,
         )
 
     @router.get(
@@ -322,9 +323,9 @@ async def _download(
 def library_of(context: Context) -> RecordingLibrary:
     """Return the library of recordings; raise a problem of status 404 if none are kept here."""
     if context.recordings is None:
-        words = "this process has no recordings; request them where the unit is analysed"
+        words = "this process has no recordings; request them from the one that analyses the unit"
         raise ProblemError(404, "No recordings", words)
-    return RecordingLibrary(context.recordings, context.faults())
+    return RecordingLibrary(context.recordings, context.plant().faults)
 
 
 async def entry_of(context: Context, recording: str) -> RecordingEntry:
@@ -332,7 +333,8 @@ async def entry_of(context: Context, recording: str) -> RecordingEntry:
     library = library_of(context)
     found = await in_thread(lambda: library.one(recording))
     if found is None:
-        raise ProblemError(404, "Unknown recording", f"unknown recording {recording!r}")
+        detail = f"unknown recording {recording!r}; see /api/v1/recordings"
+        raise ProblemError(404, "Unknown recording", detail)
     return found
 
 

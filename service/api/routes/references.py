@@ -21,7 +21,7 @@ from service.api.values import (
     PlaceName,
     Time,
 )
-from service.measuring.references import VectorRefusedError, measured_vectors
+from service.live.commands import ReferenceRefusedError, TakeReference
 from service.store.access.identities import Permission
 from service.store.references import GapReference, SetVectorReference
 
@@ -135,18 +135,12 @@ def reference_router(context: Context) -> APIRouter:
     ) -> Order1ReferenceModel:
         """Store the 1× vectors of the newest result as reference for its operating state."""
         context.bearing(unit, bearing)
-        current = context.live.current(unit, bearing)
+        command = TakeReference(unit, bearing, actor_or(asked.actor), asked.note)
         try:
-            measured = measured_vectors(current.assessment if current.is_current else None)
-        except VectorRefusedError as error:
+            return _model(await context.operators.take_reference(command))
+        except ReferenceRefusedError as error:
             detail = f"unit {unit} bearing {bearing}: {error}"
             raise ProblemError(409, "No reference", detail) from error
-        found = SetVectorReference(
-            measured, context.clock.now_ns(), actor_or(asked.actor), asked.note
-        )
-        await asyncio.to_thread(context.store.order1_references.add, found)
-        await context.operators.refer_to(measured)
-        return _model(found)
 
     return router
 

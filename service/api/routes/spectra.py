@@ -1,18 +1,19 @@
 """Routes for the amplitude spectra of a bearing: newest spectra, and stored spectra over time."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Annotated, Literal
 
 import numpy as np
 import structlog
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
 from core.arrays import FloatArray
 from core.monitor.assessment import Assessment
 from core.stiffness.order_line import marked_hz
 from core.units import NS_PER_S
-from service.api.answers import Renderings, rendered
+from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import TimeRange
@@ -145,7 +146,7 @@ def _frequencies(shown: Sequence[StoredSpectrum], max_frequency_hz: float | None
 def _require_few(n_spectra: int, n_numbers: int) -> None:
     if n_spectra * n_numbers > MAX_NUMBERS:
         detail = (
-            f"{n_spectra} spectra of {n_numbers} amplitudes exceed one answer; request at most"
+            f"{n_spectra} spectra of {n_numbers} amplitudes are too many; request at most"
             f" {max(2, MAX_NUMBERS // n_numbers)} spectra, fewer channels, or a lower"
             " max_frequency_hz"
         )
@@ -185,7 +186,6 @@ log = structlog.get_logger()
 def spectra_router(context: Context) -> APIRouter:
     """Return the router for spectra."""
     router = subject_router("/units/{unit}/bearings", "bearing")
-    newest = Renderings()
 
     @router.get(
         "/{bearing}/spectrum",
@@ -193,13 +193,17 @@ def spectra_router(context: Context) -> APIRouter:
         response_model=SpectrumModel,
         responses=problem_responses(404, 409),
     )
-    async def spectrum(unit: UnitId, bearing: BearingId) -> Response:
+    async def spectrum(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the averaged amplitude spectra of the newest result, all as displacement."""
         context.bearing(unit, bearing)
-        assessment = context.live.assessment(unit, bearing)
-        if assessment is None:
-            raise no_result(unit, bearing)
-        return await newest.of((unit, bearing), assessment, spectrum_model)
+
+        async def make() -> SpectrumModel:
+            assessment = await context.live.assessment(unit, bearing)
+            if assessment is None:
+                raise no_result(unit, bearing)
+            return await in_thread(lambda: spectrum_model(assessment))
+
+        return await context.answers.of(request, context.live.revision(unit), make)
 
     @router.get(
         "/{bearing}/spectra",
@@ -208,6 +212,7 @@ def spectra_router(context: Context) -> APIRouter:
         responses=problem_responses(404, 422, 503),
     )
     async def spectra(
+        request: Request,
         unit: UnitId,
         bearing: BearingId,
         times: TimeRange,
@@ -239,7 +244,9 @@ def spectra_router(context: Context) -> APIRouter:
         context.bearing(unit, bearing)
         places = list(dict.fromkeys(channel or PLACES))
         query = SpectraQuery(unit, bearing, *times, max_spectra)
-        return await rendered(lambda: _read(context, query, places, max_frequency_hz))
+        revision = (times, context.live.past_revision(unit, times[1]))
+        make = partial(_read, context, query, places, max_frequency_hz)
+        return await context.answers.of(request, revision, make)
 
     return router
 

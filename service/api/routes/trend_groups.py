@@ -72,7 +72,7 @@ class _Axis:
 def trend_groups(
     store: Store, query: TrendQuery, by: GroupName, grid: CellGrid
 ) -> list[TrendGroup]:
-    """Return the trend of each group that contains readings.
+    """Return the trend of each group that contains readings, in the order of states or intervals.
 
     Parameters
     ----------

@@ -4,13 +4,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Annotated, TypeVar
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
 from core.condition.cells import CellGrid
 from core.monitor.catalogue import BY_NAME
 from core.units import NS_PER_S, ns_from_s
-from service.api.answers import in_thread, rendered
+from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange
@@ -146,13 +146,13 @@ class TrendModel(TrendColumns, BearingHistory):
     quantity is unknown belong to no group."""
 
 
-def trend_model(
+def trend_answer(
     query: TrendQuery,
     trend: Trend,
     groups: list[TrendGroup] | None = None,
     past_end_ns: int | None = None,
-) -> TrendModel:
-    """Return the API model of trends.
+) -> dict[str, object]:
+    """Return trends as a JSON object with the fields of `TrendModel`; its lists are not validated.
 
     Parameters
     ----------
@@ -161,35 +161,36 @@ def trend_model(
     past_end_ns
         End of the simulated readings of the bearing; None without simulated readings.
     """
-    return TrendModel.of(
-        query,
-        trend,
-        simulated_until=simulated_until(query, past_end_ns),
-        next_cursor=None if trend.next_ns is None else str(trend.next_ns),
-        groups=None if groups is None else [_group_model(group) for group in groups],
+    return {
+        **history_of(query),
         **_columns_of(trend),
-    )
+        "simulated_until": simulated_until(query, past_end_ns),
+        "coarse_until": None if trend.coarse_until_ns is None else rfc3339(trend.coarse_until_ns),
+        "next_cursor": None if trend.next_ns is None else str(trend.next_ns),
+        "groups": None if groups is None else [_group(each) for each in groups],
+    }
 
 
 def simulated_until(query: TrendQuery, past_end_ns: int | None) -> str | None:
-    """Return the end of the simulated readings of a bearing, RFC 3339; None if the range has none.
-
-    Parameters
-    ----------
-    past_end_ns
-        End of the simulated readings of the bearing; None without simulated readings.
-    """
+    """Return the end `past_end_ns` of simulated readings, RFC 3339; None if the range has none."""
     if past_end_ns is None or past_end_ns < query.start_ns:
         return None
     return rfc3339(past_end_ns)
 
 
-def _group_model(group: TrendGroup) -> TrendGroupModel:
-    return TrendGroupModel.of(group, **_columns_of(group.trend))
+def history_of(query: TrendQuery) -> dict[str, object]:
+    """Return the fields of `BearingHistory` for a query, by name."""
+    place = {"unit": query.unit, "bearing": query.bearing}
+    return {**place, "start": rfc3339(query.start_ns), "end": rfc3339(query.end_ns)}
+
+
+def _group(group: TrendGroup) -> dict[str, object]:
+    own = {"name": group.name, "low": group.low, "high": group.high}
+    return {**own, **_columns_of(group.trend)}
 
 
 def _columns_of(trend: Trend) -> dict[str, object]:
-    series = {name: _series_model(name, trend.series) for name in trend.series if name in BY_NAME}
+    series = {name: _series(name, trend.series) for name in trend.series if name in BY_NAME}
     return {"bucket_s": bucket_s(trend), "time": times_s(trend), "series": series}
 
 
@@ -204,23 +205,23 @@ def times_s(trend: Trend) -> list[float]:
 
 
 def trend_columns(quantities: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of the stored columns that contain the given quantities."""
+    """Return the names of the stored columns of quantities: values, and uncertainties if any."""
     return columns_of(BY_NAME[name] for name in quantities)
 
 
-def _series_model(name: str, columns: Mapping[str, TrendSeries]) -> TrendSeriesModel:
+def _series(name: str, columns: Mapping[str, TrendSeries]) -> dict[str, object]:
     series = columns[name]
     random, systematic = columns.get(name + U_RANDOM), columns.get(name + U_SYSTEMATIC)
-    return TrendSeriesModel(
-        unit=BY_NAME[name].unit,
-        min=list(series.minimum),
-        max=list(series.maximum),
-        mean=list(series.mean),
-        count=list(series.count),
-        worst_level=level_names(series.worst_level),
-        u_random=list(random.mean) if random else None,
-        u_systematic=list(systematic.mean) if systematic else None,
-    )
+    return {
+        "unit": BY_NAME[name].unit,
+        "min": series.minimum,
+        "max": series.maximum,
+        "mean": series.mean,
+        "count": series.count,
+        "worst_level": level_names(series.worst_level),
+        "u_random": random.mean if random else None,
+        "u_systematic": systematic.mean if systematic else None,
+    }
 
 
 MaxPoints = Annotated[
@@ -259,6 +260,7 @@ def trend_router(context: Context) -> APIRouter:
         responses={**reading, **table_content("Trends, by column")},
     )
     async def trends(
+        request: Request,
         unit: UnitId,
         bearing: BearingId,
         times: TimeRange,
@@ -308,7 +310,8 @@ def trend_router(context: Context) -> APIRouter:
         grid = context.films.settings.baseline.settings().grid
         read = partial(_read, context, query, group_by, grid)
         if wanted == "json":
-            return await rendered(lambda: trend_model(query, *read()))
+            revision = (times, context.live.past_revision(unit, query.end_ns))
+            return await context.answers.of(request, revision, lambda: trend_answer(query, *read()))
         whole, groups, past = await in_thread(read)
         columns = await in_thread(lambda: trend_table(whole, groups, past))
         cursor = None if whole.next_ns is None else str(whole.next_ns)

@@ -1,1 +1,1 @@
-"""Work of commands without a running service: back-test, analysis again, validation, imports."""
+"""Work of commands that need no running service: back-test, re-analysis, validation, imports."""

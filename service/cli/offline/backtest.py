@@ -43,7 +43,7 @@ MAX_PERIOD_RATIO = 2.0
 
 @dataclass
 class BackTestResult:
-    """Result of a back-test."""
+    """Films, alarms, baselines, shaft responses and warnings that a back-test has found."""
 
     films: list[FilmReport] = field(default_factory=list)
     alarms: list[AlarmReport] = field(default_factory=list)
@@ -53,7 +53,7 @@ class BackTestResult:
     unit_years: float = 0.0
 
     def report(self, file: str, n_rows: int, duration_s: float) -> BackTestReport:
-        """Return the report of a file."""
+        """Return the report of the back-test of `file`, whose run took `duration_s`."""
         n_alarms, n_danger = len(self.alarms), sum(a.level == "danger" for a in self.alarms)
         per_year = n_alarms / self.unit_years if self.unit_years else None
         return BackTestReport(
@@ -78,7 +78,7 @@ def run_back_test(
     rules: BackTestRules,
     advanced: Callable[[int], object] = lambda _: None,
 ) -> BackTestResult:
-    """Learn the baselines of all histories and decide on the later readings.
+    """Learn the baselines of all bearings, and compare the later readings with them.
 
     Parameters
     ----------
@@ -94,7 +94,9 @@ def run_back_test(
     for event in rules.events:
         if not any(event.is_about(*place) for place in histories):
             name = event.unit + (f"/{event.bearing}" if event.bearing else "")
-            raise ReadingsError(f"event of {name}: the file has no readings of {name}")
+            raise ReadingsError(
+                f"event of {name}: the file has no readings of {name}; correct the event"
+            )
     for unit, places in groupby(sorted(histories), key=lambda place: place[0]):
         runs = []
         for place in places:
@@ -151,7 +153,6 @@ def _compared_ns(run: BearingRun) -> int:
 
 
 def _doubts(histories: Mapping[Place, BearingRows], rules: BackTestRules) -> Iterator[str]:
-    """Yield warnings about the validity of the results."""
     nominal_h = rules.baseline.reading_h
     for (unit, bearing), rows in histories.items():
         history = rows.history
@@ -175,7 +176,7 @@ def _doubts(histories: Mapping[Place, BearingRows], rules: BackTestRules) -> Ite
 
 
 def export_baselines(result: BackTestResult, folder: Path) -> int:
-    """Write all baselines and responses into a new folder; return the number of files.
+    """Write all baselines and shaft responses into a new folder; return the number of files.
 
     Raises
     ------
@@ -283,7 +284,7 @@ MAX_TEXT = 200
 
 
 def time_ns_of(text: str) -> int:
-    """Parse a time as nanoseconds since 1970.
+    """Return an ISO 8601 time as ns since 1970 UTC.
 
     Raises
     ------
@@ -300,7 +301,7 @@ def time_ns_of(text: str) -> int:
 
 
 def event_of(text: str) -> MachineEvent:
-    """Parse an event, written ``UNIT[/BEARING] TIME [TEXT]``.
+    """Return the machine event in a text of the form ``UNIT[/BEARING] TIME [TEXT]``.
 
     Raises
     ------

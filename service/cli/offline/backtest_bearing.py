@@ -67,7 +67,7 @@ class Learning:
     until_ns: int | None = None
 
     def end_ns(self, begin_ns: int, is_first: bool) -> int:
-        """Return the end of the learning period that begins at `begin_ns`."""
+        """Return the end, ns, of the learning period that begins at `begin_ns`."""
         if is_first and self.until_ns is not None:
             return self.until_ns
         return begin_ns + round(self.days * DAY_NS)
@@ -75,10 +75,12 @@ class Learning:
 
 @dataclass(frozen=True)
 class Period:
-    """Range of rows of a bearing under one baseline.
+    """Range of rows of a bearing that are used with one baseline.
 
     Parameters
     ----------
+    version
+        Number of the baseline, from 1.
     begin, learned, end
         The baseline is learned from rows `begin` to `learned`, and compared with rows up to `end`.
     event
@@ -95,7 +97,7 @@ class Period:
 def periods_of(
     time_ns: TimeArray, events: Sequence[MachineEvent], learning: Learning
 ) -> list[Period]:
-    """Divide the readings of a bearing at its events; periods without readings are omitted."""
+    """Return the periods of a bearing between its events, except periods without readings."""
     ordered = sorted(events, key=lambda event: event.time_ns)
     cuts = [0, *(int(np.searchsorted(time_ns, event.time_ns)) for event in ordered), time_ns.size]
     texts = ["", *(event.text for event in ordered)]
@@ -113,7 +115,7 @@ _Bools = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class BackTestRules:
-    """Rules of learning and deciding.
+    """Settings of a back-test: learning periods, limits, machine events and machine data.
 
     Parameters
     ----------
@@ -162,13 +164,13 @@ class PeriodRun:
     far: str = ""
 
     def stiffness(self, direction: str) -> QuantityBaseline | None:
-        """Return the stiffness baseline of a direction."""
+        """Return the stiffness baseline of a direction; None without a baseline."""
         return self.baseline.of(direction) if self.baseline else None
 
 
 @dataclass(frozen=True, eq=False)
 class BearingRun:
-    """Back-test of one bearing."""
+    """Result of the back-test of one bearing."""
 
     place: Place
     rows: BearingRows
@@ -177,7 +179,7 @@ class BearingRun:
 
 
 def run_bearing(place: Place, rows: BearingRows, rules: BackTestRules) -> BearingRun:
-    """Learn and decide for one bearing.
+    """Learn the baselines of one bearing, and compare its later readings with them.
 
     Raises
     ------
@@ -239,7 +241,7 @@ def _run(
 
 
 def places_of(plant: PlantFile) -> list[Place]:
-    """Return the units and bearings of a plant."""
+    """Return the unit and bearing ids of all bearings of a plant."""
     return [(unit.id, bearing.id) for unit in plant.unit for bearing in unit.bearing]
 
 
@@ -252,7 +254,7 @@ def rules_of(
     created_ns: int,
     estimator: str,
 ) -> BackTestRules:
-    """Build the rules from the settings and the rated figures of a plant."""
+    """Return the rules of a back-test; without `plant`, no rated figures and bracket stiffness."""
     units = plant.unit if plant else ()
     return BackTestRules(
         learning=learning,

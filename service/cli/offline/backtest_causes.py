@@ -16,7 +16,7 @@ NOT_LEARNED = Attribution(Cause.UNKNOWN, "the response of the shaft has not been
 
 
 class UnitCauses:
-    """Shaft response of a unit in each of its periods, and the cause of its alarms.
+    """Causes of the alarms of one unit, from its shaft response in each period.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class UnitCauses:
         self.responses = [self._learned(period) for period in self._periods]
 
     def of(self, bearing: str, direction: str, time_ns: int) -> Attribution:
-        """Return the cause of an alarm, judged from the readings up to a given time."""
+        """Return the cause of an alarm by the readings up to a time, unknown without data."""
         if not self._has_amplitudes:
             return NO_AMPLITUDES
         last = int(np.searchsorted(self._time_ns, time_ns, side="right"))

@@ -18,14 +18,14 @@ MAX_SHOWN = 40
 
 
 class RowProblems:
-    """Problems by row, limited to the number that an error names.
+    """Collector of the problems in the rows of a file; an error names the first `MAX_NAMED`.
 
     Parameters
     ----------
     line : (n,)
         Number of each row in messages.
     word
-        Unit of `line`: "line" or "row".
+        Word for `line` in messages: "line" or "row".
     """
 
     def __init__(self, line: TimeArray, word: str = "line") -> None:
@@ -39,7 +39,7 @@ class RowProblems:
         text: str,
         value: Callable[[int], Any] | None = None,
     ) -> None:
-        """Add a problem of rows, given by mask or number, with the value in each row."""
+        """Add a problem of rows, by mask or index; `value` returns the value of a row."""
         rows = np.flatnonzero(wrong) if wrong.dtype == np.bool_ else wrong
         self._n_found += rows.size
         lines = self._line[rows]
@@ -48,13 +48,7 @@ class RowProblems:
             self._found.append((int(lines[n]), words))
 
     def refuse(self) -> None:
-        """Raise an error if there is a problem.
-
-        Raises
-        ------
-        ReadingsError
-            If there is a problem; the message names the lines.
-        """
+        """Raise `ReadingsError` with the problems and their lines, if there are any."""
         if not self._found:
             return
         found = sorted(self._found)[:MAX_NAMED]
@@ -65,7 +59,7 @@ class RowProblems:
 
 
 def shown(value: Any) -> str:
-    """Format a wrong value for messages."""
+    """Return a wrong value as text for messages, cut after `MAX_SHOWN` characters."""
     text = repr(value)
     return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
 
@@ -101,13 +95,7 @@ class ReadingsError(ValueError):
 
 
 def check_headings(headings: Sequence[str]) -> None:
-    """Refuse missing, unknown and repeated headings.
-
-    Raises
-    ------
-    ReadingsError
-        If there are any; the message names them.
-    """
+    """Raise `ReadingsError` if headings are missing, unknown, repeated or too many."""
     if len(headings) > MAX_COLUMNS:
         raise ReadingsError(f"expected at most {MAX_COLUMNS} columns, got {len(headings)}")
     missing = [key for key in REQUIRED if key not in headings]
@@ -138,18 +126,18 @@ _NO_TIME = "time is not ISO 8601 with an offset from UTC, such as 2026-03-01T08:
 REASON, NO_REASON = "reason", "ok"
 """Name of the column, and its value for a good reading."""
 
-_TIMES = "must be texts like 2026-03-01T08:00:00Z or timestamps with a zone; whole ns are time_ns"
+_TIMES = "use 2026-03-01T08:00:00Z or timestamps with a zone; name a column of ns time_ns"
 
 
 def converted(table: Any, line: Any, word: str) -> Any:
-    """Convert all columns of a table.
+    """Return a table as a record batch with the required types, times in ns and line numbers.
 
     Parameters
     ----------
     line : (n,)
         Number of each row in messages.
     word
-        Unit of the numbers: "line" or "row".
+        Word for `line` in messages: "line" or "row".
 
     Raises
     ------
@@ -187,7 +175,6 @@ def _time_ns(table: Any, problems: RowProblems) -> Any:
 
 
 def _number(column: Any, key: str, problems: RowProblems) -> Any:
-    """Return a column of numbers; missing ones are NaN."""
     column, kind = _flat(column), column.type
     is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)
     if not (is_number or _is_text(kind)):

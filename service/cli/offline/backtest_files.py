@@ -44,7 +44,7 @@ def read_histories(
     places: Collection[Place] | None = None,
     advanced: Callable[[int], object] = lambda _: None,
 ) -> dict[Place, BearingRows]:
-    """Read a CSV or Parquet file.
+    """Read the readings of all bearings from a CSV or Parquet file.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def read_histories(
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):
-            raise ReadingsError("not a regular file")
+            raise ReadingsError("the path is not a regular file")
         with path.open("rb") as stream:
             word = "row" if stream.read(len(MAGIC)) == MAGIC else "line"
         return histories_of(_columns(path, word, advanced), places, word)
@@ -111,13 +111,12 @@ def _gathered(
 
 
 def _check_names(key: str, column: Any, names: set[str], line: Any, word: str) -> None:
-    """Refuse names that are not valid for units or bearings, and too many different names."""
     for code, name in enumerate(column.dictionary.to_pylist()):
         if key in ("unit", "bearing") and not IDENTIFIER.fullmatch(name):
             row = int(np.argmax(column.indices.to_numpy() == code))
             raise ReadingsError(
-                f"{word} {line[row]}: {key} {shown(name)} must be letters, digits, dot,"
-                " dash or underscore, at most 32"
+                f"{word} {line[row]}: {key} {shown(name)} must be 1 to 32 letters, digits, dots,"
+                " dashes or underscores"
             )
         names.add(name)
     if len(names) > MAX_NAMES:
@@ -145,7 +144,7 @@ QUALITY = {
 def stored_histories(
     films: FilmStore, place: Place, estimator: Estimator, start_ns: int, end_ns: int
 ) -> Iterator[FilmHistory]:
-    """Read the readings of one film, oldest first, a few months at a time."""
+    """Yield the stored readings of one film before `end_ns`, oldest first, in parts of 90 days."""
     first_ns = films.first_ns(*place, estimator)
     if first_ns is None:
         return
@@ -158,7 +157,7 @@ def stored_histories(
 
 
 def table_of(place: Place, found: FilmHistory) -> Any:
-    """Return readings as rows of both directions."""
+    """Return film readings as an Arrow table with the rows of direction x, then of y."""
     return pa.concat_tables(_side(place, found, side) for side in range(len(DIRECTIONS)))
 
 

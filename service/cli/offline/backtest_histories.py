@@ -64,7 +64,7 @@ class BearingRows:
 def histories_of(
     columns: Mapping[str, Any], places: Collection[Place] | None = None, word: str = "line"
 ) -> dict[Place, BearingRows]:
-    """Sort rows of several bearings and both directions into histories.
+    """Return the history of each bearing, with the rows of both directions merged by time.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def histories_of(
     places
         Existing units and bearings; None for any.
     word
-        Unit of the column `line`: "line" or "row".
+        Word for the column `line` in messages: "line" or "row".
 
     Raises
     ------
@@ -94,7 +94,6 @@ def histories_of(
 def _mapped(
     column: Any, values: Mapping[str, Any], default: Any, rows: _Rows | slice = slice(None)
 ) -> npt.NDArray[Any]:
-    """Return the (n,) values of the names of the rows."""
     names = column.dictionary.to_pylist()
     found = np.array([values.get(name, default) for name in names] or [default])
     return np.asarray(found[column.indices.to_numpy()[rows]])
@@ -140,7 +139,6 @@ def _check_numbers(columns: Mapping[str, Any], problems: RowProblems) -> None:
 
 
 def _by_place(columns: Mapping[str, Any]) -> list[tuple[Place, _Rows]]:
-    """Return the row numbers of each bearing, in file order."""
     unit, bearing = (columns[key].indices.to_numpy() for key in ("unit", "bearing"))
     key = unit.astype(np.int64) * len(columns["bearing"].dictionary) + bearing
     order = np.argsort(key, kind="stable")
@@ -154,7 +152,6 @@ def _by_place(columns: Mapping[str, Any]) -> list[tuple[Place, _Rows]]:
 
 
 def _outcome(columns: Mapping[str, Any], rows: _Rows) -> npt.NDArray[Any]:
-    """Return (n,) members of `ReadingOutcome`."""
     found = _mapped(columns["quality"], QUALITIES, ReadingOutcome.BAD_QUALITY, rows)
     if "reason" in columns:
         is_silent = _is_in(columns["quality"], ["bad"], rows)
@@ -164,7 +161,6 @@ def _outcome(columns: Mapping[str, Any], rows: _Rows) -> npt.NDArray[Any]:
 
 
 def _merged(columns: Mapping[str, Any], rows: _Rows, problems: RowProblems) -> BearingRows:
-    """Merge both directions of a bearing on one time axis."""
     row_ns = columns[TIME_NS][rows]
     time_ns = np.unique(row_ns)
     sides = [np.flatnonzero(_is_in(columns["direction"], [name], rows)) for name in DIRECTIONS]
@@ -183,7 +179,10 @@ def _merged(columns: Mapping[str, Any], rows: _Rows, problems: RowProblems) -> B
         return found
 
     def one(key: str, column: npt.NDArray[Any] | None) -> FloatArray:
-        """Return (n,) values common to both directions; they must agree where both have a row."""
+        """Return (n,) values of y, or of x without a row of y; NaN if `column` is None.
+
+        A value of x and y that differs at one time is added to `problems` under the name `key`.
+        """
         x, y = both(column)
         differs = ~((x == y) | np.isnan(x) & np.isnan(y))
         wrong = np.isin(slots[1], slots[0]) & differs[slots[1]]

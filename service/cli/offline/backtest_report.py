@@ -50,7 +50,7 @@ class ConditionReport(_Part):
 
 
 class CauseReport(_Part):
-    """Probable cause of an alarm."""
+    """Probable cause of an alarm, with the film's share of the change and its uncertainty."""
 
     cause: str
     reason: str
@@ -88,7 +88,7 @@ class AlarmReport(_Part):
 
 
 class SupportReport(_Part):
-    """Support of a baseline by readings."""
+    """Baseline of one period: learning period, numbers of cells by support, and scatter."""
 
     version: int
     event: str
@@ -112,7 +112,7 @@ class SupportReport(_Part):
 
 
 class FilmReport(_Part):
-    """Readings of one bearing in one direction."""
+    """Counts of the readings and alarms of one bearing in one direction, and its baselines."""
 
     unit: str
     bearing: str
@@ -143,7 +143,7 @@ class RateReport(_Part):
 
 
 class BackTestReport(_Part):
-    """Report of a back-test."""
+    """Report of the back-test of a file, as printed with ``--json``."""
 
     file: str
     rows: int
@@ -157,7 +157,7 @@ class BackTestReport(_Part):
 
 @dataclass(frozen=True)
 class AlarmStretch:
-    """Alarm as a range of rows of the decisions.
+    """Range of rows of a decision history in which an alarm is active.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ class AlarmStretch:
 
 
 def alarm_stretches(decided: DecisionHistory) -> Iterator[AlarmStretch]:
-    """Find all alarms, in order of time."""
+    """Yield all alarms in a history of decisions, in order of time."""
     is_active = np.concatenate([[False], decided.level > 0, [False]])
     edges = np.flatnonzero(np.diff(is_active.astype(np.int8)))
     for begin, end in edges.reshape(-1, 2).tolist():
@@ -195,7 +195,7 @@ def alarm_stretches(decided: DecisionHistory) -> Iterator[AlarmStretch]:
 
 
 def alarm_reports(runs: Sequence[BearingRun], causes: UnitCauses) -> Iterator[AlarmReport]:
-    """Report all alarms of a unit."""
+    """Yield a report on each alarm of a unit, by bearing, period and direction."""
     for run in runs:
         for period in run.periods:
             for direction, decided in period.decided.items():
@@ -204,7 +204,7 @@ def alarm_reports(runs: Sequence[BearingRun], causes: UnitCauses) -> Iterator[Al
 
 
 def film_reports(run: BearingRun) -> Iterator[FilmReport]:
-    """Report both directions of a bearing."""
+    """Yield a report on each direction of a bearing."""
     for direction, n_rows in zip(DIRECTIONS, run.rows.n_rows, strict=True):
         counts = np.zeros(len(Verdict), np.int64)
         for period in run.periods:
@@ -250,7 +250,7 @@ def _alarm(
 
 
 def change_report(decided: DecisionHistory, row: int) -> ChangeReport:
-    """Report the change of a reading, as a percentage; decisions are in logarithms."""
+    """Return the change at a row, in percent of the baseline, with its uncertainty."""
     change = float(decided.change[row])
     share, std = float(np.exp(change)), abs(change) / float(decided.significance[row])
     return ChangeReport(

@@ -33,7 +33,7 @@ Lines = tuple[bytes, TimeArray]
 
 
 def checked_lines(stream: BinaryIO) -> Iterator[Lines]:
-    """Yield the checked lines of a file.
+    """Yield the lines of a CSV file, some megabytes at a time, after checking them.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def _fault(line: bytes) -> str | None:
 
 
 def csv_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
-    """Read a CSV file.
+    """Read the rows of a CSV file in batches.
 
     Yields
     ------
@@ -157,7 +157,7 @@ _BUFFER_BYTES = 1_000_000
 
 
 def parquet_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
-    """Read a Parquet file; call it in a child process, which a malformed file may crash.
+    """Read the rows of a Parquet file in batches; a malformed file may crash the process.
 
     Yields
     ------
@@ -185,7 +185,7 @@ def _batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
         check_headings(headings)
         n_rows = file.metadata.num_rows
         if n_rows > MAX_ROWS:
-            raise ReadingsError(f"expected at most {MAX_ROWS} rows, got {n_rows}")
+            raise ReadingsError(f"expected at most {MAX_ROWS} rows, got {n_rows}; split the file")
         n_read = 0
         for batch in file.iter_batches(_ROWS, use_threads=False):
             row = np.arange(n_read + 1, n_read + len(batch) + 1)
@@ -202,7 +202,7 @@ WRONG_FILE = 3
 
 
 def main() -> None:
-    """Read the file named by the first argument."""
+    """Read the file named by the first argument; write its rows to standard output."""
     confine(MEMORY_BYTES)
     try:
         with Path(sys.argv[1]).open("rb") as stream:
@@ -222,7 +222,7 @@ def _send(batches: Iterator[tuple[Any, int]], out: BinaryIO) -> None:
     for batch, n_bytes in batches:
         n_rows += len(batch)
         if n_rows > MAX_ROWS:
-            raise ReadingsError(f"the file has more than {MAX_ROWS} rows")
+            raise ReadingsError(f"expected at most {MAX_ROWS} rows, got more; split the file")
         writer = writer or pa.ipc.new_stream(out, batch.schema)
         writer.write_batch(batch, custom_metadata={"n_bytes": str(n_bytes)})
     if writer is None:

@@ -97,7 +97,10 @@ def judged(
     learned: BearingBaseline,
     rules: FilmRules,
 ) -> FilmHistory:
-    """Return a history with the decisions under its own baseline."""
+    """Return a history with the decisions of its comparison with a baseline learned from it.
+
+    Raises `ValueError` if a direction has no baseline.
+    """
     found = [learned.of(direction) for direction in DIRECTIONS]
     quantities = [quantity for quantity in found if quantity is not None]
     if len(quantities) < len(DIRECTIONS):
@@ -137,7 +140,6 @@ def _deviation(
 
 
 def _trends(history: StiffnessHistory, estimator: Estimator) -> dict[str, FloatArray]:
-    """Return the simulated trends as columns of the store."""
     columns = {
         "speed_rpm": history.speed_rpm,
         "power_mw": history.power_mw,

@@ -1,6 +1,5 @@
 """Import of foreign files and CAN logs into recordings."""
 
-import math
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
@@ -9,12 +8,13 @@ from itertools import chain
 from pathlib import Path
 
 import can
+import numpy as np
 
 from acquisition.can.assembly import FrameAssembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanSettings
-from acquisition.delivery.blocks import BlockJoiner, RawBlock, sample_block
+from acquisition.delivery.blocks import BlockJoiner
 from acquisition.delivery.units import slow_conversion, waveform_factor
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import (
@@ -29,9 +29,11 @@ from acquisition.recordings.manifest import Manifest, read_manifest
 from acquisition.recordings.messages import MAX_DATA, Frames
 from acquisition.recordings.reading import imported_blocks, imported_frames
 from acquisition.recordings.writer import RecordingWriter
+from core.samples.blocks import SampleBlock
 from core.samples.calibration import UnitCalibration
 from service.runtime.times import EPOCH
-from service.settings.adapter_values import can_settings_of, recorded_unit
+from service.settings.adapter_values import recorded_unit
+from service.settings.can_values import can_settings_of
 from service.settings.core_values import calibration_of
 from service.settings.sources.can import CanSettings as CanSourceSettings
 from service.settings.sources.mapping import (
@@ -59,15 +61,15 @@ class CanLogDecoder:
         self._assembler = FrameAssembler(plan)
         self._gate = FrameGate(plan, self._assembler.refused)
 
-    def take(self, frames: Frames) -> list[RawBlock]:
-        """Decode the next frames of a log.
+    def take(self, frames: Frames) -> list[SampleBlock]:
+        """Decode the next frames of a log, and return the completed blocks.
 
         Raises
         ------
         ConfigError
             If the frames are not from one device.
         """
-        blocks: list[RawBlock] = []
+        blocks: list[SampleBlock] = []
         for time_ns, message in zip(frames["time_ns"].tolist(), _messages(frames), strict=True):
             frame = self._gate.admit(message)
             if frame is not None:
@@ -78,7 +80,7 @@ class CanLogDecoder:
 
 
 def log_decoder_of(unit: UnitSettings) -> CanLogDecoder | None:
-    """Return the decoder of a unit that reads CAN, or None for another unit.
+    """Return the decoder of CAN logs of a unit; None if the unit does not read CAN.
 
     Raises
     ------
@@ -105,7 +107,7 @@ def _messages(frames: Frames) -> Iterator[can.Message]:
 
 
 def import_job(mapping: ImportMapping, unit: UnitSettings) -> ImportJob:
-    """Describe the import of a file for its reader.
+    """Return the description of an import, which the reader of the file receives.
 
     Raises
     ------
@@ -121,7 +123,9 @@ def import_job(mapping: ImportMapping, unit: UnitSettings) -> ImportJob:
         _require_known(channels, known, "channel", unit.id)
         missing = [id_ for id_ in known if id_ not in channels]
         if missing:
-            raise ConfigError(f"channel {', '.join(missing)} of unit {unit.id} is not mapped")
+            raise ConfigError(
+                f"the mapping lacks channel {', '.join(missing)} of unit {unit.id}; add [[channel]]"
+            )
     csv = CsvLayout(**mapping.csv.model_dump()) if mapping.csv else CsvLayout()
     return ImportJob(
         format=mapping.format,
@@ -144,7 +148,7 @@ def import_recording(
     *,
     advanced: Callable[[float], None] = lambda _: None,
 ) -> Manifest:
-    """Read a foreign file into a recording of a unit.
+    """Import a foreign file as a recording of a unit; return the manifest of the recording.
 
     Parameters
     ----------
@@ -159,36 +163,41 @@ def import_recording(
     job = import_job(mapping, unit)
     decoder = None if job.channels else log_decoder_of(unit)
     if not job.channels and decoder is None:
-        raise ConfigError(f'unit {unit.id} has no source of kind "can", whose DBC file is required')
+        raise ConfigError(
+            f'unit {unit.id} has no source of kind "can"; a CAN log is decoded by its DBC file'
+        )
     read = _decoded(path, job, decoder) if decoder else imported_blocks(path, job)
     recorded = recorded_unit(unit)
     joiner = BlockJoiner(job.block_samples)
-    with closing(read) as raws:
-        first = next(raws, None)
+    with closing(read) as found:
+        first = next(found, None)
         if first is None:
             raise ConfigError(f"{path}: the file has no samples of unit {unit.id}")
-        with RecordingWriter(folder, recorded, made_by, first_decides=True) as writer:
-            for raw, done in chain([first], raws):
-                whole = raw if decoder else _with_all_slow(raw, job, unit)
-                for block in joiner.put(sample_block([whole], recorded.calibration)):
-                    writer.write_block(block)
+        with RecordingWriter(folder, recorded, made_by) as writer:
+            for part, done in chain([first], found):
+                whole = _with_all_slow(part, recorded.calibration)
+                for block in joiner.put([whole]):
+                    writer.write(block)
                 advanced(done)
             for block in joiner.flush():
-                writer.write_block(block)
+                writer.write(block)
     return read_manifest(folder)
 
 
 def _decoded(
     path: Path, job: ImportJob, decoder: CanLogDecoder
-) -> Generator[tuple[RawBlock, float]]:
+) -> Generator[tuple[SampleBlock, float]]:
     for frames, done in imported_frames(path, job):
-        yield from ((raw, done) for raw in decoder.take(frames))
+        yield from ((block, done) for block in decoder.take(frames))
 
 
-def _with_all_slow(block: RawBlock, job: ImportJob, unit: UnitSettings) -> RawBlock:
+def _with_all_slow(block: SampleBlock, calibration: UnitCalibration) -> SampleBlock:
     """Return the block with all slow channels; slow channels that the file lacks are NaN."""
-    found = dict(zip((column.id for column in job.slow), block.slow, strict=True))
-    return replace(block, slow=tuple(found.get(c.id, math.nan) for c in unit.slow_channel))
+    found = dict(zip(block.calibration.slow_ids, block.side.slow, strict=True))
+    missing = np.full(block.side.n_cells, np.nan)
+    slow = np.array([found.get(id_, missing) for id_ in calibration.slow_ids])
+    side = replace(block.side, slow=slow.reshape(-1, block.side.n_cells))
+    return replace(block, calibration=calibration, side=side)
 
 
 def _channels(mapped: Mapping[str, MappedChannel], unit: UnitSettings) -> tuple[ChannelColumn, ...]:
@@ -243,4 +252,4 @@ def _require_known(mapped: Mapping[str, object], known: list[str], kind: str, un
     for id_ in mapped:
         if id_ not in known:
             words = ", ".join(known) or "none"
-            raise ConfigError(f"{kind} {id_} is mapped, but unit {unit} has {words}")
+            raise ConfigError(f"{kind} {id_} is mapped, but unit {unit} has only {words}")

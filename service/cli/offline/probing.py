@@ -47,7 +47,7 @@ class RegisterLook:
     pairs
         Values of types of two registers in each byte order; empty for the last register.
     plausible
-        Byte orders in which the pair is a plausible float.
+        Byte orders in which this register and the next are a float of 1e-3 to 1e6.
     """
 
     address: int
@@ -118,7 +118,7 @@ class RingLook:
 
 
 def ring_look(header: RingHeader, slot: Slot) -> RingLook:
-    """Describe a block ring by its header and its newest slot."""
+    """Return the layout of a block ring and the content of its newest slot."""
     ring = header.layout
     state = (
         "blank" if slot.blank else "torn" if slot.torn else "damaged" if slot.damage else "whole"
@@ -148,7 +148,7 @@ def ring_look(header: RingHeader, slot: Slot) -> RingLook:
 
 
 def looks(data: bytes, address: int) -> list[RegisterLook]:
-    """Decode each register in every type and byte order.
+    """Return each register, decoded in every type and byte order.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def looks(data: bytes, address: int) -> list[RegisterLook]:
 
 
 def value_looks(decoder: MapDecoder, content: bytes) -> list[ValueLook]:
-    """Return every value of a map with its registers."""
+    """Return every value of a register map, decoded from `content`, with its raw registers."""
     reading = decoder.read(content)
     return [
         ValueLook(
@@ -227,12 +227,12 @@ _TRIES_IN_FLIGHT = 20
 
 
 def link_settings_of(device: ModbusLinkSettings) -> LinkSettings:
-    """Return the link settings of a device."""
+    """Return the connection settings of a device for the Modbus client."""
     return LinkSettings(**link_fields(device))
 
 
 async def read_once(device: ModbusLinkSettings, function: int, address: int, count: int) -> bytes:
-    """Read registers as big-endian words, or bits, eight in a byte."""
+    """Read registers; return big-endian words or, for functions 1 and 2, bits, eight in a byte."""
     client = ModbusClient(link_settings_of(device))
     async with client.connected():
         return await client.read(address, count, function)
@@ -241,7 +241,7 @@ async def read_once(device: ModbusLinkSettings, function: int, address: int, cou
 async def read_map_once(
     device: ModbusLinkSettings, registers: RegisterMap
 ) -> tuple[MapDecoder, bytes]:
-    """Check the signature, then read all registers of a map."""
+    """Check the signature of a device; return the decoder and the content of its registers."""
     decoder = MapDecoder(registers)
     reader = MapReader(link_settings_of(device), decoder)
     async with reader.connected():
@@ -251,7 +251,7 @@ async def read_map_once(
 async def read_ring_once(
     device: ModbusLinkSettings, base_address: int, function: int
 ) -> tuple[RingHeader, Slot]:
-    """Read a block ring's header and its newest slot."""
+    """Return the header and the newest slot of a block ring."""
     client = ModbusClient(link_settings_of(device))
     reader = RingReader(client, base_address, function)
     async with client.connected():
@@ -261,7 +261,7 @@ async def read_ring_once(
 
 
 async def identify_once(device: ModbusLinkSettings) -> Identification:
-    """Read the identification of a device."""
+    """Return the vendor, product code and revision of a device (function 43/14)."""
     client = ModbusClient(link_settings_of(device))
     async with client.connected():
         return await client.identify()
@@ -270,7 +270,7 @@ async def identify_once(device: ModbusLinkSettings) -> Identification:
 async def measure_in_flight(
     device: ModbusLinkSettings, address: int, function: int, most: int
 ) -> int:
-    """Measure how many simultaneous requests a device answers in order; at least 1.
+    """Return how many simultaneous requests a device answers in order, from 1 to `most`.
 
     Parameters
     ----------

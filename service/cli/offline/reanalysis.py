@@ -1,12 +1,13 @@
 """Analysis of a recording by the live monitor, with results in the models of the API."""
 
-from collections.abc import AsyncIterator, Callable, Iterable, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from acquisition.source import SampleSource
 from core.monitor.assessment import Assessment, AveragingWindow
 from core.monitor.monitor import UnitMonitor
 from core.monitor.refresh import Refresh
+from core.quality import Level
 from core.samples.calibration import UnitCalibration
 from service.api.routes.bearings import estimator_names, runout_names
 from service.api.values import QualityModel, reading_model, window_model
@@ -24,8 +25,29 @@ def assessment_document(assessment: Assessment) -> dict[str, Any]:
         "runout": runout_names(assessment),
         "window": window_model(assessment.window),
         "estimators": estimator_names(assessment),
-        "readings": {name: reading_model(name, r) for name, r in assessment.readings.items()},
+        "readings": {name: reading_model(r) for name, r in assessment.readings.items()},
     }
+
+
+N_PER_GN = 1e9
+
+
+def stiffness_lines(assessment: Assessment) -> Iterator[str]:
+    """Yield the film stiffness of a bearing in x and y as text, in GN/m with its 95 % interval."""
+    for axis in ("xx", "yy"):
+        reading = assessment.readings[f"stiffness_{axis}_n_per_m"]
+        words = f"{assessment.unit} {assessment.bearing} film stiffness {axis}: "
+        if reading.value is None:
+            yield f"{words}not available, {reading.quality.reason.value}"
+            continue
+        words += f"{reading.value / N_PER_GN:.3f}"
+        if reading.interval_95 is not None:
+            low, high = reading.interval_95
+            words += f" ± {(high - low) / 2.0 / N_PER_GN:.3f} GN/m (95 %)"
+        else:
+            words += " GN/m, uncertainty unknown"
+        is_good = reading.quality.level is Level.GOOD
+        yield words if is_good else f"{words}, uncertain: {reading.quality.reason.value}"
 
 
 async def refreshes(
@@ -51,31 +73,31 @@ async def refreshes(
 
 
 def is_full(averaged: AveragingWindow) -> bool:
-    """Return whether the average has all its segments."""
+    """Return whether an average has the number of segments of a full average."""
     return averaged.n_segments >= averaged.n_segments_wanted
 
 
 class LastAverages:
-    """The last full average of each bearing, or the last average if none is full."""
+    """Last full average of each bearing, or its last average if none is full."""
 
     def __init__(self) -> None:
         self._kept: dict[str, Refresh] = {}
 
     def put(self, refresh: Refresh) -> None:
-        """Add the next evaluation."""
+        """Add the next average of a bearing."""
         kept = self._kept.get(refresh.bearing.id)
         if kept is None or is_full(refresh.averaged) or not is_full(kept.averaged):
             self._kept[refresh.bearing.id] = refresh
 
     def all(self) -> Iterable[Refresh]:
-        """Return one evaluation for each bearing, in order of arrival."""
+        """Return the kept average of each bearing, in the order of the first averages."""
         return self._kept.values()
 
 
 def calibration_differences(
     ids: Sequence[str], recorded: UnitCalibration, configured: UnitCalibration
 ) -> list[str]:
-    """Describe the differences between recorded and configured calibration.
+    """Return a text on each difference between the recorded and the configured calibration.
 
     Parameters
     ----------

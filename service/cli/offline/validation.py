@@ -37,7 +37,7 @@ UNBALANCE_GRADE_MM_S: Final = 4.25
 
 @dataclass(frozen=True)
 class SimulatedRow:
-    """A condition in Table 4 or 5 and its repetition with estimated films in Table 6 or 7.
+    """Condition in Table 4 or 5, and its repetition with estimated films in Table 6 or 7.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ N_CONDITIONS = 5
 
 @dataclass(frozen=True)
 class Row:
-    """Figure printed in the paper beside the figure of padwatch.
+    """Figure of the paper, with the figure that padwatch computes and its error.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Errors:
-    """Summary of :attr:`Row.error_percent`."""
+    """Largest and root-mean-square error of rows, in percent."""
 
     max_percent: float
     rms_percent: float
@@ -196,7 +196,7 @@ def errors(rows: Sequence[Row]) -> Errors:
 
 
 def rounding_limits_gn_per_m(measured: MeasuredRow) -> tuple[float, float]:
-    """Return the limits of the printed stiffness, computed by equation (5) from rounded values.
+    """Return the lowest and highest stiffness by equation (5) that the printed digits allow.
 
     Each printed figure has an error of up to half a unit of its last digit.
     """

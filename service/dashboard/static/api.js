@@ -1,6 +1,7 @@
 /** Questions to the padwatch service, with every way they can fail told apart. */
 
 import { noteEdition } from "./edition.js";
+import { noteTime } from "./server_time.js";
 
 const TIMEOUT_MS = 8000;
 
@@ -29,7 +30,7 @@ const REFUSED = "padwatch-refused";
  * Fetch JSON from `/api/v1`; `path` is a list of segments, `query` a list of pairs.
  *
  * While nothing is new the service does not send the answer again, and the very same object is
- * returned; ages in it count from the first arrival of that object.
+ * returned.
  */
 export async function ask(path, query = [], signal = undefined) {
   const search = new URLSearchParams(query).toString();
@@ -80,6 +81,7 @@ async function answer(url, signal, how, timeoutMs = TIMEOUT_MS) {
     // no-store: the browser's own cache has no say, `answers` above has
     const response = await fetch(url, { ...how, signal: either, cache: "no-store" });
     noteEdition(response.headers);
+    noteTime(response.headers);
     return response;
   } catch (failure) {
     if (signal?.aborted) throw failure;

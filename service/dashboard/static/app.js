@@ -4,11 +4,14 @@ import { pageOf } from "./admission.js";
 import { onAmplitudes } from "./amplitudes.js";
 import { NotReachable, ask, onRefused } from "./api.js";
 import { onUpgrade } from "./edition.js";
-import { SILENCE, failedNow, heardNow, moment, viewAt } from "./live.js";
+import { loadCatalogue } from "./catalogue.js";
+import { SILENCE, failedNow, heardNow, merged, moment, viewAt } from "./live.js";
 import { PAGES } from "./pages.js";
 import { bar } from "./parts/bar.js";
+import { N_CARDS } from "./pages/overview.js";
 import { poll } from "./poll.js";
 import { ALARMS_ADDRESS } from "./route.js";
+import { serviceTimeMs } from "./server_time.js";
 import { askSession, isLocked, onSession, session } from "./session.js";
 
 const OVERVIEW_PERIOD_S = 2;
@@ -23,7 +26,7 @@ async function askOverview(signal) {
   try {
     if (session() === null || isLocked()) await askSession(signal);
     if (isLocked()) live = SILENCE;
-    else live = heardNow(live, await ask(["overview"], [], signal), moment());
+    else live = await heard(signal);
   } catch (failure) {
     if (signal.aborted) return;
     live = failedNow(live, failureWords(failure), moment());
@@ -32,8 +35,37 @@ async function askOverview(signal) {
   draw();
 }
 
+async function heard(signal) {
+  const since = live.overview ? [["since", live.overview.revision]] : [];
+  const [news] = await Promise.all([ask(["overview"], since, signal), loadCatalogue(signal)]);
+  const overview = merged(live.overview, news);
+  return heardNow(overview, await detailsOf(overview, signal), moment());
+}
+
+/**
+ * What the open page shows beyond tiles: `sources` by unit, and `latest` results by `unit/bearing`.
+ *
+ * Cards of few units show their sources; a page about a unit or bearing shows all readings.
+ */
+async function detailsOf(overview, signal) {
+  const { page: wanted, segments } = pageOf(location.hash);
+  const details = { sources: new Map(), latest: new Map() };
+  if (wanted.pattern === "#/" && overview.units.length <= N_CARDS) {
+    for (const { id, source } of await ask(["units"], [], signal)) details.sources.set(id, source);
+  }
+  const [unitId, bearingId] = wanted.pattern?.startsWith("#/units/") ? segments : [];
+  const unit = overview.units.find(({ id }) => id === unitId);
+  if (!unit) return details;
+  const bearings = unit.bearings.map(({ bearing }) => bearing).filter((bearing) => bearingId === undefined || bearing === bearingId);
+  const path = ["units", unitId];
+  const [{ source }, ...latest] = await Promise.all([path, ...bearings.map((bearing) => [...path, "bearings", bearing, "latest"])].map((one) => ask(one, [], signal)));
+  details.sources.set(unitId, source);
+  for (const one of latest) details.latest.set(`${unitId}/${one.bearing}`, one);
+  return details;
+}
+
 function draw() {
-  const view = viewAt(live, moment());
+  const view = viewAt(live, moment(), serviceTimeMs());
   head.draw(view);
   page?.draw(view);
 }
@@ -54,8 +86,8 @@ function openPage() {
   draw();
 }
 
-/** The login or its permissions have changed. */
-function changePerson() {
+/** The address, the login or its permissions have changed. */
+function changePage() {
   openPage();
   overviews.again();
 }
@@ -66,10 +98,10 @@ document.querySelector(".skip").addEventListener("click", (click) => {
 });
 document.getElementById("reload").addEventListener("click", () => location.reload());
 onUpgrade(() => (document.getElementById("upgrade").hidden = false));
-window.addEventListener("hashchange", openPage);
+window.addEventListener("hashchange", changePage);
 onAmplitudes(openPage);
 draw();
 const overviews = poll(askOverview, () => OVERVIEW_PERIOD_S);
-onSession(changePerson);
+onSession(changePage);
 onRefused(() => askSession().catch(() => {})); // the overview reports an unreachable service
 setInterval(draw, REDRAW_PERIOD_MS);

@@ -56,17 +56,19 @@ function valueWords(name, value) {
 }
 
 /**
- * Whether each entry carries the hash of the one before it, as far as entries stand next to each
- * other: `{ look, words }`. The service's own check reads all of them and computes every hash.
+ * Whether each entry carries the hash of the one before it in its chain, as far as both are shown:
+ * `{ look, words }`. The service's own check reads all of them and computes every hash.
  */
 export function chainWords(entries) {
-  let nLinks = 0;
-  for (const [place, entry] of entries.slice(0, -1).entries()) {
-    const older = entries[place + 1];
-    if (entry.number !== older.number + 1) continue;
-    nLinks += 1;
-    if (entry.previous_hash !== older.hash) return { look: "bad", words: `Entry ${entry.number} does not carry the hash of entry ${older.number}: run padwatch audit verify.` };
+  const newer = new Map();
+  const linked = new Set();
+  for (const older of entries) {
+    const entry = newer.get(older.chain);
+    newer.set(older.chain, older);
+    if (entry?.number !== older.number + 1) continue;
+    linked.add(entry).add(older);
+    if (entry.previous_hash !== older.hash) return { look: "bad", words: `Entry ${entry.number} of the chain ${entry.chain} does not carry the hash of entry ${older.number}: run padwatch audit verify.` };
   }
-  if (nLinks === 0) return { look: "absent", words: "No two entries shown follow each other. All of them are checked by padwatch audit verify." };
-  return { look: "good", words: `${nLinks + 1} entries shown hold together by their hashes. All of them are checked by padwatch audit verify.` };
+  if (linked.size === 0) return { look: "absent", words: "No two entries shown follow each other. All of them are checked by padwatch audit verify." };
+  return { look: "good", words: `${linked.size} entries shown hold together by their hashes. All of them are checked by padwatch audit verify.` };
 }

@@ -8,8 +8,8 @@ const NOT_REACHABLE = { level: "bad", reason: "service_not_reachable" };
 /** What a bearing is without a current answer, beside its readings. */
 const NOTHING_KNOWN = { quality: NOT_REACHABLE, speed_source: null, estimators: { xx: null, yy: null } };
 
-/** State before the first answer. `receivedAt`: time of the last answer; `dated`: when its content first arrived. */
-export const SILENCE = { overview: null, receivedAt: null, dated: null, failure: null, failedSince: null };
+/** State before the first answer. `receivedAt`: time of the last answer; `details`: see `detailsOf` in `app.js`. */
+export const SILENCE = { overview: null, details: null, receivedAt: null, failure: null, failedSince: null };
 
 /** Two clocks, since a steady one may stand still while a laptop sleeps. */
 export function moment() {
@@ -21,10 +21,16 @@ export function secondsBetween(earlier, later) {
   return Math.max(later.steadyMs - earlier.steadyMs, later.wallMs - earlier.wallMs, 0) / 1000;
 }
 
-/** The state after a good answer; one that is the same as before keeps its date, so that ages go on. */
-export function heardNow(live, overview, now) {
-  const dated = overview === live.overview ? live.dated : now;
-  return { overview, receivedAt: now, dated, failure: null, failedSince: null };
+/** The overview after an answer that holds all units, or only those that changed since the one before. */
+export function merged(overview, news) {
+  if (overview === null || news.since === null) return news;
+  const changed = new Map(news.units.map((unit) => [unit.id, unit]));
+  return { ...news, units: overview.units.map((unit) => changed.get(unit.id) ?? unit) };
+}
+
+/** The state after good answers. */
+export function heardNow(overview, details, now) {
+  return { overview, details, receivedAt: now, failure: null, failedSince: null };
 }
 
 /** The state after a question that failed; the last answer stays, and ages. */
@@ -32,11 +38,13 @@ export function failedNow(live, sentence, now) {
   return { ...live, failure: sentence, failedSince: live.failedSince ?? now };
 }
 
-/** What to show at this moment: ages counted on, and no number that is no longer current. */
-export function viewAt(live, now) {
+/** Seconds from a time in an answer to the present time of the service; null without that time. */
+export const ageAt = (time, timeMs) => (time && timeMs !== null ? Math.max(timeMs - Date.parse(time), 0) / 1000 : null);
+
+/** What to show at this moment: ages at the time `timeMs` of the service, and no number that is no longer current. */
+export function viewAt(live, now, timeMs) {
   const silenceS = live.receivedAt ? secondsBetween(live.receivedAt, now) : null;
   const current = silenceS !== null && silenceS <= CURRENT_LIMIT_S;
-  const sinceS = live.dated ? secondsBetween(live.dated, now) : null;
   return {
     current,
     silenceS,
@@ -48,24 +56,27 @@ export function viewAt(live, now) {
     captureError: live.overview?.captures.error ?? null,
     alarms: current ? live.overview.alarms : null,
     refreshS: live.overview?.refresh_s ?? null,
-    serviceTimeMs: live.overview ? Date.parse(live.overview.time) + sinceS * 1000 : null,
-    units: (live.overview?.units ?? []).map((unit) => agedUnit(unit, sinceS, current)),
+    serviceTimeMs: live.overview ? timeMs : null,
+    units: (live.overview?.units ?? []).map((unit) => agedUnit(unit, live.details, timeMs, current)),
   };
 }
 
-function agedUnit(unit, sinceS, current) {
-  const source = { ...unit.source, data_age_s: aged(unit.source.data_age_s, sinceS) };
+/** A unit with what is known of it beyond its tile: `isWhole` of a bearing says whether it has all its readings. */
+function agedUnit(unit, details, timeMs, current) {
+  const told = { ...unit.source, ...details?.sources.get(unit.id) };
+  const source = { ...told, data_age_s: ageAt(told.received, timeMs) };
   return {
     ...unit,
     source: current ? source : { ...source, state: "unknown", reason: null, since: null },
-    bearings: unit.bearings.map((latest) => agedLatest(latest, sinceS, current)),
-    films: current ? unit.films : unit.films.map(withheldFilm),
+    bearings: unit.bearings.map((tile) => agedLatest(tile, details?.latest.get(`${unit.id}/${tile.bearing}`), timeMs, current)),
+    films: unit.bearings.map(({ film }) => (current ? film : withheldFilm(film))),
   };
 }
 
-function agedLatest(latest, sinceS, current) {
-  const shown = { ...latest, age_s: aged(latest.age_s, sinceS) };
-  return current ? shown : { ...shown, ...NOTHING_KNOWN, readings: withheld(latest.readings) };
+function agedLatest(tile, latest, timeMs, current) {
+  const told = { ...(latest ?? tile), isWhole: latest !== undefined };
+  const shown = { ...told, age_s: ageAt(told.received, timeMs) };
+  return current ? shown : { ...shown, ...NOTHING_KNOWN, bad_reasons: [], readings: withheld(told.readings) };
 }
 
 const UNREAD = { verdict: "no_reading", change_percent: null };
@@ -78,8 +89,4 @@ function withheld(readings) {
   return Object.fromEntries(
     Object.entries(readings).map(([name, reading]) => [name, { ...reading, value: null, uncertainty: null, ...NOT_REACHABLE }]),
   );
-}
-
-function aged(ageS, sinceS) {
-  return ageS === null ? null : ageS + sinceS;
 }

@@ -56,9 +56,10 @@ export function lookOf(level, reason) {
  * The quality of a bearing as a whole, or of its first reading that is bad for no ordinary reason:
  * a broken sensor must not hide behind a quiet absence.
  */
-export function qualityOf({ quality, readings }) {
+export function qualityOf({ quality, readings, bad_reasons: reasons }) {
   if (quality.level === "bad" && lookOf(quality.level, quality.reason) === "bad") return quality;
-  return Object.values(readings).find(({ level, reason }) => lookOf(level, reason) === "bad") ?? quality;
+  const found = reasons?.map((reason) => ({ level: "bad", reason })) ?? Object.values(readings);
+  return found.find(({ level, reason }) => lookOf(level, reason) === "bad") ?? quality;
 }
 
 /** A few words for a table cell. */

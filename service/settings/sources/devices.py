@@ -103,7 +103,8 @@ class MappedDeviceSettings(ModbusLinkSettings):
             if value.channel not in known:
                 place = (*at, "map", "value", n, "channel") if self.map else (*at, "map_file")
                 words = ", ".join(known) or "none"
-                raise MisfitError(f"unknown channel {value.channel!r}; known: {words}", *place)
+                words = f"unknown channel {value.channel!r}; known channels: {words}"
+                raise MisfitError(words, *place)
 
 
 class ModbusPolledSettings(MappedDeviceSettings):
@@ -283,7 +284,7 @@ class ModbusRingSettings(ModbusLinkSettings):
     function: Literal[3, 4] = 3
     """Modbus function code of the registers: 3 (holding) or 4 (input)."""
 
-    poll_period_s: Annotated[float, Field(ge=0.01, le=60.0)] = 0.25
+    poll_period_s: Annotated[float, Field(ge=0.01, le=60.0)] = 0.5
     """Maximum time between polls of the ring, s; the ring must hold the samples of several poll
     periods. The actual period is slightly shorter and asynchronous to the slots, in order to
     measure the sampling rate."""

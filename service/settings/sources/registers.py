@@ -121,7 +121,7 @@ class FlagSettings(CellSettings):
             words = "exactly one of set_means and ok_values must be given"
             raise MisfitError(words, "set_means")
         if self.clipped_values and not self.ok_values:
-            raise MisfitError("requires ok_values", "clipped_values")
+            raise MisfitError("requires ok_values, the contents of a good value", "clipped_values")
         highest = self.counted_bits // (self.counted_bits & -self.counted_bits)
         for name in ("ok_values", "clipped_values"):
             for number in getattr(self, name):

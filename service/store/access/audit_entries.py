@@ -70,7 +70,7 @@ class AuditAction:
 
 @dataclass(frozen=True)
 class AuditEntry:
-    """Entry of the audit trail, as stored.
+    """Stored entry of the audit trail; the other fields are those of `AuditAction`, truncated.
 
     Parameters
     ----------
@@ -162,12 +162,12 @@ def recomputed(entry: AuditEntry) -> str | None:
 
 @dataclass(frozen=True)
 class Acting:
-    """Origin of actions, which is recorded in their audit entries.
+    """Origin of actions (interface, address and actor), as recorded in their audit entries.
 
     Parameters
     ----------
     peer
-        Network address of the request, or user of the operating system.
+        Network address of the request, or user of the operating system; None if unknown.
     actor
         Name of the person or machine; empty before authentication.
     command
@@ -217,5 +217,5 @@ def acting_as(who: Acting) -> Iterator[None]:
 
 
 def name_actor(actor: str) -> None:
-    """Set the authenticated person or machine as the actor of the following actions."""
+    """Set the actor of the following actions of this task or thread."""
     _ACTING.set(replace(acting(), actor=actor))

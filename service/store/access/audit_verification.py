@@ -22,12 +22,17 @@ class AuditHead:
 
 
 class HeadError(ValueError):
-    """The head file is missing, unreadable or invalid; the message states the reason."""
+    """Error raised if the head file is missing, unreadable or invalid."""
 
 
 def head_path(database: Path) -> Path:
     """Return the path of the head file beside a database."""
     return database.with_name(database.stem + SUFFIX)
+
+
+def chain_name(head: Path) -> str:
+    """Return the name of a chain of the audit trail, which is the beginning of its head file."""
+    return head.name.removesuffix(SUFFIX)
 
 
 def read_head(path: Path) -> AuditHead:
@@ -42,13 +47,13 @@ def read_head(path: Path) -> AuditHead:
         with path.open("rb") as file:
             text = file.read(MAX_BYTES)
     except FileNotFoundError:
-        raise HeadError("does not exist") from None
+        raise HeadError("the head file does not exist") from None
     except OSError as error:
-        raise HeadError(f"cannot be read: {error.strerror}") from error
+        raise HeadError(f"the head file cannot be read: {error.strerror}") from error
     try:
         return _head(json.loads(text))
     except (ValueError, RecursionError):
-        raise HeadError("is not the head of an audit trail") from None
+        raise HeadError("the head file has no valid number and hash of an entry") from None
 
 
 def write_head(path: Path, head: AuditHead) -> None:
@@ -98,7 +103,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of verifying an audit trail.
+    """Result of verifying one chain of the audit trail.
 
     Parameters
     ----------
@@ -109,13 +114,13 @@ class Verdict:
     finding
         First defect; None if the trail has no defect.
     n_behind
-        Number of newest entries that are missing in the head file, as after a crash; the next
+        Number of entries by which the head file lags behind the trail, as after a crash; the next
         write to the trail updates the file.
     contradictions
-        Numbers of the entries which record that the head contradicted the chain.
+        Numbers of the entries which record that the head file contradicted the chain.
     is_shared
-        Whether other hosts, each with its own head file, also write to the trail. The head of this
-        host then lacks the newer entries of other hosts.
+        Whether other hosts, each with its own head file, also write to the trail. The head file of
+        this host may then lag behind the entries of other hosts.
     """
 
     n_entries: int
@@ -175,7 +180,7 @@ def _wrong(
 ) -> Finding | None:
     due = before + 1
     if type(entry.number) is not int or entry.number < due:
-        return Finding(due, f"expected entry {due}, found entry {entry.number!r}")
+        return Finding(due, f"expected entry {due}, found entry {entry.number}")
     if entry.number > due:
         last = entry.number - 1
         missing = f"entry {due} is" if last == due else f"entries {due} to {last} are"
@@ -191,21 +196,24 @@ def _wrong_head(
     number: int, at_head: str, head: AuditHead | str, is_shared: bool
 ) -> Finding | None:
     if isinstance(head, str):
-        return Finding(None, f"the head {head}; the end of the trail cannot be verified")
+        return Finding(None, f"{head}; the end of the trail cannot be verified")
     if head.number > number:
         count = f"entries {number + 1} to {head.number} are"
         if head.number == number + 1:
             count = f"entry {head.number} is"
-        return Finding(number + 1, f"{count} missing at the end: the head names {head.number}")
+        detail = f"{count} missing at the end: the head file names entry {head.number}"
+        return Finding(number + 1, detail)
     if number - head.number > MAX_BEHIND and not is_shared:
-        return Finding(None, f"the head names entry {head.number}, but the trail ends at {number}")
+        detail = f"the head file names entry {head.number}, but the trail ends at {number}"
+        return Finding(None, detail)
     if (at_head if head.number else FIRST) != head.hash:
-        return Finding(head.number or None, f"entry {head.number} does not match the head's hash")
+        detail = f"entry {head.number} does not match the hash in the head file"
+        return Finding(head.number or None, detail)
     return None
 
 
 def place_of(entry: AuditEntry, last: int) -> str:
-    """Return the error message on an entry with a wrong hash: altered, or out of order."""
+    """Return how an entry with a wrong hash was changed: altered, or moved (up to `last`)."""
     for number in range(1, last + 1):
         if recomputed(replace(entry, number=number)) == entry.hash:
             return f"entry {entry.number} is out of order; its content is that of entry {number}"

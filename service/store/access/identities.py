@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 
 class Permission(StrEnum):
-    """Permission that an operation of the service requires."""
+    """Permission for a group of operations of the service, granted by a role."""
 
     READ = "read"
     """Read results, alarms, evidence and health of the plant."""
@@ -101,7 +101,7 @@ class Identity:
         return self.means is not Means.LOCAL
 
     def may(self, permission: Permission, unit: str | None = None) -> bool:
-        """Return whether an operation on a unit is permitted; None stands for the whole plant.
+        """Return whether an operation on a unit, or on the whole plant (None), is permitted.
 
         An API key that is limited to units may read the data of the whole plant, but may not
         change these data.
@@ -122,7 +122,7 @@ NS_PER_S = 1_000_000_000
 
 @dataclass(frozen=True)
 class Session:
-    """Login session of an account, as stored.
+    """Login session of an account, as stored; times are in ns since 1970 UTC.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ class SessionLimits:
     slack_s: float = 300.0
 
     def is_live(self, session: Session, now_ns: int) -> bool:
-        """Return whether a session is valid.
+        """Return whether a session is valid at a time.
 
         A session with times in the future is invalid: a host clock that was years ahead must not
         leave permanent sessions.
@@ -194,7 +194,7 @@ class KeyState(StrEnum):
 
 @dataclass(frozen=True)
 class ApiKey:
-    """API key as stored, without the secret.
+    """API key as stored, without the secret; times are in ns since 1970 UTC.
 
     Parameters
     ----------
@@ -236,11 +236,11 @@ NAME = re.compile(r"[a-z0-9](?:[a-z0-9._@-]{0,62}[a-z0-9])?", re.ASCII)
 
 
 class NameRefusedError(ValueError):
-    """The name of an account or an API key is invalid; the message states the rules."""
+    """Error raised if the name of an account or an API key breaks the rules, which it states."""
 
 
 def account_name(written: str) -> str:
-    """Return the name of an account or an API key in lower case, as stored.
+    """Return the name of an account or an API key as stored: stripped and in lower case.
 
     Raises
     ------
@@ -250,8 +250,8 @@ def account_name(written: str) -> str:
     name = written.strip().lower()
     if NAME.fullmatch(name) is None:
         raise NameRefusedError(
-            f"a name must have 1 to {MAX_NAME} of a-z 0-9 . _ @ - and begin and end with a letter"
-            " or a digit"
+            f"a name must have 1 to {MAX_NAME} of the characters a-z 0-9 . _ @ - and begin and end"
+            " with a letter or a digit"
         )
     return name
 

@@ -5,17 +5,23 @@ returns.
 """
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from service.store.access.audit_entries import AuditAction, Document, acting
 from service.store.access.identities import ApiKey, Role, Session
-from service.store.audit import AuditChain, AuditedTables
-from service.store.database import Connection, Reading
+from service.store.audit import AuditChain, AuditedTables, AuditStore
+from service.store.database import Connection, Database
+from service.store.integrity import Integrity
+from service.store.port import StoreError
 
 
 class AccessRefusedError(Exception):
-    """A change of an account is not allowed; the message states the reason."""
+    """Error raised if a change of an account is not allowed; the message states the reason."""
+
+
+class UnknownAccountError(AccessRefusedError):
+    """The account does not exist."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +52,10 @@ class Account:
 def _account_action(
     done: str, name: str, now_ns: int, before: Role | None = None, after: Role | None = None
 ) -> AuditAction:
-    """Return the audit entry about a change of an account, with its role before and after."""
     return _action(f"account.{done}", name, now_ns, _role_document(before), _role_document(after))
 
 
 def _key_action(done: str, id_: str, now_ns: int, made: ApiKey | None = None) -> AuditAction:
-    """Return the audit entry about a change of an API key, with the properties of a new key."""
     after = None
     if made is not None:
         after = {
@@ -61,6 +65,11 @@ def _key_action(done: str, id_: str, now_ns: int, made: ApiKey | None = None) ->
             "expires_ns": made.expires_ns,
         }
     return _action(f"key.{done}", id_, now_ns, None, after)
+
+
+def _session_action(done: str, name: str, now_ns: int) -> AuditAction:
+    """Return the audit entry about a login or logout, by the account itself."""
+    return replace(_action(f"session.{done}", name, now_ns, None, None), actor=name)
 
 
 def _role_document(role: Role | None) -> Document:
@@ -157,7 +166,7 @@ class AccountStore(AuditedTables):
             self._audit.add(writer, [_account_action("password_set", name, now_ns)])
 
     def rehash(self, account: Account, password_hash: str) -> None:
-        """Write a new hash of an account's password, unless the password has been changed."""
+        """Write a new hash of an account's password; no effect if the password has changed."""
         with self._writing() as writer:
             writer.execute(
                 "UPDATE account SET password_hash = ? WHERE name = ? AND password_number = ?"
@@ -180,10 +189,10 @@ class AccountStore(AuditedTables):
 
 
 class SessionStore(AuditedTables):
-    """Store of login sessions; the caller writes the audit entry of a login."""
+    """Store of login sessions."""
 
     def add(self, session: Session, password_number: int, oldest_ns: int) -> bool:
-        """Add a session; return False if the password was changed since it was verified.
+        """Add a session; return False if the password is no longer version `password_number`.
 
         Sessions that began before `oldest_ns` are deleted, and the oldest sessions of the account
         beyond `MAX_SESSIONS`.
@@ -194,6 +203,8 @@ class SessionStore(AuditedTables):
             writer.execute("DELETE FROM session WHERE created_ns < ?", (oldest_ns,))
             is_begun = writer.execute(INSERT_SESSION, row).rowcount == 1
             writer.execute(END_OLDEST, (name, name, MAX_SESSIONS))
+            if is_begun:
+                self._audit.add(writer, [_session_action("begun", name, session.created_ns)])
         return is_begun
 
     def get(self, digest: bytes) -> tuple[Session, Account] | None:
@@ -210,10 +221,19 @@ class SessionStore(AuditedTables):
         with self._writing() as writer:
             writer.execute("UPDATE session SET seen_ns = ? WHERE digest = ?", (now_ns, digest))
 
-    def end(self, digest: bytes) -> None:
-        """End a session; ending it twice has no effect."""
+    def end(self, digest: bytes, logout_ns: int | None = None) -> None:
+        """End a session; ending it twice has no effect.
+
+        Parameters
+        ----------
+        logout_ns
+            Time of the logout, which is recorded; None for a session that expired or was replaced.
+        """
+        end = "DELETE FROM session WHERE digest = ? RETURNING account"
         with self._writing() as writer:
-            writer.execute("DELETE FROM session WHERE digest = ?", (digest,))
+            ended = writer.execute(end, (digest,)).fetchone()
+            if ended is not None and logout_ns is not None:
+                self._audit.add(writer, [_session_action("ended", ended[0], logout_ns)])
 
     def end_all(self) -> None:
         """End all sessions of all accounts."""
@@ -236,16 +256,14 @@ def insert_account(
 
 
 def _require_other_admin(writer: Connection, name: str, role: Role) -> None:
-    """Raise `AccessRefusedError` if the account is the only admin."""
     if role is Role.ADMIN and not writer.execute(IS_OTHER_ADMIN, (name,)).fetchone()[0]:
         raise AccessRefusedError(f"{name} is the only admin; make another account admin first")
 
 
 def _role(writer: Connection, name: str) -> Role:
-    """Return the role of an account; raise `AccessRefusedError` if it is unknown."""
     row = writer.execute("SELECT role FROM account WHERE name = ?", (name,)).fetchone()
     if row is None:
-        raise AccessRefusedError(f"account {name} does not exist")
+        raise UnknownAccountError(f"account {name} does not exist")
     return Role(row[0])
 
 
@@ -338,13 +356,58 @@ class SetUpStore(AuditedTables):
 
 
 class AccessStore:
-    """Stores of access data: accounts, sessions, API keys and the set-up token."""
+    """Stores of access data: accounts, sessions, API keys, the set-up token and their audit trail.
 
-    def __init__(self, chain: AuditChain, reading: Reading) -> None:
-        self.accounts = AccountStore(chain, reading)
-        self.sessions = SessionStore(chain, reading)
-        self.keys = KeyStore(chain, reading)
-        self.set_up = SetUpStore(chain, reading)
+    Parameters
+    ----------
+    database
+        Open database; closed with the store.
+    chain
+        Audit trail of the changes of access data, of logins and of refused requests.
+    integrity
+        Integrity checks of the database; none for PostgreSQL.
+    """
+
+    def __init__(
+        self, database: Database, chain: AuditChain, integrity: Integrity | None = None
+    ) -> None:
+        stores = (chain, database.reading)
+        self.accounts = AccountStore(*stores)
+        self.sessions = SessionStore(*stores)
+        self.keys = KeyStore(*stores)
+        self.set_up = SetUpStore(*stores)
+        self.audit = AuditStore(*stores)
+        self.database, self.integrity = database, integrity or Integrity(chain)
+        self._rolled_back: tuple[str, ...] = ()
+
+    def accept(self, now_ns: int) -> str | None:
+        """Accept an older copy of the database, with an audit entry; return how it differs.
+
+        Raises
+        ------
+        StoreError
+            If the database cannot be written.
+        """
+        self._rolled_back = tuple(found.detail for found in self.integrity.adopt(now_ns))
+        return "; ".join(self._rolled_back) or None
+
+    @property
+    def trouble(self) -> str | None:
+        """Description of all integrity faults since the start; None without faults."""
+        faults = [*self._rolled_back]
+        if self.integrity.mark_error:
+            faults.append(f"the high-water mark cannot be written: {self.integrity.mark_error}")
+        if self.integrity.n_damaged:
+            faults.append(f"damaged or missing rows: {self.integrity.n_damaged}")
+        try:
+            self.integrity.require_file()
+        except StoreError as error:
+            faults.append(str(error))
+        return "; ".join(faults) or None
+
+    def close(self) -> None:
+        """Close the database; closing it twice has no effect."""
+        self.database.close()
 
 
 def _key(row: tuple[Any, ...]) -> ApiKey:

@@ -54,7 +54,7 @@ class MarkFinding:
     Parameters
     ----------
     n_missing
-        Number of committed transactions that are missing in the database; None if unknown.
+        Number of committed transactions that are missing from the database; None if unknown.
     detail
         Description of the difference, for messages.
     """
@@ -135,8 +135,8 @@ def _behind(mark: Mark, database: Mark) -> str:
 
 def _lost(why: str, database: Mark) -> str:
     return (
-        f"the high-water mark {why}; it is unknown whether the database, whose last transaction is"
-        f" of {_when(database.time_ns)}, is the newest"
+        f"{why}; it is unknown whether the database, whose last transaction is of"
+        f" {_when(database.time_ns)}, is the newest"
     )
 
 
@@ -170,7 +170,7 @@ PUT = f"INSERT OR REPLACE INTO high_water (id, {COLUMNS}) VALUES (1, ?, ?, ?, ?,
 
 
 class CommitMarks:
-    """High-water mark of one database; used only by the owner of its writing connection.
+    """High-water mark of one database; used only by the owner of its write connection.
 
     Parameters
     ----------
@@ -211,15 +211,19 @@ class CommitMarks:
             if in_file is None:
                 self._file.replace(mark)
                 return
-        self.found = compared("does not exist" if in_file is None else in_file, mark, self._host)
+        lost = "the high-water mark does not exist"
+        self.found = compared(lost if in_file is None else in_file, mark, self._host)
 
     def count(self, writer: Connection) -> None:
-        """Increment the commit counter within the current transaction."""
+        """Increment the commit counter within the current transaction, unless `found` is set.
+
+        Raises `StoreError` if the database has lost its mark.
+        """
         if self.found:
             return  # keep the differences until they are accepted
         last = select_mark(writer)
         if last is None:
-            raise StoreError("the database has no high-water mark")
+            raise StoreError("the database has no high-water mark; restart padwatch")
         self._put(writer, last, last.n_commits + 1)
 
     def settle(self) -> None:
@@ -237,10 +241,13 @@ class CommitMarks:
             self.error = None
 
     def adopt(self, writer: Connection) -> None:
-        """Accept the database as the newest copy, within a transaction."""
+        """Accept the database as the newest copy, within a transaction.
+
+        Raises `StoreError` if the database has lost its mark.
+        """
         last, in_file = select_mark(writer), self.in_file()
         if last is None:
-            raise StoreError("the database has no high-water mark")
+            raise StoreError("the database has no high-water mark; restart padwatch")
         n_before = in_file.n_commits if isinstance(in_file, Mark) else 0
         # above both counts, so that no earlier mark matches again
         self._put(writer, last, max(last.n_commits, n_before) + 1)

@@ -34,7 +34,7 @@ class Mark:
     nonce
         Random identifier of the transaction; it differs between independently written copies.
     time_ns
-        Time of writing, UTC.
+        Time of writing, ns since 1970 UTC.
     """
 
     store: str
@@ -70,11 +70,11 @@ SLOTS = (0, 4096)
 
 
 class MarkError(ValueError):
-    """The file has no valid mark; the message states the reason."""
+    """Error raised if the mark file is missing, unreadable, damaged or of another database."""
 
 
 class NoMarkError(MarkError):
-    """The file of the high-water mark does not exist."""
+    """Error raised if the file of the high-water mark does not exist."""
 
 
 def mark_path(database: Path) -> Path:
@@ -100,9 +100,9 @@ class MarkFile:
             with _opened(self.path, os.O_RDONLY) as descriptor:
                 return _newest(_slots(descriptor))
         except FileNotFoundError:
-            raise NoMarkError("does not exist") from None
+            raise NoMarkError("the high-water mark does not exist") from None
         except OSError as error:
-            raise MarkError(f"cannot be read: {error.strerror}") from error
+            raise MarkError(f"the high-water mark cannot be read: {error.strerror}") from error
 
     def advance(self, mark: Mark) -> None:
         """Write a mark, durable on return; a mark older than the newest in the file is ignored.
@@ -120,12 +120,12 @@ class MarkFile:
                 slots = _slots(descriptor)
                 newest = _newest(slots)
                 if newest.store != mark.store:
-                    raise MarkError("belongs to another database")
+                    raise MarkError("the high-water mark belongs to another database")
                 if newest.n_commits < mark.n_commits:
                     os.pwrite(descriptor, encoded(mark), SLOTS[slots.index(newest) - 1])
                     os.fdatasync(descriptor)
         except FileNotFoundError:
-            raise NoMarkError("does not exist") from None
+            raise NoMarkError("the high-water mark does not exist") from None
 
     def replace(self, mark: Mark) -> None:
         """Replace the file by a new file with this mark.
@@ -145,7 +145,7 @@ def _slots(descriptor: int) -> list[Mark | None]:
 def _newest(slots: list[Mark | None]) -> Mark:
     marks = [mark for mark in slots if mark is not None]
     if not marks:
-        raise MarkError("is damaged")
+        raise MarkError("the high-water mark is damaged")
     return max(marks, key=lambda mark: mark.n_commits)
 
 

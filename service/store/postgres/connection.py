@@ -59,7 +59,8 @@ class PostgresAddress:
     def full(self, purpose: str) -> str:
         """Return the connection string with the password, and the `purpose` in application_name.
 
-        The string must never be displayed or logged.
+        The string must never be displayed or logged. Raises `StoreError` if the password file
+        cannot be read or is readable by others.
         """
         given = conninfo_to_dict(self.conninfo)
         name = f"padwatch {purpose} {os.getpid()}@{socket.gethostname()}"[:63]
@@ -74,7 +75,9 @@ class PostgresAddress:
                 mode = os.fstat(file.fileno()).st_mode
                 found = file.read(MAX_PASSWORD_BYTES)
         except OSError as error:
-            raise StoreError(f"[store] password_file {path}: {error.strerror}") from error
+            raise StoreError(
+                f"[store] password_file {path} cannot be read: {error.strerror}"
+            ) from error
         if mode & 0o077:
             raise StoreError(f"[store] password_file {path} is readable by others: chmod 600 it")
         return found.decode("utf-8", "surrogateescape").rstrip("\r\n")
@@ -136,7 +139,7 @@ class PostgresConnection:
     def execute(
         self, statement: str, parameters: Parameters = (), /
     ) -> psycopg.Cursor[tuple[Any, ...]]:
-        """Run a statement and fetch all rows."""
+        """Run a statement and return a cursor with all rows."""
         return self._session.execute(translated(statement), parameters or None, binary=True)
 
     def executemany(
@@ -302,7 +305,7 @@ def _advice(error: psycopg.Error) -> str | None:
 
 @contextmanager
 def renamed(where: str) -> Iterator[None]:
-    """Return a context manager that converts database and OS errors to `StoreError`."""
+    """Return a context manager that converts errors to `StoreError` or `RefusedRowError`."""
     try:
         yield
     except psycopg.Error as error:
@@ -322,7 +325,7 @@ def lock_number(name: str) -> int:
 
 MIGRATING = lock_number("/migrating")
 WRITING = lock_number("/writing")
-"""Advisory lock of writing transactions; it permits one writer at a time, as in SQLite."""
+"""Advisory lock of write transactions; it permits one writer at a time, as in SQLite."""
 
 
 _PIECE = re.compile(r"('(?:[^']|'')*')|\?|(?<!:):([A-Za-z_][A-Za-z_0-9]*)|%|\bwhole_(?=[a-z])")

@@ -43,7 +43,7 @@ class Readers:
 
     @contextmanager
     def reading(self) -> Iterator[PostgresConnection]:
-        """Open a read-only transaction in a pooled session; close the session after an error."""
+        """Open a read-only transaction in a pooled session, and yield its connection."""
         with renamed(self._address.name):
             session = self._begun()
             try:
@@ -106,7 +106,7 @@ PAUSE_S = 0.2
 
 
 class Writer:
-    """Writing session; one writing transaction is open at a time among all processes.
+    """Session for write transactions; only one of these is open at a time among all processes.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ class Writer:
 
     @contextmanager
     def writing(self) -> Iterator[PostgresConnection]:
-        """Open a writing transaction; it is durable when its block ends without an error."""
+        """Open a write transaction and yield its connection; the end of the block commits it."""
         with self._lock, renamed(self._where):
             number = self._begin()
             try:
@@ -171,7 +171,7 @@ class Writer:
             self._settle(number, error)
         else:
             if done.statusmessage != "COMMIT":
-                raise StoreError(f"{self._where}: an error rolled the transaction back")
+                raise StoreError(f"{self._where}: the transaction was rolled back after an error")
 
     def _settle(self, number: str, lost: psycopg.Error) -> None:
         """Determine the outcome of a commit without a reply; raise an error unless it succeeded."""
@@ -190,7 +190,6 @@ class Writer:
         )
 
     def _outcome(self, number: str) -> str | None:
-        """Return the outcome of a transaction; None while it is unknown."""
         try:
             if self._session.closed:
                 self._session = writing_session(self._address)
@@ -209,7 +208,7 @@ class Writer:
 
 
 def writing_session(address: PostgresAddress) -> Session:
-    """Return a new writing session on a suitable server.
+    """Return a new session for write transactions on a suitable server.
 
     Raises
     ------
@@ -342,7 +341,7 @@ class PostgresDatabase:
         self._writer.close()
 
     def writing(self) -> AbstractContextManager[PostgresConnection]:
-        """Open a writing transaction; only one is open at a time among all processes."""
+        """Open a write transaction, the only one among all processes; yield its connection."""
         return self._writer.writing()
 
     @contextmanager
@@ -350,7 +349,7 @@ class PostgresDatabase:
         self,
         unreadable: Unreadable = "strict",  # noqa: ARG002
     ) -> Iterator[PostgresConnection]:
-        """Open a read-only transaction; `unreadable` is unused, since all text is valid UTF-8."""
+        """Open a read-only transaction and yield its connection; all text is valid UTF-8."""
         with self._readers.reading() as reader:
             yield reader
 

@@ -9,7 +9,8 @@ from pathlib import Path
 from service.settings.storage import Origin
 from service.store.access.audit_entries import AuditAction, acting
 from service.store.access.audit_verification import AuditHead, write_head
-from service.store.audit import Trail, newest_of
+from service.store.access.tables import AccessStore
+from service.store.audit import AuditChain, Trail, newest_of
 from service.store.outbox import Address, no_recipients
 from service.store.port import StoreError
 from service.store.postgres.connection import PostgresAddress, PostgresConnection
@@ -52,17 +53,42 @@ class PostgresStore(Store):
         spectra: SpectraLimits | None = None,
     ) -> None:
         database = PostgresDatabase(address, origin)
-        try:
+        with _closed_after_error(database, head):
             has_begun = _begin_head(database, head)
             super().__init__(database, head, to, spectra)
             if has_begun:
                 self.audit.record([_begun(head)])
-        except OSError as error:
-            database.close()
-            raise StoreError(f"{head}: {error}") from error
-        except BaseException:
-            database.close()
-            raise
+
+
+def open_server_access(
+    address: PostgresAddress, head: Path, origin: Origin = Origin.LIVE
+) -> AccessStore:
+    """Open the accounts, sessions and keys in a database; the parameters are as in `PostgresStore`.
+
+    Raises
+    ------
+    StoreError
+        As in `PostgresStore`.
+    """
+    database = PostgresDatabase(address, origin)
+    with _closed_after_error(database, head):
+        has_begun = _begin_head(database, head)
+        store = AccessStore(database, AuditChain(head, database))
+        if has_begun:
+            store.audit.record([_begun(head)])
+        return store
+
+
+@contextmanager
+def _closed_after_error(database: PostgresDatabase, head: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        database.close()
+        raise StoreError(f"the head file {head} cannot be written: {error.strerror}") from error
+    except BaseException:
+        database.close()
+        raise
 
 
 def _begin_head(database: PostgresDatabase, head: Path) -> bool:
@@ -91,7 +117,7 @@ def _begun(head: Path) -> AuditAction:
 
 
 def server_trail(address: PostgresAddress, head: Path) -> Trail:
-    """Return the audit trail of a database with the head file of this host, without migration."""
+    """Return the audit trail of a database, read without migration; `head` is of this host."""
     return Trail(partial(_opened, address), head, is_shared=True)
 
 

@@ -168,7 +168,8 @@ class _Covering:
             raise too_large()
 
     def _cells(self, span: Span, width_ns: int) -> Cells | None:
-        return select_cells(self._reader, self._series, width_ns, span, self._names, self._asked)
+        arguments = (self._reader, self._series, width_ns, span, self._names, self._asked)
+        return select_cells(*arguments, has_conditions=self._asked != ANYTHING)
 
     def _gathered_until(self, end_ns: int, width_ns: int) -> int:
         return min(end_ns, self._mark_ns) // width_ns * width_ns
@@ -237,7 +238,7 @@ def _runs(time_ns: IntArray, width_ns: int) -> Iterator[Span]:
 
 
 def read_trend(reader: Connection, query: TrendQuery) -> Trend:
-    """Return the trends of one bearing, in buckets if more than ``max_points`` readings match.
+    """Return the trends of one bearing as a page, or as ``max_points`` or fewer points or buckets.
 
     Raises
     ------

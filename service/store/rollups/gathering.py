@@ -133,7 +133,7 @@ class RollupStore(Tables):
     """Store of roll-ups; readings that are not aggregated yet are read as single readings."""
 
     def due(self, now_ns: int) -> list[int]:
-        """Return the numbers of the bearings with readings to aggregate, longest delayed first."""
+        """Return the series ids of bearings with readings to aggregate, longest delayed first."""
         with self._reading() as reader:
             rows = reader.execute(DUE, {"now_ns": now_ns, "width_ns": MINUTE_NS})
             return [int(row[0]) for row in rows]

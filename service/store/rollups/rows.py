@@ -1,7 +1,9 @@
 """Roll-up rows by operating condition: aggregation, encoding, tables and queries."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +13,7 @@ from core.condition.cells import CellGrid
 from core.quality import Level
 from service.store.buckets import IntArray, Summaries
 from service.store.database import Connection
+from service.store.seals import select_whole, unchecked
 from service.store.series import Layout
 from service.store.trends import IN_STATES, Span, at_least, at_most, select_layouts
 
@@ -133,7 +136,7 @@ PART_COLUMNS = 24
 
 
 def parts_of(columns: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
-    """Split columns into parts of at most `PART_COLUMNS` adjacent columns."""
+    """Return columns, split into parts of at most `PART_COLUMNS` adjacent columns."""
     return tuple(
         columns[first : first + PART_COLUMNS] for first in range(0, len(columns), PART_COLUMNS)
     )
@@ -158,25 +161,6 @@ def encoded(summaries: Summaries) -> list[bytes]:
     return found
 
 
-def decoded(names: tuple[str, ...], time_ns: IntArray, rows: Sequence[bytes]) -> Summaries:
-    """Return the roll-up statistics in binary records, the inverse of `encoded`."""
-    shape, n_head = (len(rows), len(names)), len(names)
-    count, level = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.uint8)
-    mean, minimum, maximum = (np.full(shape, np.nan) for _ in range(3))
-    n_bits = -(-n_head // 8)
-    for pattern, where in _alike([row[n_head : n_head + n_bits] for row in rows]):
-        usable = np.unpackbits(np.frombuffer(pattern, dtype=np.uint8), count=n_head)
-        columns = np.flatnonzero(usable)
-        record = np.frombuffer(
-            b"".join(rows[row] for row in where.tolist()), dtype=_record(n_head, columns.size)
-        )
-        level[where] = record["level"]
-        chosen = np.ix_(where, columns)
-        count[chosen], mean[chosen] = record["count"], record["mean"]
-        minimum[chosen], maximum[chosen] = record["minimum"], record["maximum"]
-    return Summaries(names, time_ns, count, mean, minimum, maximum, level)
-
-
 def _record(n_columns: int, n_usable: int) -> np.dtype[np.void]:
     return np.dtype(
         [
@@ -191,7 +175,6 @@ def _record(n_columns: int, n_usable: int) -> np.dtype[np.void]:
 
 
 def _alike(patterns: list[bytes]) -> list[tuple[bytes, npt.NDArray[np.int64]]]:
-    """Return the row indices of each distinct bit pattern of usable columns."""
     rows: dict[bytes, list[int]] = {}
     for row, pattern in enumerate(patterns):
         rows.setdefault(pattern, []).append(row)
@@ -270,18 +253,16 @@ OVERLAPPING = f"""
     AND {at_least("cell.oil_high_c", "oil_low")}
     AND {at_most("cell.oil_low_c", "oil_high")}
 """
-SELECT_CELLS = f"""
-    SELECT start_ns, slot, operating_state, n_readings,
-    eccentricity_low, eccentricity_high, oil_low_c, oil_high_c
-    FROM whole_rollup_cell AS cell WHERE {OVERLAPPING} ORDER BY start_ns, slot
-"""  # noqa: S608
-SELECT_ALL_NUMBERS = """
-    SELECT start_ns, slot, numbers FROM whole_rollup_numbers
-    WHERE series = :series AND width_s = :width_s AND layout = :layout
-    AND start_ns >= :start_ns AND start_ns < :end_ns ORDER BY start_ns, slot
+IN_SPAN = """
+    series = :series AND width_s = :width_s AND start_ns >= :start_ns AND start_ns < :end_ns
+    ORDER BY start_ns, slot
 """
-SELECT_SOME_NUMBERS = f"""
-    SELECT cell.start_ns, cell.slot, numbers
+SELECT_CELLS = f"""
+    SELECT cell.* FROM whole_rollup_cell AS cell WHERE {OVERLAPPING} ORDER BY start_ns, slot
+"""  # noqa: S608
+SELECT_PLACES = "SELECT series, width_s, start_ns, slot, NULL, n_readings FROM"
+SELECT_NUMBERS = f"""
+    SELECT n.*
     FROM whole_rollup_cell AS cell CROSS JOIN whole_rollup_numbers AS n ON n.series = cell.series
     AND n.width_s = cell.width_s AND n.layout = :layout
     AND n.start_ns = cell.start_ns AND n.slot = cell.slot
@@ -289,6 +270,9 @@ SELECT_SOME_NUMBERS = f"""
 """  # noqa: S608
 
 MOST_SLOTS = 1 << 20
+
+ROWS_AT_ONCE = 2000
+"""Number of rows that are decoded together; more of them do not fit into the processor's cache."""
 
 
 def select_cells(
@@ -298,8 +282,10 @@ def select_cells(
     span: Span,
     names: tuple[str, ...],
     asked: Mapping[str, object] = ANYTHING,
+    *,
+    has_conditions: bool = True,
 ) -> Cells | None:
-    """Return the cells of a time span that may contain requested readings; None if none may.
+    """Return the cells of a time span that may contain requested readings; None without cells.
 
     Parameters
     ----------
@@ -307,34 +293,51 @@ def select_cells(
         Requested columns.
     asked
         Bounds of the operating conditions, by SQL parameter.
+    has_conditions
+        Whether the conditions of the cells are read; otherwise they are unknown, and the sealed
+        keys of the numbers take the place of the checksums of the cells.
     """
-    wanted = {**asked, "series": series, "width_s": width_ns // NS_PER_S}
-    wanted |= {"start_ns": span[0], "end_ns": span[1]}
-    rows = reader.execute(SELECT_CELLS, wanted).fetchall() if span[0] < span[1] else []
+    series_of = {"series": series, "width_s": width_ns // NS_PER_S}
+    is_all = asked == ANYTHING
+
+    def read(table: str, select: str, span: Span, **more: int) -> list[tuple[Any, ...]]:
+        wanted = {**series_of, "start_ns": span[0], "end_ns": span[1], **more}
+        if not is_all:
+            return reader.execute(select, {**asked, **wanted}).fetchall()
+        where = "WHERE " + "".join(f"{name} = :{name} AND " for name in more) + IN_SPAN
+        if select is SELECT_PLACES:
+            return reader.execute(f"{select} {unchecked(reader, table)} {where}", wanted).fetchall()
+        return select_whole(reader, table, where, wanted)
+
+    select = SELECT_CELLS if has_conditions else SELECT_PLACES
+    rows = read("rollup_cell", select, span) if span[0] < span[1] else []
     if not rows:
         return None
-    start_ns, slot = (np.array([row[i] for row in rows], dtype=np.int64) for i in (0, 1))
-    places = start_ns // width_ns * MOST_SLOTS + slot
-    statement = SELECT_ALL_NUMBERS if asked == ANYTHING else SELECT_SOME_NUMBERS
-    summaries = _nothing(names, start_ns)
+    _, _, start, slot, state, n_readings, *bounds = zip(*rows, strict=True)
+    start_ns = np.array(start)
+    places = start_ns // width_ns * MOST_SLOTS + np.array(slot)
+    summaries, n_found = _nothing(names, start_ns), np.zeros(len(rows), dtype=np.int64)
+    edges = [*dict.fromkeys(start[::ROWS_AT_ONCE]), span[1]]
+    n_unknown = 0
     for id_, layout in select_layouts(reader).items():
         if set(layout.quantities) & set(names):
-            found = reader.execute(statement, wanted | {"layout": id_}).fetchall()
-            _put(summaries, layout, places, width_ns, found)
-    return Cells(_conditions(rows), summaries)
-
-
-def _conditions(rows: Iterable[tuple[object, ...]]) -> Conditions:
-    columns = list(zip(*rows, strict=True))
-    extremes = (np.array(column, dtype=np.float64) for column in columns[4:])
-    states = [NO_STATE if state is None else state for state in columns[2]]
-    return Conditions(
-        np.array(states, dtype=np.int64), np.array(columns[3], dtype=np.int64), *extremes
-    )
+            for part in pairwise(edges):
+                found = read("rollup_numbers", SELECT_NUMBERS, part, layout=id_)
+                where = _put(summaries, layout, places, width_ns, found)
+                n_found[where] += 1
+                n_unknown += len(found) - where.size
+    if not has_conditions:
+        if n_unknown or not n_found.all():  # a cell may be damaged
+            return select_cells(reader, series, width_ns, span, names, asked)
+        unknown = np.full(len(rows), np.nan)
+        states = np.full(len(rows), NO_STATE)
+        return Cells(Conditions(states, np.array(n_readings), *[unknown] * 4), summaries)
+    states = np.array([NO_STATE if each is None else each for each in state], dtype=np.int64)
+    extremes = (np.array(column, dtype=np.float64) for column in bounds)
+    return Cells(Conditions(states, np.array(n_readings, dtype=np.int64), *extremes), summaries)
 
 
 def _nothing(names: tuple[str, ...], start_ns: IntArray) -> Summaries:
-    """Return empty statistics (count 0, level BAD), which are filled by `_put`."""
     value = np.full((start_ns.size, len(names)), np.nan)
     level = np.full(value.shape, Level.BAD, dtype=np.uint8)
     count = np.zeros(value.shape, dtype=np.int64)
@@ -346,19 +349,37 @@ def _put(
     layout: Layout,
     places: IntArray,
     width_ns: int,
-    rows: list[tuple[int, int, bytes]],
-) -> None:
-    """Decode the stored rows of one layout and copy their columns into the statistics."""
+    rows: list[tuple[Any, ...]],
+) -> IntArray:
+    """Decode rows of one layout into the statistics; return the indices of their cells."""
     if not rows:
-        return
-    start_ns, slot = (np.array([row[i] for row in rows], dtype=np.int64) for i in (0, 1))
-    wanted = start_ns // width_ns * MOST_SLOTS + slot
+        return np.zeros(0, dtype=np.int64)
+    *_, start_ns, slot, found = zip(*rows, strict=True)
+    wanted = np.array(start_ns) // width_ns * MOST_SLOTS + np.array(slot)
     where = np.searchsorted(places, wanted)
     has_cell = np.flatnonzero(np.take(places, where, mode="clip") == wanted)
-    where, start_ns = where[has_cell], start_ns[has_cell]
-    part = decoded(layout.quantities, start_ns, [rows[i][2] for i in has_cell])
-    theirs = [column for column, name in enumerate(layout.quantities) if name in into.names]
-    own = np.array([into.names.index(layout.quantities[column]) for column in theirs], np.int64)
-    for name in ("count", "mean", "minimum", "maximum", "level"):
-        target: npt.NDArray[np.generic] = getattr(into, name)
-        target[np.ix_(where, own)] = getattr(part, name)[:, theirs]
+    numbers = [found[i] for i in has_cell.tolist()]
+    own_of = {name: column for column, name in enumerate(into.names)}
+    theirs = np.array([n for n, name in enumerate(layout.quantities) if name in own_of], np.int64)
+    own = np.array([own_of[layout.quantities[column]] for column in theirs], np.int64)
+    n_head = len(layout.quantities)
+    n_bits = -(-n_head // 8)
+    for pattern, alike in _alike([row[n_head : n_head + n_bits] for row in numbers]):
+        usable = np.unpackbits(np.frombuffer(pattern, dtype=np.uint8), count=n_head).astype(bool)
+        stored, known = np.flatnonzero(usable), usable[theirs]
+        record = np.frombuffer(
+            b"".join(numbers[row] for row in alike.tolist()), dtype=_record(n_head, stored.size)
+        )
+        at: Any = where[has_cell[alike]]
+        if at[-1] - at[0] == at.size - 1:
+            at = slice(at[0], at[-1] + 1)
+        columns = np.searchsorted(stored, theirs[known])
+        # one column at a time is several times as fast as indexing by two arrays
+        for column, of in zip(own, theirs, strict=True):
+            into.level[at, column] = record["level"][:, of]
+        for name in ("count", "mean", "minimum", "maximum"):
+            values, read = getattr(into, name), record[name]
+            for column, of in zip(own[known], columns, strict=True):
+                values[at, column] = read[:, of]
+    matched: IntArray = where[has_cell]
+    return matched

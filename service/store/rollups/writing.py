@@ -123,7 +123,7 @@ class DeletedUntil:
 
     @property
     def readings_ns(self) -> int:
-        """Time up to which single readings were deleted; 0 if none were deleted."""
+        """Time, in ns, up to which single readings were deleted; 0 if none were deleted."""
         return self.of(SINGLE_S)
 
     def of(self, width_s: int) -> int:
@@ -135,7 +135,7 @@ class DeletedUntil:
         return tuple(width for width in WIDTHS_NS if self.of(width // NS_PER_S) <= time_ns)
 
     def finest_ns(self, start_ns: int) -> int | None:
-        """Return the finest roll-up width, ns, that exists at a time; None if readings exist."""
+        """Return the finest roll-up width, ns, at a time; None if single readings exist."""
         return self.kept_ns(start_ns)[0] if start_ns < self.readings_ns else None
 
     def stretches(self, span: tuple[int, int]) -> list[tuple[int, int]]:
@@ -152,5 +152,5 @@ def select_deleted(reader: Connection, series: int) -> DeletedUntil:
 
 
 def set_deleted(writer: Connection, series: int, width_s: int, until_ns: int) -> None:
-    """Write the time up to which data were deleted, in the transaction of the deletion."""
+    """Write the time up to which data of a width are deleted, in the deleting transaction."""
     writer.execute(SET_DELETED, (series, width_s, until_ns))

@@ -69,7 +69,7 @@ def findings(path: Path, progress: Callable[[float], None] = lambda _: None) -> 
                 for found in compared(in_file, mark, host_id()):
                     yield Finding("high_water", found.detail)
     except (sqlite3.Error, UnicodeDecodeError) as error:
-        yield Finding("structure", f"cannot be read further: {error}")
+        yield Finding("structure", f"the database cannot be read further: {error}")
     yield from _damage(log)
 
 

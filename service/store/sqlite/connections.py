@@ -50,7 +50,7 @@ class Readers:
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
-        """Open a read-only transaction on a pooled connection; an error closes the connection."""
+        """Open a read-only transaction on a pooled connection, and yield the connection."""
         reader = self._taken()
         try:
             reader.set_progress_handler(self._should_end(), LOOK_AFTER_STEPS)
@@ -117,7 +117,7 @@ ONLY_THEN = 2
 
 
 class Writer:
-    """Writing connection to a migrated file; used by one thread at a time, under `lock`.
+    """Write connection to a migrated file; used by one thread at a time, under `lock`.
 
     A failed sync is not repeated: the operating system may have lost the data, and a second sync
     may nevertheless succeed. Instead, the file is opened again before the next transaction and
@@ -152,7 +152,7 @@ class Writer:
 
     @contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
-        """Open a writing transaction; it is durable when its block ends without an error."""
+        """Open a write transaction and yield its connection; the end of the block commits it."""
         if self._is_in_doubt:
             self._reopen()
         try:
@@ -190,7 +190,7 @@ class Writer:
 
 
 def opened(path: Path) -> sqlite3.Connection:
-    """Return a new writing connection that can be used by any thread."""
+    """Return a new write connection that can be used by any thread."""
     return sqlite3.connect(
         path, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False
     )

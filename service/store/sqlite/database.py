@@ -2,7 +2,7 @@
 
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from pathlib import Path
 
 from acquisition.clock import SystemClock
@@ -31,26 +31,102 @@ EVER_HAD = "SELECT 1 FROM sqlite_sequence WHERE name = ?"
 HAS_TRAIL = "SELECT 1 FROM sqlite_master WHERE name = 'audit'"
 
 
-class SqliteDatabase:
-    """SQLite database of the store; used by several threads, one writing transaction at a time.
+class SqliteReading:
+    """SQLite database that another process writes; used by several threads, without writing.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which another process has created and migrated.
+
+    Attributes
+    ----------
+    damage
+        Log of the damaged and missing rows found since the start.
+    file
+        Identity of the opened file.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read.
+    """
+
+    kind = "sqlite"
+
+    def __init__(self, path: Path) -> None:
+        self._begin(path)
+        if not path.exists():
+            raise StoreError(f"{path}: there is no such database")
+        self.file.remember()
+        uri = f"{path.absolute().as_uri()}?mode=ro"
+        with self._store_errors(), closing(sqlite3.connect(uri, uri=True)) as reader:
+            self.seals.load(reader)
+
+    def _begin(self, path: Path) -> None:
+        self._path = path
+        self.damage = DamageLog()
+        self.seals = Seals(self.damage)
+        self.file = OpenedFile(path)
+        self._readers = Readers(path, prepare=self.seals.install_views, require=self.file.require)
+
+    def close(self) -> None:
+        """Close all connections; closing twice has no effect."""
+        self._readers.close()
+
+    def writing(self) -> AbstractContextManager[sqlite3.Connection]:
+        """Raise `StoreError`: only the process that opened the file for writing writes to it."""
+        raise StoreError(f"{self._path}: this process only reads the database")
+
+    @contextmanager
+    def reading(self, unreadable: Unreadable = "strict") -> Iterator[sqlite3.Connection]:
+        """Open a read-only transaction on one consistent state, and yield its connection."""
+        with self._store_errors(), self._readers.reading() as reader:
+            if unreadable == "strict":
+                yield reader
+                return
+            reader.text_factory = lambda text: text.decode("utf-8", unreadable)
+            yield reader
+            reader.text_factory = str
+
+    def ever_had(self, connection: Connection, table: str) -> bool:
+        """Return whether a table with numbered rows ever had a row, including deleted rows."""
+        return connection.execute(EVER_HAD, (table,)).fetchone() is not None
+
+    def hold(self, name: str) -> FileHold:
+        """Return an exclusive lock on a name, implemented by a lock file beside the database."""
+        return held(self._path, name)
+
+    @contextmanager
+    def _store_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, sqlite3.Error, OverflowError, UnicodeEncodeError) as error:
+            kind = RefusedRowError if is_of_the_row(error) else StoreError
+            raise kind(error_message(self._path, error)) from error
+        except UnicodeDecodeError as error:  # in an error message of SQLite
+            raise StoreError(
+                f"{self._path}: the file is damaged: names in it are not text"
+            ) from error
+
+
+class SqliteDatabase(SqliteReading):
+    """SQLite database of the store; used by several threads, one write transaction at a time.
 
     Parameters
     ----------
     path
         Path of the file; the file and its folder are created if missing.
     origin
-        Origin of the stored data; a file with data of another origin is rejected.
+        Origin of the stored data; a file with data of another origin is rejected. None for the
+        file of accounts, sessions and keys.
 
     Attributes
     ----------
     had_trail
         Whether the file had an audit trail before it was opened.
-    damage
-        Log of the damaged rows found since the start.
     marks
         High-water mark of the database.
-    file
-        Identity of the opened file.
 
     Raises
     ------
@@ -59,14 +135,8 @@ class SqliteDatabase:
         than this program.
     """
 
-    kind = "sqlite"
-
-    def __init__(self, path: Path, origin: Origin) -> None:
-        self._path = path
-        self.damage = DamageLog()
-        self.seals = Seals(self.damage)
-        self.file = OpenedFile(path)
-        self._readers = Readers(path, prepare=self.seals.install_views, require=self.file.require)
+    def __init__(self, path: Path, origin: Origin | None) -> None:
+        self._begin(path)
         self.marks = CommitMarks(MarkFile(mark_path(path)), SystemClock().now_ns)
         with self._store_errors():
             if (unusable := why_unusable(path)) is not None:
@@ -90,7 +160,7 @@ class SqliteDatabase:
 
     @contextmanager
     def writing(self) -> Iterator[sqlite3.Connection]:
-        """Open a writing transaction; after its block it is durable and the commit is counted."""
+        """Open a write transaction and yield its connection; count the commit after the block."""
         with self.writer.lock, self._store_errors():
             self.file.require()
             with self.writer.transaction() as writer:
@@ -98,31 +168,12 @@ class SqliteDatabase:
                 self.marks.count(writer)
             self.marks.settle()
 
-    @contextmanager
-    def reading(self, unreadable: Unreadable = "strict") -> Iterator[sqlite3.Connection]:
-        """Open a read-only transaction on one consistent state of the file."""
-        with self._store_errors(), self._readers.reading() as reader:
-            if unreadable == "strict":
-                yield reader
-                return
-            reader.text_factory = lambda text: text.decode("utf-8", unreadable)
-            yield reader
-            reader.text_factory = str
-
     def give_back(self) -> bool:
         """Release free pages of the file to the file system; return False if none were released."""
         with self.writer.lock, self._store_errors():
             return self.writer.give_back()
 
-    def ever_had(self, connection: Connection, table: str) -> bool:
-        """Return whether a table with numbered rows ever had a row, including deleted rows."""
-        return connection.execute(EVER_HAD, (table,)).fetchone() is not None
-
-    def hold(self, name: str) -> FileHold:
-        """Return an exclusive lock on a name, implemented by a lock file beside the database."""
-        return held(self._path, name)
-
-    def _prepare(self, connection: sqlite3.Connection, origin: Origin) -> bool:
+    def _prepare(self, connection: sqlite3.Connection, origin: Origin | None) -> bool:
         """Migrate the file and open its writer; return whether it had an audit trail before."""
         in_file = self.marks.in_file()
         for setting in (f"page_size = {PAGE_BYTES}", "auto_vacuum = INCREMENTAL"):
@@ -134,15 +185,3 @@ class SqliteDatabase:
             self.marks.open(connection, in_file)
             self.seals.begin(connection)
         return had_trail
-
-    @contextmanager
-    def _store_errors(self) -> Iterator[None]:
-        try:
-            yield
-        except (OSError, sqlite3.Error, OverflowError, UnicodeEncodeError) as error:
-            kind = RefusedRowError if is_of_the_row(error) else StoreError
-            raise kind(error_message(self._path, error)) from error
-        except UnicodeDecodeError as error:  # in an error message of SQLite
-            raise StoreError(
-                f"{self._path}: the file is damaged: names in it are not text"
-            ) from error

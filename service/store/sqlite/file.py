@@ -191,7 +191,7 @@ class FileHold:
         try:
             descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         except OSError as error:
-            raise StoreError(f"{self._path}: {error.strerror}") from error
+            raise StoreError(f"{self._path} cannot be locked: {error.strerror}") from error
         if (holder := take_lock(descriptor)) is not None:
             os.close(descriptor)
             raise StoreError(

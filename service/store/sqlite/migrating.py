@@ -9,9 +9,22 @@ from service.store.port import StoreError
 APPLICATION_IDS = {Origin.LIVE: 0x5057_4454, Origin.REPLAY: 0x5057_5250}
 """``PRAGMA application_id`` of padwatch databases by origin of the data."""
 
+ACCESS_ID = 0x5057_4143
+"""``PRAGMA application_id`` of the file of accounts, sessions and keys."""
 
-def migrate(connection: sqlite3.Connection, name: str, origin: Origin = Origin.LIVE) -> None:
+
+def application_id_of(origin: Origin | None) -> int:
+    """Return the ``PRAGMA application_id`` of a file; the access file has no origin."""
+    return ACCESS_ID if origin is None else APPLICATION_IDS[origin]
+
+
+def migrate(connection: sqlite3.Connection, name: str, origin: Origin | None = Origin.LIVE) -> None:
     """Migrate a database to the current schema, one transaction per migration.
+
+    Parameters
+    ----------
+    origin
+        Origin of the stored data; None for the access file.
 
     Raises
     ------
@@ -23,8 +36,9 @@ def migrate(connection: sqlite3.Connection, name: str, origin: Origin = Origin.L
     version = int(connection.execute("PRAGMA user_version").fetchone()[0])
     application = int(connection.execute("PRAGMA application_id").fetchone()[0])
     connection.execute("COMMIT")
-    _require_origin(application, name, origin)
-    if application not in (0, APPLICATION_IDS[origin]) or (application == 0 and n_tables > 0):
+    if origin is not None:
+        _require_origin(application, name, origin)
+    if application not in (0, application_id_of(origin)) or (application == 0 and n_tables > 0):
         raise StoreError(f"{name} is not a padwatch database; choose another data folder")
     if version > len(schema.MIGRATIONS):
         raise StoreError(
@@ -32,7 +46,8 @@ def migrate(connection: sqlite3.Connection, name: str, origin: Origin = Origin.L
             " run the padwatch that wrote it, or restore a backup"
         )
     for number in range(version, len(schema.MIGRATIONS)):
-        _step(connection, number, APPLICATION_IDS[origin])
+        if script := schema.migration_of(number, is_access=origin is None):
+            _step(connection, number, script, application_id_of(origin))
 
 
 def _require_origin(application: int, name: str, origin: Origin) -> None:
@@ -44,12 +59,12 @@ def _require_origin(application: int, name: str, origin: Origin) -> None:
             )
 
 
-def _step(connection: sqlite3.Connection, number: int, application_id: int) -> None:
+def _step(connection: sqlite3.Connection, number: int, script: str, application_id: int) -> None:
     """Apply one migration unless another process has applied it in the meantime."""
     try:
         connection.executescript(
             f"BEGIN IMMEDIATE; PRAGMA application_id = {application_id};"
-            f"{schema.MIGRATIONS[number]} PRAGMA user_version = {number + 1}; COMMIT;"
+            f"{script} PRAGMA user_version = {number + 1}; COMMIT;"
         )
     except sqlite3.Error:
         if connection.in_transaction:

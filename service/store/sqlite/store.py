@@ -1,7 +1,7 @@
 """Store in a SQLite database file."""
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
@@ -9,7 +9,8 @@ from threading import Lock
 
 from service.settings.storage import Origin
 from service.store.access.audit_verification import head_path
-from service.store.audit import Trail, begin_head
+from service.store.access.tables import AccessStore
+from service.store.audit import AuditChain, Trail, begin_head
 from service.store.integrity import Integrity
 from service.store.outbox import Address, no_recipients
 from service.store.port import StoreError
@@ -17,7 +18,7 @@ from service.store.retention import RetentionStore
 from service.store.spectra import SpectraLimits
 from service.store.sqlite.checking import Scrubber
 from service.store.sqlite.connections import BUSY_TIMEOUT_S
-from service.store.sqlite.database import SqliteDatabase
+from service.store.sqlite.database import SqliteDatabase, SqliteReading
 from service.store.store import Store
 
 
@@ -49,38 +50,79 @@ class SqliteStore(Store):
         address: Address = no_recipients,
         spectra: SpectraLimits | None = None,
     ) -> None:
-        self._path = path
-        database = SqliteDatabase(path, origin)
-        self._file = database
-        try:
-            if not database.had_trail:
-                begin_head(head_path(path))
+        database = self._file = SqliteDatabase(path, origin)
+        with _begun_head(database, path):
             super().__init__(database, head_path(path), address, spectra)
             self.retention = RetentionStore(self._writing, self._reader, database.give_back)
             scrubber = Scrubber(database, database.seals, database.damage)
-            self.integrity = Integrity(
-                self._chain,
-                database.marks,
-                database.damage,
-                scrubber.check_some,
-                database.file.require,
-            )
-        except OSError as error:
-            database.close()
-            raise StoreError(f"{path}: {error}") from error
-        except BaseException:
-            database.close()
-            raise
+            self.integrity = _integrity(database, self._chain, scrubber.check_some)
 
     @property
     def _writer(self) -> sqlite3.Connection:
-        """Current writing connection; replaced after a disk error."""
+        """Current write connection; replaced after a disk error."""
         return self._file.writer.connection
 
     @property
     def _lock(self) -> Lock:
-        """Lock of the writing connection."""
         return self._file.writer.lock
+
+
+class SqliteReader(Store):
+    """Store in a SQLite file that another process writes; its methods that write raise an error.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which the other process has opened before.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        database = SqliteReading(path)
+        super().__init__(database, head_path(path), is_read_only=True)
+        self.integrity = Integrity(
+            self._chain, damage=database.damage, require_file=database.file.require
+        )
+
+
+def open_access_file(path: Path) -> AccessStore:
+    """Open the file of accounts, sessions and keys; the file is created if missing.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be opened, is damaged, belongs to another program, or has a newer schema
+        than this program.
+    """
+    database = SqliteDatabase(path, None)
+    with _begun_head(database, path):
+        chain = AuditChain(head_path(path), database)
+        return AccessStore(database, chain, _integrity(database, chain))
+
+
+@contextmanager
+def _begun_head(database: SqliteDatabase, path: Path) -> Iterator[None]:
+    """Create the head file of a new database; close the database after an error in the block."""
+    try:
+        if not database.had_trail:
+            begin_head(head_path(path))
+        yield
+    except OSError as error:
+        database.close()
+        raise StoreError(f"{head_path(path)} cannot be written: {error.strerror}") from error
+    except BaseException:
+        database.close()
+        raise
+
+
+def _integrity(
+    database: SqliteDatabase, chain: AuditChain, check_some: Callable[[], bool] = lambda: True
+) -> Integrity:
+    return Integrity(chain, database.marks, database.damage, check_some, database.file.require)
 
 
 def file_trail(database: Path) -> Trail:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from rigs.blocks import cell_block
 from rigs.fake_bus import VIRTUAL, FakeBus
 
 from acquisition.can.assembly import FrameAssembler
@@ -11,7 +12,6 @@ from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
 from acquisition.can.source import CanSource
 from acquisition.clock import SystemClock
-from acquisition.delivery.blocks import RawBlock
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_settings
 from acquisition.simulated.feed import FeedEndedError
@@ -35,7 +35,7 @@ class EventfulFeed:
         self._n_left = n_blocks
         self._epoch, self._index, self._stretch = 5, 0, 333
 
-    def advance(self, n_samples: int) -> RawBlock:
+    def advance(self, n_samples: int) -> SampleBlock:
         if self._n_left == 0:
             raise FeedEndedError
         self._n_left -= 1
@@ -46,7 +46,7 @@ class EventfulFeed:
         self._stretch -= n_samples
         jitter_us = int(self._random.integers(-3, 4))
         start_us = START_NS // 1000 + round(first * 1e6 / 600.0) + jitter_us + 10**7 * self._epoch
-        return RawBlock(
+        return cell_block(
             epoch=self._epoch,
             first_index=first,
             start_ns=1000 * start_us,

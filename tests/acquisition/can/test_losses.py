@@ -15,7 +15,6 @@ from acquisition.can.assembly import FrameAssembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanLinkSettings
-from acquisition.delivery.blocks import sample_block
 from acquisition.simulated.devices.can_frames import FrameEncoder, shortened
 from acquisition.simulated.devices.can_server import can_message
 from acquisition.simulated.devices.can_shape import daq_settings
@@ -126,8 +125,9 @@ def test_thousands_of_losses_are_counted_exactly(
     for block in blocks:
         index = np.arange(block.first_index, block.stop_index)
         np.testing.assert_array_equal(block.counts[0], index % 2**15)
-        assert block.ok == (True,) * n_channels
-        assert block.slow[0] == 45.0
+        assert block.side.ok.shape[0] == n_channels
+        assert block.side.ok.all()
+        assert block.side.slow[0, 0] == 45.0
     found = accounted(blocks)
     assert found == bus.expected
     assert blocks[0].first_index + found.total() == feed.n_samples
@@ -151,16 +151,19 @@ async def test_a_lost_header_never_lets_old_slow_values_pass_for_new(
         feed.slow = (3.0, 3.0)
         blocks += assembler.take_wire(encoder.frames(feed.advance(BLOCK)), START_NS + 166_666_667)
         first, *middle, last = blocks
-        assert first.slow == (1.0, 1.0)
-        assert last.slow == (3.0, 3.0)
+        assert first.side.slow[:, 0].tolist() == [1.0, 1.0]
+        assert last.side.slow[:, 0].tolist() == [3.0, 3.0]
         for block in middle:
-            assert all(value == 2.0 or np.isnan(value) for value in block.slow), name
-            assert all(block.ok) or name == "HEALTH"
+            assert all(value == 2.0 or np.isnan(value) for value in block.side.slow[:, 0]), name
+            assert block.side.ok.all() or name == "HEALTH"
         if name in ("HEAD", "HEALTH"):
             assert middle == []
             assert last.rejected == (Rejection("no_header", BLOCK),)
         if name.startswith("SLOW"):
-            assert [np.isnan(v) for v in middle[0].slow] == [name == "SLOW_0", name == "SLOW_1"]
+            assert [np.isnan(v) for v in middle[0].side.slow[:, 0]] == [
+                name == "SLOW_0",
+                name == "SLOW_1",
+            ]
         if name.startswith("TIME"):
             assert middle[0].start_ns - first.start_ns == 83_333_333
 
@@ -215,7 +218,7 @@ def test_random_frames_of_a_mad_device_never_break_the_account(
             frames.append((frame.frame_id, random.bytes(len(frame.data)) if mad else frame.data))
         arrived_ns += int(random.integers(0, 200_000_000))
         for block in assembler.take(frames, arrived_ns):
-            ring.write(sample_block([block], calibration))
+            ring.write(replace(block, calibration=calibration))
         assert len(assembler._sets.pending) <= 65
     assert sum(map(len, assembler._builder.side._entries.values())) < 40_000
 

@@ -206,13 +206,14 @@ def test_status_without_counter_holds_from_its_arrival_for_a_while_and_no_longer
     assert [b.n_samples for b in blocks] == [6] * 500
     assert_true_samples(blocks)
     by_start = {b.first_index: b for b in blocks}
-    assert (by_start[0].ok, by_start[0].slow) == ((True,) * 12, (45.0,))
-    assert by_start[594].ok[0]
-    assert by_start[600].slow == (50.0,)
-    assert by_start[600].ok == (False, *[True] * 11)
-    assert by_start[1794].slow == (50.0,)
-    assert np.isnan(by_start[1800].slow[0])
-    assert not any(by_start[1800].ok)
+    assert by_start[0].side.ok.all()
+    assert by_start[0].side.slow.tolist() == [[45.0]]
+    assert by_start[594].side.ok[0]
+    assert by_start[600].side.slow.tolist() == [[50.0]]
+    assert by_start[600].side.ok[:, 0].tolist() == [False, *[True] * 11]
+    assert by_start[1794].side.slow.tolist() == [[50.0]]
+    assert np.isnan(by_start[1800].side.slow[0])
+    assert not by_start[1800].side.ok.any()
 
 
 def test_a_told_restart_begins_a_new_epoch_at_zero(assembler):
@@ -221,4 +222,4 @@ def test_a_told_restart_begins_a_new_epoch_at_zero(assembler):
     assert {b.epoch for b in blocks} == {1, 2}
     second = [b for b in blocks if b.epoch == 2]
     assert (second[0].first_index, second[-1].stop_index) == (0, 600)
-    assert second[0].slow == (45.0,)
+    assert second[0].side.slow.tolist() == [[45.0]]

@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from rigs.tiers import fast_and_long
 
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
@@ -97,40 +96,6 @@ def queues(counting_feed, counts_calibration, stepped_clock) -> Callable:
 BOTH_LAYOUTS = pytest.mark.parametrize("layout", [INTERLEAVED, PER_CHANNEL])
 
 
-@BOTH_LAYOUTS
-async def test_the_counter_wraps_without_a_gap(queues, layout):
-    async with queues(layout, first_counter=65_400) as p, p.source.connect() as stream:
-        p.run(40)
-        blocks = await up_to(stream, 65_400 + 40 * STEP)
-
-    assert blocks[0].first_index == 65_400
-    assert gaps(blocks) == []
-    assert_right(blocks, offset=-65_400)
-
-
-@BOTH_LAYOUTS
-@pytest.mark.parametrize("n_rounds", fast_and_long(10, 100))
-async def test_ten_losses_in_each_round_are_counted_exactly(queues, layout, n_rounds) -> None:
-    rng = np.random.default_rng(8)
-    async with queues(layout, step=5) as p, p.source.connect() as stream:
-        blocks: list[SampleBlock] = []
-        lost = 0
-        for _ in range(n_rounds):
-            for _ in range(10):
-                n_dropped = int(rng.integers(1, 4))
-                p.device.spoil("drop", n_dropped)
-                lost += 5 * n_dropped
-                p.run(n_dropped + 2)
-            newest = p.device._position * 5
-            blocks += await up_to(stream, newest - 55)
-        n_taken = sum(b.n_samples for b in blocks)
-
-    assert sum(n for _, n in gaps(blocks)) + n_taken == blocks[-1].stop_index
-    assert len(gaps(blocks)) >= 10 * n_rounds - 10
-    assert all(n % 5 == 0 for _, n in gaps(blocks))
-    assert_right(blocks)
-
-
 @pytest.mark.parametrize(("layout", "n_steps"), [(INTERLEAVED, 4000), (UNCOUNTED, 20)])
 async def test_what_waited_for_a_reader_is_exact_by_the_clock_or_thrown_away(
     queues, layout, n_steps
@@ -151,18 +116,6 @@ async def test_what_waited_for_a_reader_is_exact_by_the_clock_or_thrown_away(
         assert_right([after])
     else:
         assert after.samples[0, 0] >= (n_steps + 2) * STEP
-
-
-async def test_a_restart_is_a_new_epoch(queues) -> None:
-    async with queues(first_counter=20_000) as p, p.source.connect() as stream:
-        p.run(4)
-        before = await up_to(stream, 20_000 + 5 * STEP)
-        p.server.inject("reset_counter")
-        p.run(4)
-        after = await up_to(stream, 4 * STEP, before[0].epoch + 1)
-
-    assert {b.epoch for b in after} == {before[0].epoch + 1}
-    assert after[0].first_index == 0
 
 
 async def test_an_overflow_is_an_exact_gap(queues) -> None:

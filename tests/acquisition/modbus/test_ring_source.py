@@ -11,7 +11,6 @@ from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.register_image import encode_header, encode_slot
 from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from core.quality import Reason
-from core.samples.blocks import Rejection, StampFault
 
 U32 = 2**32
 
@@ -23,25 +22,6 @@ def samples_of(blocks) -> np.ndarray:
 def cells_of(blocks) -> list[int]:
     """First sample of each cell."""
     return [block.first_index + start for block in blocks for start in block.side.starts.tolist()]
-
-
-async def test_a_device_clock_that_was_set_costs_no_sample(counting_feed, source_at, read_until):
-    feed = counting_feed(n_channels=3)
-    device = RingDevice(feed)
-    device.produce(6)
-    async with ModbusTcpServer(device) as server, source_at(server.port).connect() as stream:
-        first = await anext(stream)
-        feed._start_ns += 3600 * 10**9
-        blocks = []
-        for stop_index in (400, 450, 500):
-            device.produce(1)
-            blocks += await read_until(stream, stop_index)
-    assert first.first_index == 300  # only the newest slot is read on the first connection
-    assert [block.stamp_fault for block in blocks] == [StampFault.JUMPED, None, None]
-    assert [block.first_index for block in blocks] == [350, 400, 450]
-    assert abs(blocks[0].start_ns - first.start_ns - 50e9 / 600) < 2000
-    assert {block.epoch for block in blocks} == {first.epoch}
-    assert blocks[1].start_ns - first.start_ns > 3600 * 10**9
 
 
 async def test_a_slot_that_is_being_written_is_read_again(device, server, source_at):
@@ -194,21 +174,6 @@ async def test_a_slot_of_an_epoch_that_has_ended_is_never_one_of_the_new_one(
         blocks = [await anext(stream), await anext(stream)]
     assert [block.first_index for block in blocks] == [0, 100]
     np.testing.assert_array_equal(blocks[1].samples[0], np.arange(200, 250))
-
-
-async def test_counters_reset_from_far_are_a_new_epoch_and_not_a_gap_of_years(
-    counting_feed, source_at, read_until
-):
-    settings = RingDeviceSettings(n_slots=8, first_sequence=3_000_000_000)
-    device = RingDevice(counting_feed(n_channels=3), settings=settings)
-    async with ModbusTcpServer(device) as server, source_at(server.port).connect() as stream:
-        before = await anext(stream)
-        device.first_sequence = 0
-        device.restart(next_epoch=False)
-        device.produce(2)
-        after = await read_until(stream, 150)
-    assert after[0].epoch != before.epoch
-    assert (after[0].first_index, after[0].rejected) == (50, (Rejection("inconsistent_index", 50),))
 
 
 async def test_one_header_of_an_epoch_that_has_ended_does_not_make_old_samples_new(

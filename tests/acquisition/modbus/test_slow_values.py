@@ -10,12 +10,11 @@ from rigs.blocks import given_block
 from rigs.registers import SlowFeed
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.joined import JoinedSource, only_slow, without_slow
 from acquisition.errors import LinkError
 from acquisition.modbus.cells import Cell, NumberType
 from acquisition.modbus.polled_source import PolledSettings
 from acquisition.modbus.register_map import MapValue, RegisterMap
-from acquisition.modbus.slow_values import PolledSlowValues
+from acquisition.modbus.slow_values import JoinedSource, PolledSlowValues, only_slow, without_slow
 from acquisition.modbus.transport import TcpTransport
 from acquisition.simulated.devices.map_device import MapDevice
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer

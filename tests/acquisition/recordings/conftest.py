@@ -3,12 +3,13 @@
 import io
 import math
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rigs.blocks import cell_block
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings import reader
 from acquisition.recordings.child import answer
@@ -16,36 +17,42 @@ from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel
 from acquisition.recordings.messages import Message, receive, send
 from acquisition.recordings.writer import RecordingWriter
 from core.machine.channel import Measurand
+from core.samples.blocks import SampleBlock
 
 MADE_BY = "padwatch in a test"
 START_NS = 1_767_225_600_000_000_000
 
 
+UNIT = RecordedUnit(
+    unit="U1",
+    rate_hz=600.0,
+    channels=tuple(
+        RecordedChannel(
+            id=f"c{n}",
+            measurand=Measurand.GAP_UM,
+            full_scale_v=12.0,
+            unit_per_v=-250.0,
+            ok_min_v=-11.0,
+            ok_max_v=11.0,
+        )
+        for n in range(2)
+    ),
+    slow_channels=tuple(
+        RecordedSlowChannel(id=f"slow{n}", unit="degC", minimum=-10.0, maximum=120.0)
+        for n in range(2)
+    ),
+)
+"""Probes of -8 V at 2 mm, and slow channels in degC from -10 to 120."""
+
+
 @pytest.fixture(scope="session")
 def unit() -> RecordedUnit:
-    """Probes of -8 V at 2 mm, and slow channels in degC from -10 to 120."""
-    return RecordedUnit(
-        unit="U1",
-        rate_hz=600.0,
-        channels=tuple(
-            RecordedChannel(
-                id=f"c{n}",
-                measurand=Measurand.GAP_UM,
-                full_scale_v=12.0,
-                unit_per_v=-250.0,
-                ok_min_v=-11.0,
-                ok_max_v=11.0,
-            )
-            for n in range(2)
-        ),
-        slow_channels=tuple(
-            RecordedSlowChannel(id=f"slow{n}", unit="degC", minimum=-10.0, maximum=120.0)
-            for n in range(2)
-        ),
-    )
+    return UNIT
 
 
-def numbered_block(first_index: int, n_samples: int, epoch: int = 1, **changes: object) -> RawBlock:
+def numbered_block(
+    first_index: int, n_samples: int, epoch: int = 1, **changes: object
+) -> SampleBlock:
     index = np.arange(first_index, first_index + n_samples)
     values: dict[str, object] = {
         "epoch": epoch,
@@ -55,12 +62,13 @@ def numbered_block(first_index: int, n_samples: int, epoch: int = 1, **changes: 
         "counts": (np.array([index, index + 1]) % 2**14).astype(np.int16),
         "ok": (True, True),
         "slow": (45.0, math.nan),
+        "calibration": UNIT.calibration,
     }
-    return RawBlock(**(values | changes))
+    return cell_block(**(values | changes))
 
 
 @pytest.fixture(scope="session")
-def numbered() -> Callable[..., RawBlock]:
+def numbered() -> Callable[..., SampleBlock]:
     """Builds blocks; keywords replace fields."""
     return numbered_block
 
@@ -69,11 +77,11 @@ def numbered() -> Callable[..., RawBlock]:
 def record(tmp_path: Path, unit: RecordedUnit) -> Callable[..., Path]:
     """Records blocks of a unit, of `unit` if none is given; gives the folder."""
 
-    def recorded(blocks: Iterable[RawBlock], of: RecordedUnit = unit) -> Path:
+    def recorded(blocks: Iterable[SampleBlock], of: RecordedUnit = unit) -> Path:
         folder = tmp_path / "recording"
         with RecordingWriter(folder, of, MADE_BY) as writer:
             for block in blocks:
-                writer.write(block)
+                writer.write(replace(block, calibration=of.calibration))
         return folder
 
     return recorded

@@ -9,14 +9,14 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.export import ExportFormat, csv_schema, export_recording, export_tables
 from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.reader import Recording, open_recording
+from core.samples.blocks import SampleBlock
 
 Record = Callable[..., Path]
-Numbered = Callable[..., RawBlock]
+Numbered = Callable[..., SampleBlock]
 
 INDEX = [*range(100), *range(137, 200), *range(40, 90)]
 EPOCHS = [1] * 163 + [2] * 50
@@ -91,7 +91,8 @@ def test_a_recording_of_many_blocks_and_no_slow_channels_is_exported_whole(
     tmp_path: Path, unit: RecordedUnit, record: Record, numbered: Numbered, kind: str
 ) -> None:
     plain = unit.model_copy(update={"slow_channels": ()})
-    blocks = (numbered(7 * n, 7, slow=()) for n in range(1200))
+    own = plain.calibration
+    blocks = (numbered(7 * n, 7, slow=(), calibration=own) for n in range(1200))
     recording = open_recording(record(blocks, plain))
     told: list[int] = []
     export_recording(recording, kind, tmp_path / "out", told.append)

@@ -15,17 +15,17 @@ import pyarrow.parquet as pq
 import pytest
 from rigs.tiers import fast_and_long
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import checksum_of
 from acquisition.recordings.reader import open_recording
+from core.samples.blocks import SampleBlock
 
-Record = Callable[[Iterable[RawBlock]], Path]
+Record = Callable[[Iterable[SampleBlock]], Path]
 N_BLOCKS, N_EACH = 20, 50
 
 
 @pytest.fixture
-def folder(record: Record, numbered: Callable[..., RawBlock]) -> Path:
+def folder(record: Record, numbered: Callable[..., SampleBlock]) -> Path:
     return record([numbered(N_EACH * n, N_EACH) for n in range(N_BLOCKS)])
 
 
@@ -50,7 +50,7 @@ def rewrite(folder: Path, name: str, table: Any, **options: Any) -> None:
 
 
 def read_to_the_end(folder: Path) -> int:
-    return sum(block.counts.shape[1] for block in open_recording(folder).raw_blocks())
+    return sum(block.counts.shape[1] for block in open_recording(folder).blocks())
 
 
 def refusal(folder: Path) -> str:
@@ -216,16 +216,16 @@ def change_block(folder: Path, number: int, **changes: Any) -> None:
     ("changes", "words"),
     [
         ({"n_samples": 51}, "blocks have 1001 samples, expected 1000"),
-        ({"n_samples": 0}, "block 3: number of samples of a block must be 1 to"),
+        ({"n_samples": 0}, "block 3: n_samples must be 1 to"),
         ({"n_samples": -50}, "to 131072, got -50"),
         ({"n_samples": 2**31 - 1}, "to 131072, got 2147483647"),
-        ({"first_index": -1}, "block 3: first index of a block must be"),
+        ({"first_index": -1}, "block 3: first_index must be"),
         ({"first_index": 2**62}, "9007199254740992, got 4611686018427387904"),
-        ({"epoch": -7}, "block 3: epoch of a block must be 0 to"),
-        ({"ok": 7}, "block 3: OK bits are set for channels that are not recorded"),
+        ({"epoch": -7}, "block 3: epoch must be 0 to"),
+        ({"ok": 7}, "block 3: ok must be 0 to 3, got 7"),
         (
             {"rejected": [{"reason": "torn", "n_samples": 10}]},
-            "block 3: a block has 10 rejected, but 0 missing",
+            "block 3: 10 rejected, but 0 missing",
         ),
         (
             {"rejected": [{"reason": "x", "n_samples": 0}]},
@@ -237,7 +237,7 @@ def change_block(folder: Path, number: int, **changes: Any) -> None:
         ),
         (
             {"rejected": [{"reason": "x", "n_samples": 1}] * 100},
-            "block 3: a block has 100 rejections, more than 32",
+            "block 3: 100 rejections, more than 32",
         ),
     ],
     ids=lambda value: str(value)[:40],

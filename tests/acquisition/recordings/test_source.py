@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from acquisition.delivery.blocks import BlockAssembler, RawBlock, sample_block
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.reader import open_recording
@@ -20,11 +20,11 @@ from acquisition.simulated.devices.recorded import RecordedFeed
 from acquisition.simulated.feed import FeedEndedError
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Unit
-from core.samples.blocks import Rejection
+from core.samples.blocks import Rejection, SampleBlock, joined
 from core.samples.calibration import UnitCalibration
 
-Record = Callable[[Iterable[RawBlock]], Path]
-Numbered = Callable[..., RawBlock]
+Record = Callable[[Iterable[SampleBlock]], Path]
+Numbered = Callable[..., SampleBlock]
 FOREIGN = [
     kind
     for _, kind in inspect.getmembers(pa.lib, inspect.isclass)
@@ -38,7 +38,7 @@ def machine(*channels: str, measurand: Measurand = Measurand.GAP_UM, **changes: 
 
 
 async def test_blocks_are_those_that_were_calibrated_live_also_when_left_and_taken_up_again(
-    record: Record, numbered: Numbered, unit: RecordedUnit, stepped_clock
+    record: Record, numbered: Numbered, stepped_clock
 ) -> None:
     raws = [numbered(50 * n, 50) for n in range(14)]
     source = RecordingSource(open_recording(record(raws)), stepped_clock)
@@ -51,7 +51,7 @@ async def test_blocks_are_those_that_were_calibrated_live_also_when_left_and_tak
     assert stepped_clock.monotonic_s() == 1e6
     assert [block.n_samples for block in found] == [150, 150, 150, 150, 100]
     for n, block in enumerate(found):
-        live = sample_block(raws[3 * n : 3 * n + 3], unit.calibration)
+        live = joined(raws[3 * n : 3 * n + 3])
         assert block.samples.tobytes() == live.samples.tobytes()
         assert block == live
     async with source.connect() as blocks:
@@ -88,9 +88,8 @@ async def test_a_unit_finds_its_channels_by_name_wherever_they_are(
     async with RecordingSource(recording, stepped_clock, selection).connect() as blocks:
         block = await anext(blocks)
     assert block.unit == "U7"
-    whole = sample_block([raw], recording.manifest.calibration)
-    np.testing.assert_array_equal(block.samples, whole.samples[[1, 0]])
-    assert block.channel_quality == whole.channel_quality[::-1]
+    np.testing.assert_array_equal(block.samples, raw.samples[[1, 0]])
+    assert block.channel_quality == raw.channel_quality[::-1]
     assert {id_: reading.value for id_, reading in block.slow.items()} == {"slow1": 50.0}
 
 
@@ -153,7 +152,7 @@ async def test_no_exception_of_pyarrow_or_the_disk_leaves_under_its_own_name(
             await anext(blocks)
 
 
-def all_pieces(feed: RecordedFeed, lengths: Iterable[int]) -> list[RawBlock]:
+def all_pieces(feed: RecordedFeed, lengths: Iterable[int]) -> list[SampleBlock]:
     pieces = []
     for length in lengths:
         try:
@@ -199,9 +198,9 @@ def test_what_a_daq_makes_of_it_is_the_recording_to_the_last_bit(
     assert again == through_delivery(blocks, recording.manifest.calibration)
 
 
-def through_delivery(raws: list[RawBlock], calibration: UnitCalibration) -> list[str]:
+def through_delivery(raws: list[SampleBlock], calibration: UnitCalibration) -> list[str]:
     delivery = BlockAssembler(calibration)
-    blocks = [block for raw in raws for block in delivery.take(raw)] + delivery.flush()
+    blocks = [block for raw in raws for block in delivery.take([raw])] + delivery.flush()
     return [f"{block!r} {block.samples.tobytes().hex()}" for block in blocks]
 
 
@@ -222,4 +221,4 @@ def test_only_the_channels_of_the_unit_are_given(record: Record, numbered: Numbe
     unit = Unit("U1", 92.3, 600.0, (Channel("c1", Measurand.GAP_UM),), ())
     piece = RecordedFeed(recording, select(recording.manifest, unit, {})).advance(50)
     np.testing.assert_array_equal(piece.counts, [np.arange(1, 51)])
-    assert (piece.ok, piece.slow) == ((False,), ())
+    assert (piece.side.ok.tolist(), piece.side.slow.size) == ([[False]], 0)

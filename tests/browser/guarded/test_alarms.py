@@ -125,9 +125,9 @@ async def test_a_page_from_before_an_upgrade_says_so_and_loads_the_new_one(plant
         answer = await route.fetch(headers=asked)
         await route.fulfill(response=answer, headers={**answer.headers, "padwatch-edition": "9"})
 
-    await page.route("**/api/v1/overview", of_a_later_service)
+    await page.route("**/api/v1/overview*", of_a_later_service)
     await expect(page.get_by_text("has been upgraded")).to_be_visible()
-    await page.unroute("**/api/v1/overview")
+    await page.unroute("**/api/v1/overview*")
     await page.get_by_role("button", name="Reload the page").click()
     await expect(page.locator("#service")).to_contain_text("Service answered")
     await expect(page.locator("#upgrade")).to_be_hidden()

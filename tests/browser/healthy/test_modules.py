@@ -1,7 +1,7 @@
-"""Single modules of the dashboard, run in the browser without a page of the plant."""
+"""Modules of the dashboard: run without a page, and loaded all at once, again or offline."""
 
 from on_screen import FILES
-from playwright.async_api import Page
+from playwright.async_api import Browser, Page, Request, Route, expect
 
 EMPTY = FILES[1:] + "padwatch.svg"
 """A page of the plant that runs nothing by itself."""
@@ -57,12 +57,13 @@ async def test_before_and_after_are_told_in_words_and_a_broken_chain_is_seen(pla
     changes = await page.evaluate(CALL, ["audit_words", "changeLines", shelved])
     assert changes == ["state: unacknowledged → shelved"]
     chain = [
-        {"number": 3, "hash": "c", "previous_hash": "b"},
-        {"number": 2, "hash": "b", "previous_hash": "a"},
-        {"number": 1, "hash": "a", "previous_hash": "0"},
+        {"chain": "access", "number": 3, "hash": "c", "previous_hash": "b"},
+        {"chain": "padwatch", "number": 2, "hash": "z", "previous_hash": "y"},
+        {"chain": "access", "number": 2, "hash": "b", "previous_hash": "a"},
+        {"chain": "access", "number": 1, "hash": "a", "previous_hash": "0"},
     ]
-    broken = [chain[0], chain[1] | {"hash": "x"}, chain[2]]
-    for entries, look in ((chain, "good"), ([chain[0], chain[2]], "absent"), (broken, "bad")):
+    broken = [*chain[:2], chain[2] | {"hash": "x"}, chain[3]]
+    for entries, look in ((chain, "good"), ([chain[0], chain[3]], "absent"), (broken, "bad")):
         found = await page.evaluate(CALL, ["audit_words", "chainWords", entries])
         assert found["look"] == look
 
@@ -92,3 +93,66 @@ async def test_the_worst_about_a_source_is_told_with_what_to_do(plant, page) -> 
 async def test_an_orbit_may_be_drawn_before_its_place_on_the_page_has_a_size(plant, page) -> None:
     await page.goto(plant.url)
     await page.evaluate(DRAWN_WITHOUT_A_SIZE, FILES)
+
+
+async def test_the_page_names_all_modules_that_it_loads(plant, page: Page) -> None:
+    asked: list[str] = []
+
+    def note(request: Request) -> None:
+        if request.url.endswith(".js"):
+            asked.append(request.url)
+
+    page.on("request", note)
+    await page.goto(plant.url)
+    await expect(page.locator("#service")).to_contain_text("Service answered")
+    named = await page.locator("link[rel=modulepreload]").evaluate_all(
+        "all => all.map(a => a.href)"
+    )
+    modules = {url for url in asked if FILES in url}
+    assert len(modules) > 100
+    assert modules == set(named)
+
+
+async def test_a_page_whose_modules_did_not_load_loads_itself_again(plant, page: Page) -> None:
+    failed: list[Route] = []
+
+    async def fail(route: Route) -> None:
+        failed.append(route)
+        await route.fulfill(status=404)
+
+    await page.route("**/session.js", fail, times=1)
+    await page.goto(plant.url)
+
+    await expect(page.locator("#service")).to_contain_text("Service answered")
+    assert len(failed) == 1
+
+
+async def test_the_reference_of_the_api_needs_no_other_site(
+    plant, page: Page, complaints: list[str]
+) -> None:
+    elsewhere: list[str] = []
+
+    def note(request: Request) -> None:
+        if not request.url.startswith((plant.url, "data:")):
+            elsewhere.append(request.url)
+
+    page.on("request", note)
+    await page.goto(plant.url + "docs")
+    await expect(page.locator(".info .title")).to_contain_text("padwatch")
+    await page.get_by_role("button", name="GET /api/v1/overview").first.click()
+    await page.get_by_role("button", name="Try it out").click()
+    await page.get_by_role("button", name="Execute").click()
+    await expect(page.locator(".responses-table.live-responses-table")).to_contain_text("200")
+    assert elsewhere == []
+    assert complaints == []
+
+
+async def test_browsers_that_open_the_page_at_once_all_show_it(plant, browser: Browser) -> None:
+    contexts = [await browser.new_context() for _ in range(4)]
+    pages = [await context.new_page() for context in contexts]
+    for page in pages:
+        await page.goto(plant.url, wait_until="commit")
+    for page in pages:
+        await expect(page.locator("#service")).to_contain_text("Service answered")
+    for context in contexts:
+        await context.close()

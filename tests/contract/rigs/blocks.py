@@ -1,16 +1,17 @@
 """Blocks of samples in engineering units, whose qualities and readings are given as they are."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from core.arrays import SampleArray
+from core.arrays import RawArray, SampleArray
 from core.checks.channels import VERDICT_OF, VerdictArray
 from core.quality import Quality, Reading, Reason, bad
-from core.samples.blocks import SampleBlock, SideValues
-from core.samples.calibration import UNLIMITED, UnitCalibration
+from core.samples.blocks import Rejection, SampleBlock, SideValues
+from core.samples.calibration import UNLIMITED, SlowCalibration, UnitCalibration
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +50,25 @@ def given_block(
         given=tuple(channel_quality),
     )
     return replace(block, **changes)
+
+
+def cell_block(
+    epoch: int,
+    first_index: int,
+    start_ns: int,
+    rate_hz: float,
+    counts: RawArray,
+    ok: Sequence[bool],
+    slow: Sequence[float],
+    rejected: tuple[Rejection, ...] = (),
+    calibration: UnitCalibration | None = None,
+) -> SampleBlock:
+    """A block of one cell, whose calibration has no limits if none is given."""
+    if calibration is None:
+        ids = (SlowCalibration(f"slow{n}", -math.inf, math.inf) for n in range(len(slow)))
+        calibration = UnitCalibration("U1", rate_hz, (UNLIMITED,) * len(counts), tuple(ids))
+    side = SideValues.of(start_ns, ok, slow)
+    return SampleBlock(calibration, epoch, first_index, counts, side, rejected)
 
 
 def with_quality(block: SampleBlock, quality: Sequence[Quality]) -> SampleBlock:

@@ -158,7 +158,7 @@ async def running(
 
 def samples(recording: Recording) -> list[int]:
     """The numbers of the samples in a recording."""
-    blocks = recording.raw_blocks()
+    blocks = recording.blocks()
     return [int(value) for raw in blocks for value in raw.counts[0]]
 
 

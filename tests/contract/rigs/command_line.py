@@ -14,8 +14,8 @@ ROOT = Path(__file__).parents[3]
 
 OPEN = """
 from functools import partial
-from service.cli import run
-run.run_plant = partial(run.run_plant, is_demo=True)
+from service.cli import processes
+processes.run_plant = partial(processes.run_plant, is_demo=True)
 from service.cli.main import main
 main()
 """

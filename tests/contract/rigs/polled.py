@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.modbus.cells import Cell, NumberType
 from acquisition.modbus.polled_source import PolledSource
 from acquisition.modbus.register_map import FlagCheck, MapValue, Meaning, RegisterMap
 from acquisition.simulated.devices.map_device import MapDevice
 from core.samples.blocks import SampleBlock
 from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
+from rigs.blocks import cell_block
 
 STATUS = Cell(address=50)
 BAD_IF_SET = FlagCheck(cell=STATUS, mask=0x0008, set_means=Meaning.BAD)
@@ -24,11 +24,11 @@ class Waves:
     def __init__(self) -> None:
         self.n, self.value, self.oil = 0, 100.0, 45.0
 
-    def advance(self, n_samples: int) -> RawBlock:
+    def advance(self, n_samples: int) -> SampleBlock:
         first, self.n = self.n, self.n + n_samples
         counts = np.full((1, n_samples), self.value + first, dtype=np.float32)
         start_ns = (1_800_000_000 + first) * 10**9
-        return RawBlock(0, first, start_ns, 1.0, counts, (True,), (self.oil,))
+        return cell_block(0, first, start_ns, 1.0, counts, (True,), (self.oil,))
 
 
 def map_of(**settings) -> RegisterMap:

@@ -6,20 +6,19 @@ from dataclasses import replace
 import numpy as np
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.blocks import RawBlock
-from acquisition.delivery.joined import JoinedSource, only_slow, without_slow
 from acquisition.modbus.cells import ByteOrder, Cell, NumberType
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
 from acquisition.modbus.polled_source import PolledSettings, PolledSource, vector_calibration
 from acquisition.modbus.register_map import FlagCheck, MapValue, Meaning, RegisterMap, Together
-from acquisition.modbus.slow_values import PolledSlowValues
+from acquisition.modbus.slow_values import JoinedSource, PolledSlowValues, only_slow, without_slow
 from acquisition.modbus.transport import TcpTransport
 from acquisition.simulated.devices.fifo_device import FifoDevice
 from acquisition.simulated.devices.map_device import MapDevice
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.source import SampleSource
 from core.spectra.polls import VectorPart, VectorRow
+from rigs.blocks import cell_block
 from rigs.modbus import OnRtu, OnTcp, Rig
 
 SLOW = ("slow0", "slow1")
@@ -168,7 +167,7 @@ class SlowFeed:
     def advance(self, n_samples: int):
         first, self._n = self._n, self._n + n_samples
         counts = np.zeros((0, n_samples), dtype=np.int16)
-        return RawBlock(0, first, 0, 600.0, counts, (), self.slow)
+        return cell_block(0, first, 0, 600.0, counts, (), self.slow)
 
 
 class FifoTcpRig(OnTcp, _FifoRig):

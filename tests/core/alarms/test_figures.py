@@ -31,7 +31,7 @@ def figures(events: Sequence[AlarmEvent], span_s: float = DAY_S):  # type: ignor
     return figures_of(events, 0, round(span_s * NS_PER_S), RULE)
 
 
-def test_what_calls_for_somebody_is_counted_and_nothing_else() -> None:
+def test_what_calls_for_somebody_is_counted_and_nothing_else():
     shelved = AlarmState.SHELVED
     events = [
         event(1.0),
@@ -50,7 +50,7 @@ def test_what_calls_for_somebody_is_counted_and_nothing_else() -> None:
     assert found.n_by_level == {ALERT: 2, DANGER: 1}
 
 
-def test_the_worst_ten_minutes_and_the_most_frequent_alarms_are_found() -> None:
+def test_the_worst_ten_minutes_and_the_most_frequent_alarms_are_found():
     found = figures([event(t) for t in (595.0, 600.0, 1000.0, 1194.9, 1195.0, 5000.0)])
 
     assert found.most_in_10_min == 4
@@ -70,7 +70,7 @@ def test_the_worst_ten_minutes_and_the_most_frequent_alarms_are_found() -> None:
     ("times_s", "n_chattering"),
     [((0, 30, 60), 3), ((0, 30, 61), 0), ((0, 50, 100, 110, 120), 4), ((0, 1), 0)],
 )
-def test_three_in_a_minute_chatter(times_s: Sequence[float], n_chattering: int) -> None:
+def test_three_in_a_minute_chatter(times_s, n_chattering):
     found = figures([event(t) for t in times_s])
     watch = ChatterWatch(RULE)
     for each in (event(t) for t in times_s):
@@ -80,7 +80,7 @@ def test_three_in_a_minute_chatter(times_s: Sequence[float], n_chattering: int) 
     assert watch.is_chattering("U1:UJB:order1_shaft_x", 130 * NS_PER_S) == (n_chattering > 0)
 
 
-def test_an_alarm_that_returns_soon_is_fleeting_and_does_not_chatter_for_long() -> None:
+def test_an_alarm_that_returns_soon_is_fleeting_and_does_not_chatter_for_long():
     watch = ChatterWatch(RULE)
     for at_s in (0, 1, 2):
         watch.note(event(at_s), at_s * NS_PER_S)
@@ -94,7 +94,7 @@ def test_an_alarm_that_returns_soon_is_fleeting_and_does_not_chatter_for_long() 
     assert figures(events).n_fleeting == 1
 
 
-def test_what_is_active_for_more_than_a_day_is_stale_unless_hidden() -> None:
+def test_what_is_active_for_more_than_a_day_is_stale_unless_hidden():
     def alarm(subject: str, **other: object) -> Alarm:
         identity = AlarmIdentity("U1", subject, "order1_shaft_x")
         return Alarm(identity, **{"level": ALERT, "raised_ns": 0, **other})  # type: ignore[arg-type]
@@ -111,6 +111,6 @@ def test_what_is_active_for_more_than_a_day_is_stale_unless_hidden() -> None:
     assert [each.identity.subject for each in found] == ["oldest", "old"]
 
 
-def test_spans_without_length_are_refused() -> None:
+def test_spans_without_length_are_refused():
     with pytest.raises(ValueError, match="must be after"):
         figures([], 0.0)

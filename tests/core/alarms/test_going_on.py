@@ -81,7 +81,7 @@ def hot(lives: Lives) -> Lives:
     return lives
 
 
-def test_an_alarm_whose_limit_is_gone_is_closed_and_can_be_acknowledged(hot: Lives) -> None:
+def test_an_alarm_whose_limit_is_gone_is_closed_and_can_be_acknowledged(hot):
     assert hot.events == [(OIL, "raised", "above_limit"), (OIL, "returned", "no_longer_watched")]
     assert hot.stored[OIL].state is AlarmState.RETURNED_UNACKNOWLEDGED
 
@@ -91,8 +91,8 @@ def test_an_alarm_whose_limit_is_gone_is_closed_and_can_be_acknowledged(hot: Liv
 
 @pytest.mark.parametrize("is_measured_meanwhile", [True, False])
 def test_one_that_was_closed_and_not_acknowledged_is_there_after_the_next_restart_too(
-    hot: Lives, is_measured_meanwhile: bool
-) -> None:
+    hot, is_measured_meanwhile
+):
     if is_measured_meanwhile:
         hot.take(2)
     hot.restart(NO_LIMIT)
@@ -102,7 +102,7 @@ def test_one_that_was_closed_and_not_acknowledged_is_there_after_the_next_restar
     assert hot.changes(OIL) == ["raised", "returned", "acknowledged"]
 
 
-def test_one_whose_limit_comes_back_is_judged_again(hot: Lives) -> None:
+def test_one_whose_limit_comes_back_is_judged_again(hot):
     hot.take(2)
     hot.restart(WATCHED)
     hot.take(3, oil=70.0)
@@ -111,9 +111,7 @@ def test_one_whose_limit_comes_back_is_judged_again(hot: Lives) -> None:
     assert (hot.stored[OIL].level, hot.stored[OIL].occurrence) == (AlarmLevel.ALERT, 2)
 
 
-def test_a_link_that_was_lost_when_nothing_more_was_kept_stays_lost_until_samples_come(
-    lives: Lives,
-) -> None:
+def test_a_link_that_was_lost_when_nothing_more_was_kept_stays_lost_until_samples_come(lives):
     lives.hear(True, 0)
     lives.take(1)
     lives.hear(False, 5, 16)
@@ -127,7 +125,7 @@ def test_a_link_that_was_lost_when_nothing_more_was_kept_stays_lost_until_sample
     assert lives.changes(LINK) == ["raised", "returned"]
 
 
-def test_a_link_that_has_come_back_since_it_was_kept_as_lost_is_there(lives: Lives) -> None:
+def test_a_link_that_has_come_back_since_it_was_kept_as_lost_is_there(lives):
     lives.take(1)
     lives.hear(False, 2, 13)
     lives.memory = lives.alarms.memory
@@ -139,7 +137,7 @@ def test_a_link_that_has_come_back_since_it_was_kept_as_lost_is_there(lives: Liv
     assert lives.alarms.is_connected
 
 
-def test_what_people_say_of_a_lost_link_holds_its_delay_neither_up_nor_off(lives: Lives) -> None:
+def test_what_people_say_of_a_lost_link_holds_its_delay_neither_up_nor_off(lives):
     lives.take(1)
     lives.hear(False, 2, 8)
     lives.memory = lives.alarms.memory

@@ -1,20 +1,29 @@
-"""Values against limits, by operating state and with a deadband, and what a reading cannot tell."""
+"""What limits say of readings, zones, films and vectors, and what is unknown there."""
+
+import math
+from collections.abc import Mapping
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.alarms.alarm import AlarmRule
+from core.alarms.alarm import AlarmIdentity, AlarmRule, AlarmState
 from core.alarms.judgements import (
+    OrderVector,
+    VectorReference,
     channel_judgement,
     drift_reading,
     fault_judgement,
     offset_reading,
+    vector_judgement,
 )
-from core.alarms.rules import LimitRule, Region
-from core.condition.cells import OperatingPoint
+from core.alarms.kinds import Watch
+from core.alarms.rules import LimitRule, Region, UnitRules, rule_of
+from core.alarms.unit_alarms import UnitAlarms
+from core.condition.cells import NOWHERE_KNOWN, OperatingPoint
 from core.condition.operating_state import STEADY, OperatingState
-from core.limits import AlarmLevel, Limits, ZoneLimits, judge
+from core.limits import AlarmLevel, Judgement, Limits, ZoneLimits, judge, unknown
+from core.machine.unit import Unit
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
 from core.samples.blocks import DeviceClock, StampFault
 
@@ -30,9 +39,7 @@ LEVELS = st.sampled_from([None, ALERT, DANGER])
 
 
 @given(value=st.floats(-1e3, 1e3), held=LEVELS)
-def test_the_level_is_that_of_the_limits_give_or_take_the_deadband(
-    value: float, held: AlarmLevel | None
-) -> None:
+def test_the_level_is_that_of_the_limits_give_or_take_the_deadband(value, held):
     level = LIMITS.passed(value, held)
 
     assert (level or 0) >= (2 if value > 200.0 else 1 if value > 150.0 else 0)
@@ -42,7 +49,7 @@ def test_the_level_is_that_of_the_limits_give_or_take_the_deadband(
     assert LIMITS.passed(value, level) == level
 
 
-def test_a_value_is_told_with_its_limit_and_a_doubtful_one_raises_but_does_not_clear() -> None:
+def test_a_value_is_told_with_its_limit_and_a_doubtful_one_raises_but_does_not_clear():
     assert judge(Reading(210.0), LIMITS, None).limit == 200.0
     assert judge(Reading(160.0), LIMITS, None).limit == 150.0
     assert judge(Reading(10.0), LIMITS, None).limit == 150.0
@@ -57,7 +64,7 @@ def test_a_value_is_told_with_its_limit_and_a_doubtful_one_raises_but_does_not_c
 
 
 @pytest.mark.parametrize("reason", [Reason.SENSOR_FAILURE, Reason.DEAD, Reason.NOT_MEASURED])
-def test_a_reading_without_a_number_is_unknown_and_standstill_alone_hides(reason: Reason) -> None:
+def test_a_reading_without_a_number_is_unknown_and_standstill_alone_hides(reason):
     condition = judge(missing(reason), LIMITS, DANGER)
 
     assert (condition.is_known, condition.reason) == (False, reason)
@@ -65,7 +72,7 @@ def test_a_reading_without_a_number_is_unknown_and_standstill_alone_hides(reason
     assert judge(missing(Reason.STANDSTILL), LIMITS, DANGER).suppressed_by == "standstill"
 
 
-def test_a_channel_a_clock_and_a_link_are_judged_by_what_is_known_of_them() -> None:
+def test_a_channel_a_clock_and_a_link_are_judged_by_what_is_known_of_them():
     assert channel_judgement(GOOD, None).level is None
     outside = channel_judgement(uncertain(Reason.SENSOR_FAILURE), None)
     assert (outside.level, outside.reason) == (ALERT, Reason.SENSOR_FAILURE)
@@ -104,15 +111,13 @@ GAP = Limits(2400.0, 2600.0, 10.0, alert_below=600.0, danger_below=400.0)
         (399.0, DANGER, 400.0, "below_limit"),
     ],
 )
-def test_a_shaft_may_walk_out_of_a_probes_range_on_either_side(
-    gap_um: float, level: AlarmLevel | None, limit: float, reason: str
-) -> None:
+def test_a_shaft_may_walk_out_of_a_probes_range_on_either_side(gap_um, level, limit, reason):
     found = judge(Reading(gap_um), GAP, None)
 
     assert (found.level, found.limit, found.reason) == (level, limit, reason)
 
 
-def test_a_gap_returns_only_when_it_is_clearly_inside_the_limits_of_the_present_state() -> None:
+def test_a_gap_returns_only_when_it_is_clearly_inside_the_limits_of_the_present_state():
     assert judge(Reading(609.0), GAP, ALERT).level is ALERT
     assert judge(Reading(611.0), GAP, ALERT).level is None
     assert judge(Reading(409.0), GAP, DANGER).level is DANGER
@@ -128,9 +133,7 @@ def test_a_gap_returns_only_when_it_is_clearly_inside_the_limits_of_the_present_
 
 @pytest.mark.parametrize("state", [RUN_UP, OperatingState.STANDSTILL, OperatingState.RUN_DOWN])
 @pytest.mark.parametrize("value", [20.0, 120.0])
-def test_elsewhere_nothing_is_judged_and_so_nothing_returns(
-    state: OperatingState, value: float
-) -> None:
+def test_elsewhere_nothing_is_judged_and_so_nothing_returns(state, value):
     limits = LimitRule(Limits(100.0), AlarmRule(), STEADY)
     found = limits.judge(Reading(value), OperatingPoint(state), ALERT)
 
@@ -138,7 +141,7 @@ def test_elsewhere_nothing_is_judged_and_so_nothing_returns(
     assert found.suppressed_by == found.reason == state.name.lower()
 
 
-def test_where_the_state_is_not_known_the_strictest_limits_count() -> None:
+def test_where_the_state_is_not_known_the_strictest_limits_count():
     found = LimitRule(
         None, AlarmRule(), tables=((in_(PART), Limits(150.0)), (in_(FULL), Limits(100.0)))
     )
@@ -161,8 +164,8 @@ def test_where_the_state_is_not_known_the_strictest_limits_count() -> None:
     ],
 )
 def test_a_condition_cell_has_limits_of_its_own_and_where_it_is_not_known_all_count_that_may(
-    eccentricity: float | None, attitude_deg: float | None, oil_c: float | None, passed: list[float]
-) -> None:
+    eccentricity, attitude_deg, oil_c, passed
+):
     cell = Region(STEADY, (0.35, 0.4), (45.0, 47.5), (0.0, 90.0))
     warm = Region(STEADY, oil_temperature_c=(47.5, 50.0))
     tables = ((cell, Limits(150.0)), (warm, Limits(60.0)))
@@ -184,9 +187,131 @@ def test_a_condition_cell_has_limits_of_its_own_and_where_it_is_not_known_all_co
         (3.1, DANGER, "zone_d"),
     ],
 )
-def test_a_zone_is_named_also_when_it_is_no_alarm(
-    value: float, level: AlarmLevel | None, zone: str
-) -> None:
+def test_a_zone_is_named_also_when_it_is_no_alarm(value, level, zone):
     found = judge(Reading(value), ZoneLimits(2.0, 3.0, zone_b=1.0), None)
 
     assert (found.level, found.reason) == (level, zone)
+
+
+FILM_X = "U1:UJB:stiffness_x"
+
+LOST = Judgement(AlarmLevel.ALERT, value=-0.21, limit=0.1, reason="film")
+
+
+@pytest.fixture
+def alarms(unit: Unit) -> UnitAlarms:
+    return UnitAlarms(unit, UnitRules(films=rule_of(0.0, 0.0)))
+
+
+def changes(alarms: UnitAlarms, conditions: Mapping[str, Judgement], now_ns: int) -> list[str]:
+    news = alarms.films(conditions, now_ns)
+    return [event.change.value for told in news for event in told.events]
+
+
+def test_films_have_an_alarm_in_each_direction_that_announces_a_loss_with_its_size(alarms, unit):
+    ids = [alarm.identity.id for alarm in alarms.alarms]
+    assert [id_ for id_ in ids if "stiffness" in id_] == [FILM_X, "U1:UJB:stiffness_y"]
+    unwatched = UnitAlarms(unit, UnitRules())
+    assert not [a for a in unwatched.alarms if "stiffness" in a.identity.id]
+    with pytest.raises(KeyError):
+        unwatched.films({FILM_X: LOST}, 0)
+
+    [news] = alarms.films({FILM_X: LOST}, 7)
+
+    [event] = news.events
+    found = (event.change.value, event.value, event.limit, event.time_ns)
+    assert found == ("raised", -0.21, 0.1, 7)
+
+
+@pytest.mark.parametrize(
+    "verdict", ["no_baseline", "insufficient_excitation", "bad_quality", "transient"]
+)
+def test_a_film_that_cannot_be_judged_stays_in_alarm_and_says_why(alarms, verdict):
+    changes(alarms, {FILM_X: LOST}, 0)
+
+    assert changes(alarms, {FILM_X: unknown(verdict)}, 1) == ["condition_unknown"]
+    alarm = alarms.alarm(FILM_X)
+    assert (alarm.level, alarm.condition.reason) == (AlarmLevel.ALERT, verdict)
+
+
+def test_a_film_that_was_never_judged_raises_nothing(alarms):
+    assert changes(alarms, {FILM_X: unknown("no_baseline")}, 1) == []
+    alarm = alarms.alarm(FILM_X)
+    assert (alarm.state, alarm.condition.is_known) == (AlarmState.NORMAL, False)
+
+
+def test_a_latched_loss_outlasts_the_healthy_verdict(unit):
+    alarms = UnitAlarms(unit, UnitRules(films=rule_of(0.0, 0.0, is_latching=True)))
+    changes(alarms, {FILM_X: LOST}, 0)
+
+    assert changes(alarms, {FILM_X: Judgement()}, 1) == ["latched"]
+    assert alarms.alarm(FILM_X).level is AlarmLevel.ALERT
+
+
+VECTOR_ALERT = AlarmLevel.ALERT
+VECTOR_LIMITS = Limits(30.0, 60.0, 2.0)
+NO_PHASE = missing(Reason.NOT_MEASURED)
+WELL = VectorReference("U1", "UJB", OperatingState.FULL_LOAD, {"shaft_x": OrderVector(60.0, 10.0)})
+LENGTH = VectorReference("U1", "UJB", OperatingState.FULL_LOAD, {"shaft_x": OrderVector(60.0)})
+
+
+def judged(
+    found: Mapping[str, Reading],
+    reference: VectorReference | None,
+    held: AlarmLevel | None,
+    place: str = "shaft_x",
+) -> Judgement:
+    rule = LimitRule(VECTOR_LIMITS, rule_of(0.0, 0.0))
+    identity = AlarmIdentity("U1", "UJB", f"order1_change_{place}")
+    watch = Watch(identity, rule.rule, place, limits=rule)
+    return vector_judgement(found, watch, reference, NOWHERE_KNOWN, held)
+
+
+def readings(amplitude: Reading | float, phase: Reading | float) -> dict[str, Reading]:
+    found = {"order1_shaft_x_um_pk": amplitude, "order1_shaft_x_phase_deg": phase}
+    return {n: r if isinstance(r, Reading) else Reading(r) for n, r in found.items()}
+
+
+def test_a_vector_that_turns_either_way_is_noticed_though_its_length_stays():
+    found = judged(readings(60.0, 70.0), WELL, None)
+
+    assert found.value == pytest.approx(60.0)  # 60° of an equilateral triangle
+    assert found.level is VECTOR_ALERT
+    assert found.reason == "above_limit"
+    almost = judged(readings(60.0, 350.0), WELL, None)
+
+    assert almost.value == pytest.approx(2 * 60.0 * math.sin(math.radians(10.0)))
+
+
+@pytest.mark.parametrize("reference", [WELL, LENGTH])
+@pytest.mark.parametrize(
+    ("amplitude", "level"), [(80.0, None), (95.0, VECTOR_ALERT), (25.0, VECTOR_ALERT)]
+)
+def test_without_a_phase_only_the_length_counts_and_that_is_said(reference, amplitude, level):
+    found = judged(readings(amplitude, NO_PHASE), reference, None)
+
+    assert (found.level, found.value) == (level, abs(amplitude - 60.0))
+    assert found.reason.startswith("amplitude_change")
+
+
+def test_without_a_reference_or_its_phase_nothing_is_known_and_standstill_suppresses():
+    found = judged(readings(60.0, NO_PHASE), WELL, VECTOR_ALERT)
+
+    assert (found.is_known, found.reason) == (False, "no_phase")
+
+    standing = readings(missing(Reason.STANDSTILL), NO_PHASE)
+    found = judged(standing, WELL, VECTOR_ALERT)
+
+    assert (found.is_known, found.suppressed_by) == (False, "standstill")
+
+    for reference, place in ((None, "shaft_x"), (WELL, "bearing_y")):
+        there = readings(60.0, 10.0)
+        there |= {n.replace("shaft_x", place): r for n, r in there.items()}
+        found = judged(there, reference, None, place)
+        assert (found.is_known, found.reason, found.suppressed_by) == (False, "no_reference", None)
+
+
+@pytest.mark.parametrize("vector", [(math.nan, 0.0), (-1.0, 0.0), (60.0, math.inf)])
+def test_a_vector_is_made_of_numbers(vector):
+    with pytest.raises(ValueError, match="must be a number"):
+        OrderVector(*vector)

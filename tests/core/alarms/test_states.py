@@ -91,14 +91,12 @@ def machine(unit: Unit, block: Callable[..., SampleBlock]) -> Machine:
         ({"order1_shaft_x_um_pk": 90.0}, "order1_change_shaft_x raised"),
     ],
 )
-def test_each_measurement_has_its_alarm(
-    machine: Machine, found: dict[str, float], raised: str
-) -> None:
+def test_each_measurement_has_its_alarm(machine, found, raised):
     assert machine.runs(FULL) == []
     assert machine.runs(FULL, **found) == [raised]
 
 
-def test_a_machine_that_runs_down_shakes_without_an_alarm(machine: Machine) -> None:
+def test_a_machine_that_runs_down_shakes_without_an_alarm(machine):
     machine.runs(FULL)
     shaking = machine.runs(RUN_DOWN, overall_shaft_x_um_pp=900.0)
 
@@ -107,7 +105,7 @@ def test_a_machine_that_runs_down_shakes_without_an_alarm(machine: Machine) -> N
     assert machine.alarms.alarm(SPAN).suppressed_by == "run_down"
 
 
-def test_an_alarm_that_a_stop_hides_has_not_returned_and_is_told_again(machine: Machine) -> None:
+def test_an_alarm_that_a_stop_hides_has_not_returned_and_is_told_again(machine):
     machine.runs(FULL, overall_shaft_x_um_pp=210.0)
     told = [w for state in (RUN_DOWN, STANDING, STANDING) for w in machine.runs(state)]
     assert machine.state(SPAN) is AlarmState.SUPPRESSED
@@ -120,9 +118,7 @@ def test_an_alarm_that_a_stop_hides_has_not_returned_and_is_told_again(machine: 
     assert machine.state(SPAN) is AlarmState.UNACKNOWLEDGED
 
 
-def test_where_the_state_is_not_known_nothing_is_suppressed_but_by_standing(
-    machine: Machine,
-) -> None:
+def test_where_the_state_is_not_known_nothing_is_suppressed_but_by_standing(machine):
     assert machine.runs(None, overall_shaft_x_um_pp=210.0) == ["overall_shaft_x raised"]
     assert not [a for a in machine.alarms.alarms if a.suppressed_by is not None]
 
@@ -132,7 +128,7 @@ def test_where_the_state_is_not_known_nothing_is_suppressed_but_by_standing(
     assert machine.alarms.alarm("U1:UJB:eccentricity_ratio").suppressed_by == "standstill"
 
 
-def test_a_vector_has_a_reference_in_the_state_it_was_taken_in(machine: Machine) -> None:
+def test_a_vector_has_a_reference_in_the_state_it_was_taken_in(machine):
     machine.runs(PART, order1_shaft_x_um_pk=90.0)
     alarm = machine.alarms.alarm("U1:UJB:order1_change_shaft_x")
     assert (alarm.condition.is_known, alarm.condition.reason) == (False, "no_reference")
@@ -141,9 +137,7 @@ def test_a_vector_has_a_reference_in_the_state_it_was_taken_in(machine: Machine)
     assert machine.runs(PART, order1_shaft_x_um_pk=90.0) == ["order1_change_shaft_x raised"]
 
 
-def test_an_alarm_shows_what_was_found_last_and_slow_channels_share_the_state(
-    machine: Machine,
-) -> None:
+def test_an_alarm_shows_what_was_found_last_and_slow_channels_share_the_state(machine):
     machine.runs(FULL, overall_shaft_x_um_pp=120.0)
     machine.runs(FULL, overall_shaft_x_um_pp=130.0)
 
@@ -153,9 +147,7 @@ def test_an_alarm_shows_what_was_found_last_and_slow_channels_share_the_state(
     assert "oil_temperature raised" in machine.runs(FULL, oil_c=65.0)
 
 
-def test_an_alarm_and_its_events_carry_the_condition_at_which_it_was_raised(
-    machine: Machine,
-) -> None:
+def test_an_alarm_and_its_events_carry_the_condition_at_which_it_was_raised(machine):
     there = {"eccentricity_ratio": 0.4, "attitude_angle_deg": 47.0, "oil_temperature_c": 52.0}
     machine.runs(FULL, **there, overall_shaft_x_um_pp=210.0)
     failed = (bad(Reason.SENSOR_FAILURE), *(GOOD,) * 3, bad(Reason.DEAD))

@@ -56,7 +56,7 @@ def alarms(unit: Unit) -> UnitAlarms:
     return UnitAlarms(unit, RULES)
 
 
-def test_each_part_of_a_unit_has_its_alarm_by_a_name_that_stays(alarms: UnitAlarms) -> None:
+def test_each_part_of_a_unit_has_its_alarm_by_a_name_that_stays(alarms):
     assert [alarm.identity.id for alarm in alarms.alarms] == [
         *(f"U1:{id_}:channel_not_ok" for id_ in (*IDS, "oil")),
         "U1:UJB:order1_shaft_x",
@@ -69,7 +69,7 @@ def test_each_part_of_a_unit_has_its_alarm_by_a_name_that_stays(alarms: UnitAlar
     ]
 
 
-def test_a_replay_judges_neither_link_nor_clock(unit: Unit, block) -> None:
+def test_a_replay_judges_neither_link_nor_clock(unit, block):
     clock = dict.fromkeys(("clock_offset", "clock_drift", "time_stamps"))
     alarms = UnitAlarms(unit, replace(RULES, **clock, link=None))
     alarms.link(False, "played out", 0)
@@ -85,7 +85,7 @@ def test_a_replay_judges_neither_link_nor_clock(unit: Unit, block) -> None:
     assert all(a.state is AlarmState.NORMAL for a in alarms.alarms)
 
 
-def test_a_channel_without_a_bearing_is_watched_too(alarms: UnitAlarms, block) -> None:
+def test_a_channel_without_a_bearing_is_watched_too(alarms, block):
     news = alarms.take(block(0, qualities=(*(GOOD,) * 4, bad(Reason.CLIPPED))), [], 0)
 
     assert told(news) == [("U1:spare:channel_not_ok", "raised")]
@@ -93,8 +93,8 @@ def test_a_channel_without_a_bearing_is_watched_too(alarms: UnitAlarms, block) -
 
 
 def test_a_probe_that_only_a_segment_shows_as_stuck_is_an_alarm_until_one_shows_otherwise(
-    alarms: UnitAlarms, block
-) -> None:
+    alarms, block
+):
     stuck = assessed(shaft_x=missing(Reason.STUCK))
     alarms.take(block(0), [], 0)
     first = alarms.take(block(1), [stuck], 0)
@@ -106,7 +106,7 @@ def test_a_probe_that_only_a_segment_shows_as_stuck_is_an_alarm_until_one_shows_
     assert ("U1:sx:channel_not_ok", "returned") in told(last)
 
 
-def test_a_channel_that_clips_too_often_says_how_often(alarms: UnitAlarms, block) -> None:
+def test_a_channel_that_clips_too_often_says_how_often(alarms, block):
     alarms.take(block(0), [], 0)
     few = alarms.take(block(1), [assessed(shaft_x=Reading(30.0, uncertain(Reason.CLIPPED)))], 0)
     [news] = alarms.take(block(2), [assessed(shaft_x=missing(Reason.CLIPPED))], 0)
@@ -117,8 +117,8 @@ def test_a_channel_that_clips_too_often_says_how_often(alarms: UnitAlarms, block
 
 
 def test_a_film_of_the_wrong_sign_is_an_alarm_of_its_two_channels_until_the_sign_is_right(
-    alarms: UnitAlarms, block
-) -> None:
+    alarms, block
+):
     def with_k(**readings: Reading) -> Any:
         found = assessed()
         found.readings |= {f"{name}_xx_n_per_m": r for name, r in readings.items()}
@@ -138,18 +138,14 @@ def test_a_film_of_the_wrong_sign_is_an_alarm_of_its_two_channels_until_the_sign
     assert [(id_, "returned") for id_ in channels] == [e for e in told(last) if "channel" in e[0]]
 
 
-def test_an_amplitude_is_judged_when_its_segment_ends_not_when_the_block_does(
-    alarms: UnitAlarms, block
-) -> None:
+def test_an_amplitude_is_judged_when_its_segment_ends_not_when_the_block_does(alarms, block):
     [news] = alarms.take(block(7), [assessed(shaft_y=Reading(61.0))], 0)
 
     assert told([news]) == [("U1:UJB:order1_shaft_y", "raised")]
     assert news.events[0].time_ns == 5 * SECOND
 
 
-def test_warm_oil_is_an_alert_after_its_delay_and_hot_oil_a_danger(
-    alarms: UnitAlarms, block
-) -> None:
+def test_warm_oil_is_an_alert_after_its_delay_and_hot_oil_a_danger(alarms, block):
     warm, hot = Reading(66.0), Reading(76.0)
     found = [told(alarms.take(block(s, oil=warm), [], 0)) for s in range(4)]
     found += [told(alarms.take(block(s, oil=hot), [], 0)) for s in range(4, 8)]
@@ -158,7 +154,7 @@ def test_warm_oil_is_an_alert_after_its_delay_and_hot_oil_a_danger(
     assert found == [[], [], [(id_, "raised")], [], [], [], [(id_, "escalated")], []]
 
 
-def test_a_broken_thermometer_is_said_and_clears_no_hot_oil(alarms: UnitAlarms, block) -> None:
+def test_a_broken_thermometer_is_said_and_clears_no_hot_oil(alarms, block):
     for second in range(4):
         alarms.take(block(second, oil=Reading(76.0)), [], 0)
 
@@ -173,7 +169,7 @@ def test_a_broken_thermometer_is_said_and_clears_no_hot_oil(alarms: UnitAlarms, 
     assert alarms.alarm("U1:UJB:oil_temperature").level is AlarmLevel.DANGER
 
 
-def test_a_block_that_comes_again_decides_nothing(alarms: UnitAlarms, block) -> None:
+def test_a_block_that_comes_again_decides_nothing(alarms, block):
     for second in range(3):
         alarms.take(block(second), [], 0)
 
@@ -182,7 +178,7 @@ def test_a_block_that_comes_again_decides_nothing(alarms: UnitAlarms, block) -> 
     assert told(alarms.take(block(3, qualities=clipped), [], 0)) != []
 
 
-def test_a_channel_whose_rows_are_amplitude_and_phase_fails_with_either(unit: Unit, block) -> None:
+def test_a_channel_whose_rows_are_amplitude_and_phase_fails_with_either(unit, block):
     rows = ["sx", "sx", "sy", "sy", "bx", "bx", "by", "by"]
     alarms = UnitAlarms(unit, RULES, rows)
     phase_lost = [GOOD, bad(Reason.NOT_FINITE), *(GOOD,) * 6]
@@ -194,7 +190,7 @@ def test_a_channel_whose_rows_are_amplitude_and_phase_fails_with_either(unit: Un
     assert (spare.condition.is_known, spare.condition.reason) == (False, "not_measured")
 
 
-def test_stamps_that_do_not_fit_are_an_alarm_that_lasts_a_while(alarms: UnitAlarms, block) -> None:
+def test_stamps_that_do_not_fit_are_an_alarm_that_lasts_a_while(alarms, block):
     news = alarms.take(block(0, stamp_fault=StampFault.REGRESSED), [], 0)
     alarms.take(block(1), [], 0)
     later = alarms.take(block(2), [], 599 * SECOND)
@@ -205,7 +201,7 @@ def test_stamps_that_do_not_fit_are_an_alarm_that_lasts_a_while(alarms: UnitAlar
     assert (told(later), told(at_last)) == ([], [("U1:device:time_stamps", "returned")])
 
 
-def test_nothing_is_said_of_a_unit_in_good_health(alarms: UnitAlarms, block) -> None:
+def test_nothing_is_said_of_a_unit_in_good_health(alarms, block):
     alarms.link(True, None, 0)
     news = [alarms.take(block(s), [assessed()] if s % 9 == 8 else [], 0) for s in range(200)]
 

@@ -1,4 +1,4 @@
-"""Laws that a baseline obeys whatever it learns from, and columns that it refuses."""
+"""Laws that a baseline obeys, columns that it refuses, and drift told from seasons and chance."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,11 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.baseline.agreement import Drift, drift_within, learning_drift
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
 from core.baseline.cell_table import Support, cells_between, neighbourhood
 from core.baseline.history import ReadingOutcome, StiffnessHistory
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
+from core.baseline.surface_fit import slope_scatter
 from core.condition.cells import CellGrid, FilmConditions
 
 ORIGIN = Origin("U1", "UJB", "dynamic", 1, "Ada", 1_700_000_000_000_000_000, "commissioning")
@@ -46,9 +48,7 @@ def healthy(film_life: FilmLife) -> StiffnessHistory:
     return film_life(1)
 
 
-def test_what_never_changes_is_its_own_baseline_and_a_stiffer_bracket_moves_both(
-    healthy: StiffnessHistory,
-) -> None:
+def test_what_never_changes_is_its_own_baseline_and_a_stiffer_bracket_moves_both(healthy):
     constant = learned(with_ln_k(healthy, np.full_like(healthy.ln_k, 20.0)))
     heights = constant.surface.at(healthy.conditions)
     assert np.allclose(heights, 20.0, rtol=0.0, atol=1e-9)
@@ -60,7 +60,7 @@ def test_what_never_changes_is_its_own_baseline_and_a_stiffer_bracket_moves_both
     np.testing.assert_allclose(deviation(after, moved), same, atol=1e-6)
 
 
-def test_the_order_of_the_days_does_not_change_what_is_normal(healthy: StiffnessHistory) -> None:
+def test_the_order_of_the_days_does_not_change_what_is_normal(healthy):
     day = healthy.time_ns // 86_400_000_000_000
     days = np.unique(day)
     target = dict(zip(days, np.random.default_rng(3).permutation(days), strict=True))
@@ -81,7 +81,7 @@ def test_the_order_of_the_days_does_not_change_what_is_normal(healthy: Stiffness
     assert np.nanquantile(np.abs(shift), 0.95) < 1e-3  # alike days are weighed as one, and are not
 
 
-def test_the_surface_is_as_near_the_truth_as_it_says(film_life: FilmLife) -> None:
+def test_the_surface_is_as_near_the_truth_as_it_says(film_life):
     errors = []
     for seed in range(6):
         history = film_life(seed)
@@ -95,9 +95,7 @@ def test_the_surface_is_as_near_the_truth_as_it_says(film_life: FilmLife) -> Non
     assert 0.4 < np.std(np.concatenate(errors)) < 1.3
 
 
-def test_nothing_is_compared_outside_the_learned_support_nor_at_an_unseen_attitude(
-    healthy: StiffnessHistory,
-) -> None:
+def test_nothing_is_compared_outside_the_learned_support_nor_at_an_unseen_attitude(healthy):
     baseline = learned(healthy)
     far = FilmConditions(np.array([0.95, 0.4, 0.4]), np.array([45.0, 5.0, 45.0]), np.full(3, 30.0))
     found = baseline.compare(far, np.full(3, 20.0), np.full(3, 0.01))
@@ -112,9 +110,7 @@ def test_nothing_is_compared_outside_the_learned_support_nor_at_an_unseen_attitu
     assert np.mean(found.place >= 0) < 0.01
 
 
-def test_a_reading_that_scatters_more_than_the_learned_ones_weighs_less(
-    healthy: StiffnessHistory,
-) -> None:
+def test_a_reading_that_scatters_more_than_the_learned_ones_weighs_less(healthy):
     baseline = learned(healthy)
     here = FilmConditions(np.full(2, 0.4), np.full(2, 45.0), np.full(2, 30.0))
     typical, noisy = baseline.u_random, 10.0 * baseline.scatter
@@ -122,9 +118,7 @@ def test_a_reading_that_scatters_more_than_the_learned_ones_weighs_less(
     assert weight[1] < 0.02 < 0.2 < weight[0] <= 1.0
 
 
-def test_a_cell_needs_readings_on_several_days_or_neighbours_to_borrow_from(
-    healthy: StiffnessHistory,
-) -> None:
+def test_a_cell_needs_readings_on_several_days_or_neighbours_to_borrow_from(healthy):
     settings = BaselineSettings(min_days=5, min_readings=30)
     cells = {cell.cell: cell for cell in learned(healthy, settings).table.cells}
     own = frozenset(name for name, cell in cells.items() if cell.support is Support.OWN)
@@ -138,7 +132,7 @@ def test_a_cell_needs_readings_on_several_days_or_neighbours_to_borrow_from(
     assert cells_between(own, reach=3) == {(2, 5), (3, 5), (4, 6), (4, 7), (4, 8)}
 
 
-def test_less_is_known_of_the_far_side_of_the_outermost_cell(healthy: StiffnessHistory) -> None:
+def test_less_is_known_of_the_far_side_of_the_outermost_cell(healthy):
     baseline = learned(healthy)
     known = [cell for cell in baseline.table.cells if cell.support is Support.OWN]
     edge = max(known, key=lambda cell: cell.cell[0])
@@ -148,7 +142,7 @@ def test_less_is_known_of_the_far_side_of_the_outermost_cell(healthy: StiffnessH
     assert 0.0 < std[0] < std[1] < std[2]
 
 
-def test_what_position_does_lasts_and_the_rest_averages_out(film_life: FilmLife) -> None:
+def test_what_position_does_lasts_and_the_rest_averages_out(film_life):
     history = film_life(5, days=240)
     e, day = history.eccentricity_ratio, history.time_ns // 86_400_000_000_000
     steep = np.exp(9.0 * (e - 0.4))
@@ -160,7 +154,7 @@ def test_what_position_does_lasts_and_the_rest_averages_out(film_life: FilmLife)
 
 
 @pytest.mark.parametrize("share", [0.05, 0.2])
-def test_wrong_readings_hardly_move_a_baseline(healthy: StiffnessHistory, share: float) -> None:
+def test_wrong_readings_hardly_move_a_baseline(healthy, share):
     random = np.random.default_rng(7)
     is_wrong = random.random(healthy.ln_k.shape) < share
     wrong = healthy.ln_k + np.where(is_wrong, random.uniform(0.5, 3.0, is_wrong.shape), 0.0)
@@ -170,9 +164,7 @@ def test_wrong_readings_hardly_move_a_baseline(healthy: StiffnessHistory, share:
     assert np.nanmedian(both) < 0.01
 
 
-def test_a_fault_or_a_few_days_or_what_had_not_settled_is_not_learned(
-    film_life: FilmLife, healthy: StiffnessHistory
-) -> None:
+def test_a_fault_or_a_few_days_or_what_had_not_settled_is_not_learned(film_life, healthy):
     def fall(hours: np.ndarray) -> np.ndarray:
         return np.where(hours > 90 * 24, np.log(0.8), 0.0)
 
@@ -186,14 +178,14 @@ def test_a_fault_or_a_few_days_or_what_had_not_settled_is_not_learned(
     assert learn(healthy, unsettled, ORIGIN, BaselineSettings()).quantities == ()
 
 
-def test_alike_readings_are_known_to_stray_further(film_life: FilmLife) -> None:
+def test_alike_readings_are_known_to_stray_further(film_life):
     alone = learned(film_life(3, lasting_std=1e-6, noise_std=0.01))
     alike = learned(film_life(3, lasting_std=0.01, noise_std=1e-6))
     assert alike.scatter == pytest.approx(alone.scatter, rel=0.5)
     assert alike.time_scatter[1].share > 2.0 * alone.time_scatter[1].share
 
 
-def test_an_attitude_that_matters_is_learned(healthy: StiffnessHistory) -> None:
+def test_an_attitude_that_matters_is_learned(healthy):
     day = healthy.time_ns // 86_400_000_000_000 - healthy.time_ns[0] // 86_400_000_000_000
     attitude_deg = np.random.default_rng(5).uniform(-180.0, 180.0, 121)[day]
     turned = replace(
@@ -208,7 +200,7 @@ def test_an_attitude_that_matters_is_learned(healthy: StiffnessHistory) -> None:
     assert {len(cell.cell) for cell in sectors.table.cells} == {3}
 
 
-def test_both_directions_of_a_bearing_are_learned(healthy: StiffnessHistory) -> None:
+def test_both_directions_of_a_bearing_are_learned(healthy):
     assert [each.direction for each in baseline_of(healthy).quantities] == ["x", "y"]
 
 
@@ -220,12 +212,12 @@ def history(n: int = 5) -> StiffnessHistory:
     )
 
 
-def test_columns_of_unequal_length_are_refused() -> None:
+def test_columns_of_unequal_length_are_refused():
     with pytest.raises(ValueError, match=r"power_mw: shape \(4,\), expected \(5,\)"):
         replace(history(), power_mw=np.ones(4))
 
 
-def test_a_part_of_a_history_is_a_history_and_a_missing_number_says_why() -> None:
+def test_a_part_of_a_history_is_a_history_and_a_missing_number_says_why():
     whole = history()
     assert whole.rows(1, 3).time_ns.tolist() == [1, 2]
     assert len(whole.rows(2, 2)) == 0
@@ -245,17 +237,88 @@ def test_a_part_of_a_history_is_a_history_and_a_missing_number_says_why() -> Non
 @pytest.mark.parametrize(
     ("column", "row", "value", "says"),
     [
-        ("time_ns", 2, 1, "time_ns: row 2 is not after row 1"),
+        ("time_ns", 2, 1, "time_ns: row 2 must be later than row 1"),
         ("oil_temperature_c", 3, np.inf, "oil_temperature_c: row 3 is infinite"),
         ("ln_k", (0, 4), np.nan, "outcome: row 4 contradicts ln_k"),
         ("outcome", (0, 4), ReadingOutcome.BAD_QUALITY, "outcome: row 4 contradicts ln_k"),
         ("u_random", (1, 0), 0.0, "u_random: row 0 must be above 0"),
     ],
 )
-def test_impossible_columns_are_refused_with_their_row(
-    column: str, row: int | tuple[int, int], value: float, says: str
-) -> None:
+def test_impossible_columns_are_refused_with_their_row(column, row, value, says):
     wrong = getattr(history(), column).copy()
     wrong[row] = value
     with pytest.raises(ValueError, match=says):
         replace(history(), **{column: wrong})
+
+
+def test_what_cells_are_like_and_a_few_wrong_days_are_no_drift():
+    random = np.random.default_rng(1)
+    day = np.repeat(np.arange(100), 5)
+    cell = np.clip(day // 10 + random.integers(-2, 3, day.size), 0, 9)  # a season through the cells
+    value = 0.5 * cell + random.normal(0.0, 0.01, day.size)
+    found = drift_within(day, value, cell)
+    assert found is not None
+    assert abs(found.change) < 3.0 * found.std < 0.02
+    random = np.random.default_rng(3)
+    day = np.repeat(np.arange(100), 4)
+    value = random.normal(0.0, 0.01, day.size)
+    value[-4:] = -0.8
+    found = drift_within(day, value, np.zeros(day.size, np.int64))
+    assert found is not None
+    assert abs(found.change) < 0.02
+    day = np.arange(100)
+    assert drift_within(day, -0.01 * day, day) is None
+
+
+def test_drift_is_found_and_its_uncertainty_covers_it():
+    random = np.random.default_rng(2)
+    day = np.repeat(np.arange(120), 4)
+    errors = []
+    for _ in range(200):
+        cell = random.integers(0, 20, day.size)
+        alike = np.repeat(random.normal(0.0, 0.01, 15), 8)[day]  # spells that are alike
+        value = 0.3 * cell - 0.05 * day / 119 + alike + random.normal(0.0, 0.01, day.size)
+        found = drift_within(day, value, cell)
+        assert found is not None
+        errors.append((found.change + 0.05) / found.std)
+    assert np.mean(np.abs(errors) < 2.0) > 0.85
+    assert abs(np.mean(errors)) < 0.3
+
+
+@pytest.mark.parametrize("size", [0.0, 0.1])
+def test_a_baseline_tells_whether_its_film_changed_while_it_was_learned(film_life, size):
+    history = film_life(
+        4, change=lambda hours: np.log(1.0 - size * np.clip(hours / 24 / 110, 0.0, 1.0))
+    )
+    settled = np.ones(len(history), np.bool_)
+    origin = Origin("U1", "UJB", "dynamic", 1, "Ada", 0)
+    learned = learn(history, settled, origin, BaselineSettings())
+    drifts = [learning_drift(history, settled, quantity) for quantity in learned.quantities]
+    for found in drifts:
+        assert isinstance(found, Drift)
+        assert abs(found.change - np.log(1.0 - size)) < max(4.0 * found.std, 0.03)
+        assert (abs(found.change) > 3.0 * found.std) == (size > 0.0)
+
+
+N = 4000
+
+
+def test_scatter_is_put_down_to_position_if_slopes_differ_and_not_to_a_few_wrong_days():
+    random = np.random.default_rng(1)
+    slope = random.uniform(0.0, 6.0, N)
+    deviation = 0.006 * random.standard_normal(N) + 0.003 * slope * random.standard_normal(N)
+    found = slope_scatter(slope, deviation)
+    steep = np.array([5.0])
+    assert np.sqrt(found.variance(steep)) == pytest.approx(np.hypot(0.006, 0.015), rel=0.1)
+    assert np.sqrt(found.lasting(steep)) == pytest.approx(0.015, rel=0.15)
+    assert found.lasting(np.array([0.0])) == 0.0
+    random = np.random.default_rng(2)
+    found = slope_scatter(np.full(N, 4.0), 0.01 * random.standard_normal(N))
+    assert found.lasting(np.array([4.0])) == 0.0
+    assert np.sqrt(found.variance(np.array([4.0]))) == pytest.approx(0.01, rel=0.1)
+    random = np.random.default_rng(3)
+    slope = random.uniform(0.0, 6.0, N)
+    deviation = 0.01 * random.standard_normal(N)
+    deviation[:40] = 1.0
+    found = slope_scatter(slope, deviation)
+    assert np.sqrt(found.variance(np.array([3.0]))) == pytest.approx(0.01, rel=0.15)

@@ -99,8 +99,8 @@ def put_down(
 @pytest.mark.parametrize(("row", "is_named"), [(0, True), (3, True), (4, False)])
 @pytest.mark.parametrize("factor", [0.8, 0.7])
 def test_a_softer_film_moves_the_shaft_and_is_the_film_unless_probes_would_do_the_same(
-    response: ShaftResponse, row: int, is_named: bool, factor: float
-) -> None:
+    response, row, is_named, factor
+):
     pair = {row: factor, row ^ 1: factor}
     found = put_down(response, row, film=pair)
     assert found.cause is (Cause.FILM if is_named else Cause.UNKNOWN)
@@ -109,18 +109,14 @@ def test_a_softer_film_moves_the_shaft_and_is_the_film_unless_probes_would_do_th
     assert found.shaft_change > 0.02
 
 
-def test_a_stiffer_film_is_the_film_and_two_faults_at_once_have_no_single_cause(
-    response: ShaftResponse,
-) -> None:
+def test_a_stiffer_film_is_the_film_and_two_faults_at_once_have_no_single_cause(response):
     assert put_down(response, 0, film={0: 1.3, 1: 1.3}).cause is Cause.FILM
     found = put_down(response, 0, film={0: 0.75, 1: 0.75}, accelerometer={0: 0.75, 1: 0.75})
     assert found.cause is Cause.UNKNOWN
 
 
 @pytest.mark.parametrize("row", range(6))
-def test_an_accelerometer_that_lost_a_fifth_is_not_the_film(
-    response: ShaftResponse, row: int
-) -> None:
+def test_an_accelerometer_that_lost_a_fifth_is_not_the_film(response, row):
     found = put_down(response, row, accelerometer={row: 0.8})
     assert found.cause is Cause.BRACKET_OR_TRANSDUCER
     assert found.film_share == pytest.approx(0.0, abs=0.2)
@@ -136,9 +132,7 @@ NOT_FILMS = [
 
 @pytest.mark.parametrize("seed", range(2, 5))
 @pytest.mark.parametrize(("row", "changes"), NOT_FILMS)
-def test_probes_that_read_more_and_loose_brackets_are_never_the_film(
-    response: ShaftResponse, row: int, changes: Mapping[str, Mapping[int, float]], seed: int
-) -> None:
+def test_probes_that_read_more_and_loose_brackets_are_never_the_film(response, row, changes, seed):
     found = put_down(response, row, seed, **changes)
     assert found.cause in (Cause.BRACKET_OR_TRANSDUCER, Cause.UNKNOWN)
     assert found.film_share is None or found.film_share < 1.0 + 2.0 * found.film_share_std
@@ -147,16 +141,14 @@ def test_probes_that_read_more_and_loose_brackets_are_never_the_film(
 @pytest.mark.parametrize(
     ("row", "changes"), [NOT_FILMS[0], NOT_FILMS[6], NOT_FILMS[7], NOT_FILMS[9]]
 )
-def test_probes_and_brackets_are_named_where_no_film_moves_the_shaft_so(
-    response: ShaftResponse, row: int, changes: Mapping[str, Mapping[int, float]]
-) -> None:
+def test_probes_and_brackets_are_named_where_no_film_moves_the_shaft_so(response, row, changes):
     found = put_down(response, row, **changes)
     assert found.cause is Cause.BRACKET_OR_TRANSDUCER
 
 
 def test_a_probe_that_reads_more_is_recognised_though_its_bearing_seems_to_run_further_out(
-    response: ShaftResponse,
-) -> None:
+    response,
+):
     """Where stiffness rises with eccentricity, the film seems softer in y too."""
     found = put_down(response, 2, probe={2: 1.25}, rise=1.0)
     assert (found.cause, found.reason) == (Cause.BRACKET_OR_TRANSDUCER, PROBE_REASON)
@@ -166,16 +158,14 @@ def test_a_probe_that_reads_more_is_recognised_though_its_bearing_seems_to_run_f
 @pytest.mark.parametrize("factor", [0.9, 0.8, 1.25])
 @pytest.mark.parametrize("what", ["film", "accelerometer"])
 def test_what_changes_in_all_bearings_alike_is_oil_or_not_known_and_no_transducer(
-    response: ShaftResponse, what: str, factor: float, seed: int
-) -> None:
+    response, what, factor, seed
+):
     found = put_down(response, 0, seed, **{what: dict.fromkeys(range(6), factor)})
     assert found.cause in (Cause.OIL, Cause.UNKNOWN)
     assert what == "film" or found.cause is Cause.UNKNOWN
 
 
-def test_a_small_change_or_one_without_response_or_readings_has_no_cause(
-    response: ShaftResponse,
-) -> None:
+def test_a_small_change_or_one_without_response_or_readings_has_no_cause(response):
     shares = [put_down(response, 0, seed, film={0: 0.995}) for seed in range(3, 6)]
     assert {found.cause for found in shares} <= {Cause.UNKNOWN, Cause.FILM}
     assert any(found.cause is Cause.UNKNOWN for found in shares)
@@ -212,7 +202,7 @@ def learned(seed: int, outliers: float = 0.0) -> ShaftResponse:
     return found
 
 
-def test_shares_follow_from_stiffness_and_wrong_or_too_few_readings_teach_nothing() -> None:
+def test_shares_follow_from_stiffness_and_wrong_or_too_few_readings_teach_nothing():
     ln_k, ln_shaft = film_columns(histories(2))
     left = ln_shaft - np.mean(ln_shaft, axis=0) - learned(1).expected(ln_k)
     assert np.std(left) == pytest.approx(0.01, rel=0.2)
@@ -223,8 +213,8 @@ def test_shares_follow_from_stiffness_and_wrong_or_too_few_readings_teach_nothin
     assert learn_response(histories(1), np.arange(N_POINTS) < 500) is None
 
 
-def test_a_response_needs_bearings_read_at_the_same_times() -> None:
+def test_a_response_needs_bearings_read_at_the_same_times():
     found = histories(1)
     found["LJB"] = replace(found["LJB"], time_ns=found["LJB"].time_ns + 1)
-    with pytest.raises(ValueError, match="LJB are not at the times"):
+    with pytest.raises(ValueError, match="LJB must be at the times"):
         learn_response(found, np.ones(N_POINTS, np.bool_))

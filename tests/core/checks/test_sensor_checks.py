@@ -32,7 +32,7 @@ def judged(samples: npt.NDArray[np.floating], turning: bool = True) -> Quality:
     return signal_quality(rms, float(counts.mean()), MM_S_PER_COUNT, turning, LIMITS)
 
 
-def test_of_eight_samples_or_more_a_healthy_channel_moves_by_more_than_a_count() -> None:
+def test_of_eight_samples_or_more_a_healthy_channel_moves_by_more_than_a_count():
     time_s = np.arange(N_SAMPLES) / 600.0
     assert judged(0.002 * np.sin(2 * np.pi * 1.538 * time_s)) == GOOD
     assert judged(0.001 * RANDOM.standard_normal(N_SAMPLES)) == GOOD
@@ -44,7 +44,7 @@ def test_of_eight_samples_or_more_a_healthy_channel_moves_by_more_than_a_count()
 
 
 @pytest.mark.parametrize("from_sample", [1000, 4000, 7168])
-def test_a_channel_that_stops_within_a_segment_is_seen_in_that_segment(from_sample: int) -> None:
+def test_a_channel_that_stops_within_a_segment_is_seen_in_that_segment(from_sample):
     signal = 0.1 * RANDOM.standard_normal(N_SAMPLES)
     signal[from_sample:] = signal[from_sample]
     assert judged(signal).reason is not Reason.OK
@@ -60,9 +60,7 @@ def test_a_channel_that_stops_within_a_segment_is_seen_in_that_segment(from_samp
         (0.2, 1900.0, -0.15, GOOD),
     ],
 )
-def test_a_resolution_may_be_unknown_or_negative(
-    rms: float, mean: float, per_count: float, quality: Quality
-) -> None:
+def test_a_resolution_may_be_unknown_or_negative(rms, mean, per_count, quality):
     assert signal_quality(rms, mean, per_count, True, LIMITS) == quality
 
 
@@ -81,13 +79,11 @@ NEAR = 2180.0 + 100.0 * np.sin(2 * np.pi * TURNS)  # up to 2280 µm, where the l
     ],
     ids=["vibrates near a limit", "beyond it", "loses contact", "fails at the end", "half a turn"],
 )
-def test_ok_limits_are_of_the_level_and_not_of_the_vibration(
-    samples: npt.NDArray[np.floating], expected: Quality
-) -> None:
+def test_ok_limits_are_of_the_level_and_not_of_the_vibration(samples, expected):
     assert level_quality(samples, 390, (-2250.0, 2250.0)) == expected
 
 
-def test_the_share_of_clipped_samples_is_counted_at_both_ends() -> None:
+def test_the_share_of_clipped_samples_is_counted_at_both_ends():
     counts = np.array([0.0, 32767.0, -32768.0, -32767.0, 32766.0])
     assert clipped_share(0.15 * counts, 0.15) == 0.4
     assert clipped_share(-0.15 * counts, -0.15) == 0.4
@@ -101,13 +97,13 @@ def share(x: complex, y: complex) -> float:
     ("x", "y", "expected"),
     [(1, -1j, 0.0), (1, 1j, 1.0), (1, 1, 0.5), (1, 0, 0.5), (0, 0, 0.5), (2, -1j, 0.1)],
 )
-def test_the_share_of_an_orbit_that_turns_backward(x: complex, y: complex, expected: float) -> None:
+def test_the_share_of_an_orbit_that_turns_backward(x, y, expected):
     turned = np.exp(0.7j)
     assert share(x, y) == pytest.approx(expected)
     assert share(x * turned, y * turned) == pytest.approx(expected)
 
 
-def test_swapped_axes_turn_an_orbit_against_the_shaft() -> None:
+def test_swapped_axes_turn_an_orbit_against_the_shaft():
     forward, swapped = share(2, -1j), share(-1j, 2)
     assert axes_quality(forward, 1, LIMITS) == GOOD
     assert axes_quality(swapped, 1, LIMITS) == uncertain(Reason.SWAPPED_AXES)
@@ -116,7 +112,7 @@ def test_swapped_axes_turn_an_orbit_against_the_shaft() -> None:
     assert axes_quality(share(1, 0.2), 1, LIMITS) == GOOD
 
 
-def test_a_speed_no_turbine_reaches_is_none_and_one_that_the_1x_line_contradicts_in_doubt() -> None:
+def test_a_speed_no_turbine_reaches_is_none_and_one_that_the_1x_line_contradicts_in_doubt():
     for speed_rpm in (-5.0, 300.0, 65535.0):
         checked = checked_speed(Reading(speed_rpm), None, 92.3, LIMITS)
         assert checked == missing(Reason.SPEED_IMPLAUSIBLE)
@@ -135,7 +131,7 @@ STILL = np.full(24, 92.3)
 FULL = np.full(24, 700.0)
 
 
-def test_ordinary_wander_is_stationary_and_a_load_change_or_a_run_down_is_not() -> None:
+def test_ordinary_wander_is_stationary_and_a_load_change_or_a_run_down_is_not():
     swing = np.sin(np.arange(24.0))
     assert stationarity(92.3 * (1 + 0.003 * swing), FULL + 8 * swing, LIMITS) == GOOD
     assert stationarity(STILL, 2.0 * swing, LIMITS, 700.0) == GOOD
@@ -147,7 +143,7 @@ def test_ordinary_wander_is_stationary_and_a_load_change_or_a_run_down_is_not() 
     assert stationarity(STILL, some, LIMITS) == moved
 
 
-def test_a_load_change_is_a_share_of_the_rated_power_and_an_unknown_load_is_not_steady() -> None:
+def test_a_load_change_is_a_share_of_the_rated_power_and_an_unknown_load_is_not_steady():
     """Two thirds of a 15 MW unit's power are 10 MW."""
     moved, unknown = uncertain(Reason.NON_STATIONARY), uncertain(Reason.POWER_UNKNOWN)
     small = np.linspace(15.0, 5.0, 24)

@@ -51,7 +51,7 @@ def standard(reading: Reading) -> float:
     return math.hypot(reading.u_random, reading.u_systematic)
 
 
-def test_four_probes_tell_displacement_from_growth_and_two_say_what_they_take_for_it() -> None:
+def test_four_probes_tell_displacement_from_growth_and_two_say_what_they_take_for_it():
     centre = located(*gaps(60.0, -80.0, 35.0), CLEARANCE_UM)
 
     assert number(centre.shaft_centre_x_um) == pytest.approx(60.0)
@@ -72,7 +72,7 @@ def test_four_probes_tell_displacement_from_growth_and_two_say_what_they_take_fo
 
 
 @pytest.mark.parametrize("lost", ["near_x", "far_x", "near_y", "far_y"])
-def test_a_lost_probe_of_four_costs_certainty_and_no_more(lost: str) -> None:
+def test_a_lost_probe_of_four_costs_certainty_and_no_more(lost):
     whole = located(*gaps(60.0, -80.0, 35.0), CLEARANCE_UM)
     fewer = located(*gaps(60.0, -80.0, 35.0, (lost,)), CLEARANCE_UM)
 
@@ -83,7 +83,7 @@ def test_a_lost_probe_of_four_costs_certainty_and_no_more(lost: str) -> None:
     assert standard(fewer.eccentricity_ratio) > standard(whole.eccentricity_ratio)
 
 
-def test_without_any_pair_the_last_known_growth_stands_in_and_may_have_changed() -> None:
+def test_without_any_pair_the_last_known_growth_stands_in_and_may_have_changed():
     axes = gaps(60.0, -80.0, 35.0, ("far_x", "near_y"))
     never = located(*axes, CLEARANCE_UM)
     lately = located(*axes, CLEARANCE_UM, last_growth=Growth(35.0, 5.0))
@@ -99,7 +99,7 @@ def test_without_any_pair_the_last_known_growth_stands_in_and_may_have_changed()
     )
 
 
-def test_a_doubtful_gap_or_an_axis_without_probes_leaves_what_is_known_without_it() -> None:
+def test_a_doubtful_gap_or_an_axis_without_probes_leaves_what_is_known_without_it():
     centre = located(*gaps(60.0, -80.0, 0.0, ("near_x", "far_x")), CLEARANCE_UM)
 
     assert number(centre.shaft_centre_y_um) == pytest.approx(-80.0)
@@ -114,7 +114,7 @@ def test_a_doubtful_gap_or_an_axis_without_probes_leaves_what_is_known_without_i
     assert centre.shaft_centre_y_um.quality.reason is Reason.OK
 
 
-def test_a_centred_shaft_has_an_eccentricity_of_zero_and_any_angle() -> None:
+def test_a_centred_shaft_has_an_eccentricity_of_zero_and_any_angle():
     centre = located(*gaps(0.0, 0.0), CLEARANCE_UM)
 
     assert number(centre.eccentricity_ratio) == 0.0
@@ -124,7 +124,7 @@ def test_a_centred_shaft_has_an_eccentricity_of_zero_and_any_angle() -> None:
     assert centre.attitude_angle_deg.u_systematic == pytest.approx(103.9, abs=0.1)
 
 
-def test_scatter_of_a_gap_is_kept_apart_from_what_is_always_wrong() -> None:
+def test_scatter_of_a_gap_is_kept_apart_from_what_is_always_wrong():
     x, y = gaps(60.0, -80.0)
     noisy = replace(x, near=replace(x.near, u_random=4.0))
     centre = located(noisy, y, CLEARANCE_UM)
@@ -167,7 +167,7 @@ def drawn(random: np.random.Generator, lost: tuple[str, ...]) -> tuple[Any, floa
     [(), ("near_x",), ("far_x",), ("near_y",), ("far_y",), ("far_x", "far_y")],
     ids=lambda lost: "+".join(lost) or "none",
 )
-def test_eccentricity_and_angle_stay_within_their_stated_uncertainty(lost: tuple[str, ...]) -> None:
+def test_eccentricity_and_angle_stay_within_their_stated_uncertainty(lost):
     random = np.random.default_rng(11)
     n_runs, inside, off, widths = 1000, np.zeros(2), [], []
     for _ in range(n_runs):

@@ -20,7 +20,7 @@ RESPONSES: dict[str, Response] = {
 }
 
 
-def test_a_half_hertz_corner_passes_0_61_of_the_vortex_line() -> None:
+def test_a_half_hertz_corner_passes_0_61_of_the_vortex_line():
     passed = HighPass(0.5).at(np.array([92.3 / 60.0 / 4.0]))[0]
 
     assert abs(passed) == pytest.approx(0.61, abs=0.001)
@@ -36,16 +36,14 @@ def test_a_half_hertz_corner_passes_0_61_of_the_vortex_line() -> None:
         (Resonance(0.5, 0.1), 5.0, -90.0),
     ],
 )
-def test_responses_at_their_own_frequency(
-    response: Response, magnitude: float, phase_deg: float
-) -> None:
+def test_responses_at_their_own_frequency(response, magnitude, phase_deg):
     factor = response.at(np.array([0.5]))[0]
 
     assert abs(factor) == pytest.approx(magnitude)
     assert math.degrees(cmath.phase(factor)) == pytest.approx(phase_deg)
 
 
-def test_responses_are_one_where_the_transducer_is_made_for_and_a_chain_multiplies_them() -> None:
+def test_responses_are_one_where_the_transducer_is_made_for_and_a_chain_multiplies_them():
     far_above, far_below = np.array([500.0]), np.array([0.05])
 
     assert HighPass(0.5).at(far_above)[0] == pytest.approx(1.0, abs=1e-3)
@@ -60,7 +58,7 @@ def test_responses_are_one_where_the_transducer_is_made_for_and_a_chain_multipli
     assert ResponseChain(()).at(FREQUENCY_HZ) == pytest.approx(np.ones(200))
 
 
-def test_a_sheet_is_met_at_its_points_and_between_them_a_phase_goes_the_short_way_round() -> None:
+def test_a_sheet_is_met_at_its_points_and_between_them_a_phase_goes_the_short_way_round():
     at_points = SHEET.at(np.array(SHEET.frequency_hz))
     everywhere = SHEET.at(FREQUENCY_HZ)
 
@@ -80,7 +78,7 @@ def test_a_sheet_is_met_at_its_points_and_between_them_a_phase_goes_the_short_wa
 
 @pytest.mark.parametrize("measurand", [m for m in Measurand if m != Measurand.KEY_PHASE_V])
 @pytest.mark.parametrize("name", RESPONSES)
-def test_the_analysis_takes_out_what_the_transducer_put_in(name: str, measurand: Measurand) -> None:
+def test_the_analysis_takes_out_what_the_transducer_put_in(name, measurand):
     plain = Channel("vx", measurand, -1)
     real = Channel("vx", measurand, -1, RESPONSES[name])
 

@@ -1,7 +1,7 @@
 """The unit monitor: from sample blocks to assessments, and what it refuses to say."""
 
 import gc
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +19,6 @@ from core.spectra.speed import SpeedSource
 
 RATE_HZ = 600.0
 HOP, SEGMENT = 7168, 8192
-Results = Callable[..., list[Assessment]]
 
 
 def watch(monitor: UnitMonitor, stream: Sequence[SampleBlock]) -> list[Assessment]:
@@ -34,9 +33,7 @@ def monitor(unit: Unit) -> UnitMonitor:
 GAPS_UM = (1950.0, 2060.0)
 
 
-def test_results_come_with_each_hop_however_the_samples_are_cut(
-    monitor: UnitMonitor, blocks, signals, results: Results
-) -> None:
+def test_results_come_with_each_hop_however_the_samples_are_cut(monitor, blocks, signals, results):
     rows, counts, single = signals(60.0), [], []
     for block in blocks(rows, n_each=1):
         if found := monitor.ingest(block):
@@ -50,9 +47,7 @@ def test_results_come_with_each_hop_however_the_samples_are_cut(
         assert [a.time_ns for a in other] == pytest.approx([a.time_ns for a in single], abs=1)
 
 
-def test_the_machine_reads_its_stiffness_its_position_and_its_orbit(
-    results: Results, signals
-) -> None:
+def test_the_machine_reads_its_stiffness_its_position_and_its_orbit(results, signals):
     *few, newest = results(signals(60.0, gaps_um=GAPS_UM))
     value = {name: reading.value for name, reading in newest.readings.items()}
     assert value["order1_shaft_x_um_pk"] == pytest.approx(60.0, rel=1e-3)
@@ -77,8 +72,8 @@ def test_the_machine_reads_its_stiffness_its_position_and_its_orbit(
 
 
 def test_what_a_result_was_made_of_goes_at_once_without_a_search_for_cycles(
-    monitor: UnitMonitor, blocks, signals
-) -> None:
+    monitor, blocks, signals
+):
     """The arrays of one evaluation are a megabyte: twenty units fill 60 MiB between searches."""
     stream = list(blocks(signals(40.0)))
     gc.collect()
@@ -90,7 +85,7 @@ def test_what_a_result_was_made_of_goes_at_once_without_a_search_for_cycles(
         gc.enable()
 
 
-def test_a_vortex_off_its_nominal_order_is_found_and_read_true(results: Results, signals) -> None:
+def test_a_vortex_off_its_nominal_order_is_found_and_read_true(results, signals):
     rows = signals(90.0)
     rope = 2 * np.pi * 0.283 * 92.3 / 60 * np.arange(rows.shape[1]) / RATE_HZ
     rows[0] -= 68.0 * np.cos(rope)
@@ -102,9 +97,7 @@ def test_a_vortex_off_its_nominal_order_is_found_and_read_true(results: Results,
 
 
 @pytest.mark.parametrize("coherent_um", [0.0, 2.0], ids=["noise alone", "hydraulic noise"])
-def test_without_a_vortex_there_is_no_vortex_quantity(
-    results: Results, signals, coherent_um: float
-) -> None:
+def test_without_a_vortex_there_is_no_vortex_quantity(results, signals, coherent_um):
     """Full load: hydraulic noise moves shaft and bearing together at every frequency."""
     rows = signals(90.0, noise_um=1.0)
     common = coherent_um * np.random.default_rng(8).normal(size=rows.shape[1])
@@ -116,7 +109,7 @@ def test_without_a_vortex_there_is_no_vortex_quantity(
     assert found[-1].readings["order1_k_eff_xx_n_per_m"].value is not None
 
 
-def test_a_few_segments_give_no_preferred_stiffness(results: Results, signals) -> None:
+def test_a_few_segments_give_no_preferred_stiffness(results, signals):
     """One segment makes any noise coherent."""
     found = results(signals(90.0))
     for axes in ("xx", "yy"):
@@ -127,9 +120,7 @@ def test_a_few_segments_give_no_preferred_stiffness(results: Results, signals) -
 
 
 @pytest.mark.parametrize("order", [0.16, 0.47])
-def test_a_line_beside_the_vortex_band_is_told_and_is_no_vortex(
-    results: Results, signals, order: float
-) -> None:
+def test_a_line_beside_the_vortex_band_is_told_and_is_no_vortex(results, signals, order):
     rows = signals(90.0, noise_um=1.0)
     rope = 2 * np.pi * order * 92.3 / 60 * np.arange(rows.shape[1]) / RATE_HZ
     rows[0] -= 30.0 * np.cos(rope)
@@ -143,7 +134,7 @@ def test_a_line_beside_the_vortex_band_is_told_and_is_no_vortex(
 
 
 @pytest.mark.parametrize("n_seeds", fast_and_long(8, 100))
-def test_transducer_noise_alone_never_makes_a_stiffness(results: Results, n_seeds: int) -> None:
+def test_transducer_noise_alone_never_makes_a_stiffness(results, n_seeds):
     """A standing machine whose speed channel still says 92.3."""
     for seed in range(n_seeds):
         rng = np.random.default_rng(seed)
@@ -154,9 +145,7 @@ def test_transducer_noise_alone_never_makes_a_stiffness(results: Results, n_seed
 
 
 @pytest.mark.parametrize("spoiled", [np.nan, np.inf, -np.inf])
-def test_one_nan_does_not_blind_the_other_channels(
-    results: Results, signals, spoiled: float
-) -> None:
+def test_one_nan_does_not_blind_the_other_channels(results, signals, spoiled):
     rows = signals(14.0)
     rows[2, 5000] = spoiled
     readings = results(rows)[-1].readings
@@ -165,8 +154,8 @@ def test_one_nan_does_not_blind_the_other_channels(
 
 
 def test_a_standing_machine_has_no_orders_and_the_line_gives_a_speed_that_nobody_measures(
-    results: Results, signals
-) -> None:
+    results, signals
+):
     newest = results(signals(14.0), speed_rpm=0.0)[-1]
     assert newest.readings["speed_rpm"].quality == bad(Reason.STANDSTILL)
     assert newest.readings["order1_k_eff_xx_n_per_m"].quality == bad(Reason.STANDSTILL)
@@ -179,9 +168,7 @@ def test_a_standing_machine_has_no_orders_and_the_line_gives_a_speed_that_nobody
     assert newest.readings["order1_shaft_x_um_pk"].quality.reason is Reason.SPEED_UNKNOWN
 
 
-def test_what_came_before_an_outage_or_a_restart_is_in_no_average_after_it(
-    unit: Unit, blocks, signals
-) -> None:
+def test_what_came_before_an_outage_or_a_restart_is_in_no_average_after_it(unit, blocks, signals):
     before = list(blocks(signals(60.0)))
     for anew, restarts in (({"first_index": 10**6}, 0), ({"epoch": 2}, 1)):
         monitor = UnitMonitor(unit, AnalysisSettings(n_segments=4))
@@ -192,9 +179,7 @@ def test_what_came_before_an_outage_or_a_restart_is_in_no_average_after_it(
         assert monitor.account.n_restarts == restarts
 
 
-def test_a_lost_probe_is_never_shown_as_zero_micrometres(
-    monitor: UnitMonitor, blocks, signals
-) -> None:
+def test_a_lost_probe_is_never_shown_as_zero_micrometres(monitor, blocks, signals):
     rows = signals(120.0)
     stream = list(blocks(rows))
     lost = rows.shape[1] // 120  # from half way on the x probe is dead
@@ -220,9 +205,7 @@ def test_a_lost_probe_is_never_shown_as_zero_micrometres(
     assert newest["order1_bearing_x_um_pk"].value == pytest.approx(20.0, rel=2e-3)
 
 
-def test_a_gap_voids_the_segment_it_touches_and_counts_it(
-    monitor: UnitMonitor, blocks, signals
-) -> None:
+def test_a_gap_voids_the_segment_it_touches_and_counts_it(monitor, blocks, signals):
     stream = list(blocks(signals(120.0)))
     kept = stream[:300] + stream[301:]
     results = watch(monitor, kept)
@@ -237,7 +220,7 @@ def test_a_gap_voids_the_segment_it_touches_and_counts_it(
     assert results[-1].readings["order1_shaft_x_um_pk"].value == pytest.approx(60.0, rel=1e-3)
 
 
-def test_foreign_blocks_are_refused_naming_both(monitor: UnitMonitor, blocks, signals) -> None:
+def test_foreign_blocks_are_refused_naming_both(monitor, blocks, signals):
     block = next(blocks(signals(1.0)))
     with pytest.raises(ValueError, match="unit 'U1', got 'U2'"):
         monitor.ingest(of_unit(block, unit="U2"))
@@ -247,8 +230,8 @@ def test_foreign_blocks_are_refused_naming_both(monitor: UnitMonitor, blocks, si
 
 @pytest.mark.parametrize(("reason", "is_estimated"), [("torn", False), (UNCOUNTED_LOSS, True)])
 def test_what_was_refused_is_missing_too_and_is_recorded_as_a_gap(
-    monitor: UnitMonitor, blocks, signals, reason: str, is_estimated: bool
-) -> None:
+    monitor, blocks, signals, reason, is_estimated
+):
     first, *others = list(blocks(signals(14.0)))[:4]
     late = replace(others[-1], rejected=(Rejection(reason, 7),))
     for block in (first, late):

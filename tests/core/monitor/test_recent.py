@@ -20,7 +20,6 @@ HOP, SEGMENT = 7168, 8192
 DELAYS_S = (0.0, 1.0, 10.0, 15.0)
 WITHIN_S = 30.0
 
-Signals = Callable[..., FloatArray]
 Blocks = Callable[..., Iterator[SampleBlock]]
 
 
@@ -52,8 +51,8 @@ EVERY = [(late_s, factor) for late_s in np.arange(0.5, 12.5) for factor in (1.7,
 
 @pytest.mark.parametrize("steps", fast_and_long([(0.5, 1.7), (7.5, 3.0)], EVERY))
 def test_a_step_of_the_shafts_vibration_is_an_alarm_within_half_a_minute_and_its_delay(
-    unit: Unit, blocks: Blocks, signals: Signals, steps: list[tuple[float, float]]
-) -> None:
+    unit, blocks, signals, steps
+):
     kinds = [f"{name}_shaft_{axis}" for name in ("order1", "overall") for axis in "xy"]
     for late_s, factor in steps:
         step_s, rows = 24.0 + late_s, signals(85.0)
@@ -67,9 +66,7 @@ def test_a_step_of_the_shafts_vibration_is_an_alarm_within_half_a_minute_and_its
             assert delay_s <= after_s <= delay_s + WITHIN_S, (late_s, kind)
 
 
-def test_a_bump_that_is_shorter_than_the_delay_is_no_alarm(
-    unit: Unit, blocks: Blocks, signals: Signals
-) -> None:
+def test_a_bump_that_is_shorter_than_the_delay_is_no_alarm(unit, blocks, signals):
     rows = signals(60.0)
     bump = rows[:2, 30 * 600 : 32 * 600]
     bump += 2.0 * (bump - 2000.0)
@@ -82,8 +79,8 @@ def test_a_bump_that_is_shorter_than_the_delay_is_no_alarm(
 
 
 def test_what_is_known_of_just_now_is_what_the_average_reads_of_a_steady_shaft(
-    unit: Unit, blocks: Blocks, signals: Signals
-) -> None:
+    unit, blocks, signals
+):
     monitor = UnitMonitor(unit, AnalysisSettings())
     results = [a for block in blocks(signals(40.0)) for a in monitor.ingest(block)]
 
@@ -98,7 +95,7 @@ def test_what_is_known_of_just_now_is_what_the_average_reads_of_a_steady_shaft(
 
 
 @pytest.mark.parametrize(("turn_samples", "n_parts"), [(390.0, 4), (600.0, 2), (3000.0, 1)])
-def test_parts_cover_what_is_new_and_have_turns_enough(turn_samples: float, n_parts: int) -> None:
+def test_parts_cover_what_is_new_and_have_turns_enough(turn_samples, n_parts):
     start, stop = parts_of(SEGMENT, HOP, turn_samples)
 
     assert (stop.size, stop[-1]) == (n_parts, SEGMENT)

@@ -23,7 +23,7 @@ def block(first_index: int, n_samples: int, epoch: int = 1, **changes: object) -
 
 
 @given(st.lists(st.integers(1, 60), min_size=1, max_size=20), st.integers(0, 10**9))
-def test_the_ring_equals_the_tail_of_all_that_was_written(sizes: list[int], start: int) -> None:
+def test_the_ring_equals_the_tail_of_all_that_was_written(sizes, start):
     ring, index = Ring(2, CAPACITY), start
     for size in sizes:
         assert ring.write(block(index, size)) is None
@@ -40,9 +40,7 @@ STEPS = st.tuples(st.integers(1, 30), st.integers(0, 50), st.integers(0, 5), st.
 
 
 @given(st.lists(STEPS, min_size=1, max_size=30))
-def test_every_offered_sample_is_stored_flagged_missing_or_rejected(
-    steps: list[tuple[int, int, int, bool]],
-) -> None:
+def test_every_offered_sample_is_stored_flagged_missing_or_rejected(steps):
     ring, index, gaps, good_samples = Ring(2, CAPACITY), 0, 0, 0
     ring.write(block(0, 1))
     index, rejected = 1, 0
@@ -60,13 +58,13 @@ def test_every_offered_sample_is_stored_flagged_missing_or_rejected(
     assert account.n_stored == 1 + good_samples
 
 
-def test_a_gap_is_exact_and_repeated_samples_are_dropped_and_counted() -> None:
+def test_a_gap_is_exact_and_repeated_samples_are_dropped_and_counted():
     ring = Ring(2, CAPACITY)
     ring.write(block(100, 10))
     assert ring.write(block(117, 5)) == Gap(1, 110, 7, 117 * 10**7)
     assert ring.holds(117, 122)
     assert not ring.holds(109, 122)
-    with pytest.raises(LookupError, match="109 to 122"):
+    with pytest.raises(LookupError, match="109 to 121"):
         ring.read(109, 122)
     ring = Ring(2, CAPACITY)
     ring.write(block(0, 10))
@@ -77,7 +75,7 @@ def test_a_gap_is_exact_and_repeated_samples_are_dropped_and_counted() -> None:
     np.testing.assert_array_equal(ring.read(0, 15).samples[0], np.arange(15))
 
 
-def test_a_restarted_device_begins_a_new_count_without_a_giant_gap() -> None:
+def test_a_restarted_device_begins_a_new_count_without_a_giant_gap():
     ring = Ring(2, CAPACITY)
     ring.write(block(4_000_000_000, 10))
     later_ns = 4_000_000_100 * 10**7
@@ -90,7 +88,7 @@ def test_a_restarted_device_begins_a_new_count_without_a_giant_gap() -> None:
     assert not ring.holds(0, 6)  # the rest are old samples of another epoch
 
 
-def test_a_window_has_the_worst_quality_and_the_mean_of_slow_readings_that_half_of_it_has() -> None:
+def test_a_window_has_the_worst_quality_and_the_mean_of_slow_readings_that_half_of_it_has():
     ring = Ring(2, CAPACITY)
     clipped = (bad(Reason.CLIPPED), GOOD)
     ring.write(block(0, 10, channel_quality=clipped, slow={"oil": Reading(99.0)}))
@@ -110,7 +108,7 @@ def test_a_window_has_the_worst_quality_and_the_mean_of_slow_readings_that_half_
     assert (slow["oil"].value, slow["power"]) == (45.0, missing(Reason.NOT_MEASURED))
 
 
-def test_a_count_that_was_found_and_not_begun_says_nothing_of_what_is_missing() -> None:
+def test_a_count_that_was_found_and_not_begun_says_nothing_of_what_is_missing():
     """As of a counter that went on while whoever reads it began again."""
     ring = Ring(2, CAPACITY)
     ring.write(block(0, 10))
@@ -120,7 +118,7 @@ def test_a_count_that_was_found_and_not_begun_says_nothing_of_what_is_missing() 
     assert ring.holds(40_000, 40_010)
 
 
-def test_what_was_rejected_before_a_block_counts_once_and_before_the_first_never() -> None:
+def test_what_was_rejected_before_a_block_counts_once_and_before_the_first_never():
     ring = Ring(2, CAPACITY)
     ring.write(block(0, 10))
     torn = block(15, 10, rejected=(Rejection("torn", 5),))
@@ -135,7 +133,7 @@ def test_what_was_rejected_before_a_block_counts_once_and_before_the_first_never
 
 
 @pytest.mark.parametrize("refused", [(5,), (1, 4), (2, 7), (9, -1)])
-def test_no_more_is_rejected_than_the_index_leaves_room_for(refused: tuple[int, ...]) -> None:
+def test_no_more_is_rejected_than_the_index_leaves_room_for(refused):
     ring = Ring(2, CAPACITY)
     ring.write(block(0, 10))
     named = tuple(Rejection(f"reason {n}", count) for n, count in enumerate(refused))
@@ -145,6 +143,6 @@ def test_no_more_is_rejected_than_the_index_leaves_room_for(refused: tuple[int, 
     assert min(account.rejected.values()) > 0
 
 
-def test_a_block_with_other_channels_is_refused_naming_both() -> None:
+def test_a_block_with_other_channels_is_refused_naming_both():
     with pytest.raises(ValueError, match="3 channels, got 2"):
         Ring(3, CAPACITY).write(block(0, 10))

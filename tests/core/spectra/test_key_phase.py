@@ -54,7 +54,7 @@ def edges_of(signal: FloatArray) -> list[int]:
 
 @pytest.mark.parametrize("speed_rpm", [60.0, 76.6, 92.3, 90.909, 120.0, 143.7, 150.0])
 @pytest.mark.parametrize("angle_rad", [0.0, 0.9, 3.3, 6.2])
-def test_clean_pulses_give_angle_and_speed(speed_rpm: float, angle_rad: float) -> None:
+def test_clean_pulses_give_angle_and_speed(speed_rpm, angle_rad):
     found = read_key_phase(pulses(speed_rpm, angle_rad), RATE_HZ)
 
     assert isinstance(found, KeyPhase)
@@ -64,7 +64,7 @@ def test_clean_pulses_give_angle_and_speed(speed_rpm: float, angle_rad: float) -
 
 
 @pytest.mark.parametrize("speed_rpm", np.linspace(60.0, 150.0, 91).tolist())
-def test_edges_without_slope_still_give_angle_and_speed(speed_rpm: float) -> None:
+def test_edges_without_slope_still_give_angle_and_speed(speed_rpm):
     found = read_key_phase(steps(speed_rpm, 0.9), RATE_HZ)
 
     assert isinstance(found, KeyPhase)
@@ -73,7 +73,7 @@ def test_edges_without_slope_still_give_angle_and_speed(speed_rpm: float) -> Non
     assert found.speed_rpm == pytest.approx(speed_rpm, rel=1.5e-4)
 
 
-def test_edges_lie_between_the_samples_and_are_exact_where_they_slope() -> None:
+def test_edges_lie_between_the_samples_and_are_exact_where_they_slope():
     ramp = np.array([0.0, 0.0, 0.1, 0.7, 1.0, 1.0, 0.0, 0.0, 0.3, 0.9, 1.0, 0.0])
     assert rising_edges(ramp) == pytest.approx([2 + 2 / 3, 8 + 1 / 3])
     # behind an anti-alias filter an edge takes a few samples
@@ -86,7 +86,7 @@ def test_edges_lie_between_the_samples_and_are_exact_where_they_slope() -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_noise_makes_no_pulses_and_hardly_moves_the_angle(seed: int) -> None:
+def test_noise_makes_no_pulses_and_hardly_moves_the_angle(seed):
     noise = 0.1 * np.random.default_rng(seed).normal(size=N_SAMPLES)
     found = read_key_phase(pulses(92.3, 1.0) + noise, RATE_HZ)
     assert isinstance(found, KeyPhase)
@@ -94,7 +94,7 @@ def test_noise_makes_no_pulses_and_hardly_moves_the_angle(seed: int) -> None:
     assert found.speed_rpm == pytest.approx(92.3, rel=1e-4)
 
 
-def test_a_missing_pulse_or_a_pick_up_that_fails_is_no_phase_reference() -> None:
+def test_a_missing_pulse_or_a_pick_up_that_fails_is_no_phase_reference():
     begins = np.array(edges_of(pulses(92.3, 0.9)))[[0, 1, 9, 19, 20]]
     single = [slice(begin - 1, begin + 12) for begin in begins]
     for dead in (*single, slice(0, N_SAMPLES // 2), slice(N_SAMPLES // 2, None)):
@@ -106,14 +106,14 @@ def test_a_missing_pulse_or_a_pick_up_that_fails_is_no_phase_reference() -> None
 @pytest.mark.parametrize(
     ("first", "last"), [(-20, 0), *((after, after + 6) for after in (20, 80, 200, 350))]
 )
-def test_a_pulse_out_of_its_place_is_no_phase_reference(first: int, last: int) -> None:
+def test_a_pulse_out_of_its_place_is_no_phase_reference(first, last):
     signal = pulses(92.3, 0.9)
     begin = edges_of(signal)[7]
     signal[begin + first : begin + last] = 5.0
     assert read_key_phase(signal, RATE_HZ) is None
 
 
-def test_doubled_pulses_and_fast_changes_of_speed_are_no_phase_reference() -> None:
+def test_doubled_pulses_and_fast_changes_of_speed_are_no_phase_reference():
     turns = 92.3 / 60 / RATE_HZ * np.arange(N_SAMPLES)
     twice = (turns % 1.0 < WIDTH_TURNS) | ((turns - 0.3) % 1.0 < WIDTH_TURNS)
     fault = read_key_phase(np.where(twice, 5.0, 0.0), RATE_HZ)
@@ -125,7 +125,7 @@ def test_doubled_pulses_and_fast_changes_of_speed_are_no_phase_reference() -> No
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_without_pulses_noise_is_never_read_as_any(seed: int) -> None:
+def test_without_pulses_noise_is_never_read_as_any(seed):
     noise = np.random.default_rng(seed).normal(size=N_SAMPLES)
     assert read_key_phase(noise, RATE_HZ) is None
 
@@ -133,7 +133,7 @@ def test_without_pulses_noise_is_never_read_as_any(seed: int) -> None:
 @pytest.mark.parametrize(
     "signal", [*(np.full(N_SAMPLES, level_v) for level_v in (0.0, 0.2, 5.0)), pulses(8.0, 0.9)]
 )
-def test_a_shaft_that_stands_or_rolls_slowly_has_too_few_pulses(signal: FloatArray) -> None:
+def test_a_shaft_that_stands_or_rolls_slowly_has_too_few_pulses(signal):
     assert read_key_phase(signal, RATE_HZ) is None
 
 
@@ -149,14 +149,14 @@ def speed(unit: Unit, slow: Reading, pulses_rpm: float | None) -> Speed:
 
 
 @pytest.mark.parametrize("slow", [Reading(92.2), missing(Reason.OUT_OF_RANGE)])
-def test_good_pulses_are_preferred(unit: Unit, slow: Reading) -> None:
+def test_good_pulses_are_preferred(unit, slow):
     found = speed(unit, slow, 92.3)
     assert found.source is SpeedSource.KEY_PHASE
     assert found.rpm == Reading(92.3)
 
 
 @pytest.mark.parametrize("pulses_rpm", [None, 400.0], ids=["none", "no turbine reaches"])
-def test_without_good_pulses_the_speed_channel_counts(unit: Unit, pulses_rpm: float | None) -> None:
+def test_without_good_pulses_the_speed_channel_counts(unit, pulses_rpm):
     found = speed(unit, Reading(92.2), pulses_rpm)
     assert found.source is SpeedSource.SLOW_CHANNEL
     assert found.rpm == Reading(92.2)
@@ -164,9 +164,7 @@ def test_without_good_pulses_the_speed_channel_counts(unit: Unit, pulses_rpm: fl
 
 
 @pytest.mark.parametrize("pulses_rpm", [184.6, 80.0])
-def test_pulses_that_the_speed_channel_contradicts_are_doubted(
-    unit: Unit, pulses_rpm: float
-) -> None:
+def test_pulses_that_the_speed_channel_contradicts_are_doubted(unit, pulses_rpm):
     found = speed(unit, Reading(92.3), pulses_rpm)
     assert found.source is SpeedSource.KEY_PHASE
     assert found.rpm.quality.level is Level.UNCERTAIN
@@ -174,13 +172,13 @@ def test_pulses_that_the_speed_channel_contradicts_are_doubted(
     assert found.budget is None
 
 
-def test_pulses_far_below_the_rated_speed_are_standstill(unit: Unit) -> None:
+def test_pulses_far_below_the_rated_speed_are_standstill(unit):
     found = speed(unit, missing(Reason.OUT_OF_RANGE), 15.0)
     assert found.source is SpeedSource.KEY_PHASE
     assert found.rpm.quality == bad(Reason.STANDSTILL)
 
 
-def test_the_interval_of_a_speed_by_pulses_holds_the_truth(unit: Unit) -> None:
+def test_the_interval_of_a_speed_by_pulses_holds_the_truth(unit):
     held = []
     for seed in range(200):
         noisy = pulses(92.3, 0.9) + np.random.default_rng(seed).normal(0.0, 0.3, N_SAMPLES)
@@ -194,7 +192,7 @@ def test_the_interval_of_a_speed_by_pulses_holds_the_truth(unit: Unit) -> None:
 
 
 @pytest.mark.parametrize("slow", [Reading(92.3), missing(Reason.OUT_OF_RANGE)])
-def test_the_speed_of_a_line_is_as_uncertain_as_the_line_is_weak(unit: Unit, slow: Reading) -> None:
+def test_the_speed_of_a_line_is_as_uncertain_as_the_line_is_weak(unit, slow):
     bins = (FREQUENCY_HZ - 92.3 / 60.0) * 8192 / 600.0
     power = NO_LINE + 1e4 * (np.sinc(bins) / (1.0 - bins**2)) ** 2  # Hann's main lobe
     found = running_speed(unit, {"speed": slow}, FREQUENCY_HZ, power, AnalysisSettings())

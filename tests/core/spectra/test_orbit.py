@@ -37,8 +37,8 @@ def on_ellipse(
     sense=st.sampled_from([-1, 1]),
 )
 def test_an_ellipse_comes_back_with_its_axes_its_angle_and_its_sense(
-    major: float, roundness: float, angle_deg: float, sense: int
-) -> None:
+    major, roundness, angle_deg, sense
+):
     x, y = on_ellipse(major, roundness * major, angle_deg, sense)
 
     phasors = [order_phasors(each, RATE_HZ, TURN_HZ)[MIDDLE] for each in (x, y)]
@@ -51,14 +51,14 @@ def test_an_ellipse_comes_back_with_its_axes_its_angle_and_its_sense(
     assert abs(off_deg) < 0.2 / (1.0 - roundness)
 
 
-def test_a_straight_line_has_no_sense() -> None:
+def test_a_straight_line_has_no_sense():
     found = ellipse_of(3.0 + 0.0j, 4.0 + 0.0j)
 
     assert (found.major_um_pk, found.minor_um_pk, found.sense) == pytest.approx((5.0, 0.0, 0))
     assert found.angle_deg == pytest.approx(math.degrees(math.atan2(4.0, 3.0)))
 
 
-def test_running_speed_alone_is_left_of_a_motion_with_vortex_harmonic_and_noise() -> None:
+def test_running_speed_alone_is_left_of_a_motion_with_vortex_harmonic_and_noise():
     x, _ = on_ellipse(60.0, 40.0, 20.0, 1)
     random = np.random.default_rng(1)
     disturbed = x + 80.0 * np.sin(2.0 * np.pi * 0.25 * TURN_HZ * T)
@@ -70,7 +70,7 @@ def test_running_speed_alone_is_left_of_a_motion_with_vortex_harmonic_and_noise(
     assert np.max(np.abs(alone[inner] - x[inner])) < 1.5
 
 
-def test_a_motion_that_grows_is_followed_across_short_holes_and_not_across_long_ones() -> None:
+def test_a_motion_that_grows_is_followed_across_short_holes_and_not_across_long_ones():
     x, _ = on_ellipse(60.0, 40.0, 0.0, 1)
 
     size = np.abs(order_phasors(x * np.linspace(0.5, 1.5, T.size), RATE_HZ, TURN_HZ))
@@ -94,7 +94,7 @@ def pulses(turns: FloatArray) -> FloatArray:
     return np.where(turns % 1.0 < 0.02, 5.0, 0.0)
 
 
-def test_marks_lie_where_the_pulses_begin_also_before_and_behind_a_hole() -> None:
+def test_marks_lie_where_the_pulses_begin_also_before_and_behind_a_hole():
     marks = marks_of(pulses(TURN_HZ * T + 0.25))
 
     expected = (np.arange(1, marks.size + 1) - 0.25) / TURN_HZ * RATE_HZ
@@ -135,7 +135,7 @@ def orbit(x: complex, y: complex, n_segments: int = 24) -> CrossSpectrum:
     return spectrum(phasors)
 
 
-def test_x_before_y_is_forward_and_a_straight_line_has_no_sense() -> None:
+def test_x_before_y_is_forward_and_a_straight_line_has_no_sense():
     assert roundness(orbit(2.0, -2.0j), 3) == pytest.approx(1.0)
     assert roundness(orbit(2.0, 2.0j), 3) == pytest.approx(-1.0)
     assert roundness(orbit(-1.0j, 1.0), 3) == pytest.approx(-1.0)  # exchanged
@@ -154,7 +154,7 @@ def with_line(phasors: ComplexArray, line: int, size: float, rows: slice) -> Com
     return changed
 
 
-def test_a_vortex_is_a_shared_line_and_neither_a_flank_nor_nothing() -> None:
+def test_a_vortex_is_a_shared_line_and_neither_a_flank_nor_nothing():
     shared = with_line(noise(1), 5, 10.0, slice(None))
     louder_in_one_probe = with_line(shared, 8, 30.0, slice(0, 1))
     silent, moving = noise(1), with_line(noise(2), 6, 10.0, slice(None))

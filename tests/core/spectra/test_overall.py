@@ -1,5 +1,6 @@
-"""Broad-band vibration and 1× phases, read off signals whose values are known."""
+"""Overall values of shafts and bearings, and runout that is taken off by the angle of the shaft."""
 
+import cmath
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -10,12 +11,14 @@ import pytest
 from rigs.blocks import given_block
 
 from core.arrays import FloatArray
-from core.machine.channel import Channel, Measurand
+from core.machine.channel import Channel, Measurand, SlowRollVector
 from core.machine.response import HighPass
 from core.machine.unit import Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
-from core.quality import GOOD, Reading, Reason, bad
+from core.quality import GOOD, Reading, Reason, bad, uncertain
+from core.spectra.runout import RunoutVerdict, take_off_runout, without_runout
+from core.spectra.speed import KeyPhase, Speed, SpeedSource
 
 RATE_HZ, N = 600.0, 2 * 8192
 TIME_S = np.arange(N) / RATE_HZ
@@ -64,9 +67,7 @@ def velocity(unit: Unit, measure: Measure) -> Callable[..., float | None]:
     return read
 
 
-def test_a_shaft_is_measured_from_peak_to_peak_and_by_its_farthest_excursion(
-    measure: Measure,
-) -> None:
+def test_a_shaft_is_measured_from_peak_to_peak_and_by_its_farthest_excursion(measure):
     both = tone(60.0, TURN_HZ) + tone(15.0, 3 * TURN_HZ)
     found = measure(2000.0 + both, 2000.0 + tone(40.0, 7.3), 0 * TIME_S, 0 * TIME_S)
 
@@ -87,16 +88,12 @@ def test_a_shaft_is_measured_from_peak_to_peak_and_by_its_farthest_excursion(
         (Measurand.DISPLACEMENT_UM, 1e3 / (2 * math.pi * 20.0)),
     ],
 )
-def test_a_bearing_has_the_same_velocity_whatever_measures_it(
-    velocity: Callable[..., float], measurand: Measurand, per_velocity: float
-) -> None:
+def test_a_bearing_has_the_same_velocity_whatever_measures_it(velocity, measurand, per_velocity):
     found = velocity(tone(3.0 * per_velocity, 20.0), measurand)
     assert found == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
 
 
-def test_velocity_has_the_power_of_its_band_after_what_the_transducer_takes_away(
-    velocity: Callable[..., float],
-) -> None:
+def test_velocity_has_the_power_of_its_band_after_what_the_transducer_takes_away(velocity):
     noise = np.random.default_rng(4).normal(size=N)  # mm/s, white up to 300 Hz
     assert velocity(noise, Measurand.VELOCITY_MM_S) == pytest.approx(1.0, rel=0.03)
     corner = HighPass(0.5)
@@ -108,9 +105,7 @@ def test_velocity_has_the_power_of_its_band_after_what_the_transducer_takes_away
     assert found == pytest.approx(3.0 / math.sqrt(2.0), rel=1e-3)
 
 
-def test_without_a_displacement_or_a_key_phase_there_is_no_shaft_motion_or_no_phase(
-    measure: Measure, unit: Unit
-) -> None:
+def test_without_a_displacement_or_a_key_phase_there_is_no_shaft_motion_or_no_phase(measure, unit):
     shafts = tuple(Channel(id_, Measurand.VELOCITY_MM_S) for id_ in ("sx", "sy"))
     there = replace(unit, channels=(*shafts, *unit.channels[2:]))
     found = measure(*[tone(60.0, TURN_HZ)] * 4, there=there)
@@ -125,9 +120,7 @@ def test_without_a_displacement_or_a_key_phase_there_is_no_shaft_motion_or_no_ph
 
 
 @pytest.mark.parametrize("mark_s", [0.0, 0.2, 0.5])
-def test_a_phase_is_the_same_whenever_a_record_begins(
-    measure: Measure, unit: Unit, mark_s: float
-) -> None:
+def test_a_phase_is_the_same_whenever_a_record_begins(measure, unit, mark_s):
     kp = Channel("kp", Measurand.KEY_PHASE_V)
     there = replace(unit, channels=(*unit.channels, kp), key_phase="kp")
     since = 360.0 * TURN_HZ * mark_s  # the shaft's angle at the first sample is less by this
@@ -137,3 +130,71 @@ def test_a_phase_is_the_same_whenever_a_record_begins(
     assert found["order1_shaft_x_phase_deg"].value == pytest.approx(30.0, abs=0.5)
     assert found["order1_shaft_y_phase_deg"].value == pytest.approx(300.0, abs=0.5)
     assert found["order1_bearing_x_phase_deg"].value == pytest.approx(30.0, abs=0.5)
+
+
+VECTOR = SlowRollVector("ujb_shaft_x", "SN 4711", 10.0 * cmath.exp(0.4j), 12.0, 1_790_000_000)
+VIBRATION = 25.0 * cmath.exp(-1.1j)
+"""Relative to the mark on the shaft, as the vector is."""
+
+
+@pytest.mark.parametrize("shaft_angle_rad", [0.0, 0.9, -2.0, 40.0])
+def test_what_is_left_is_the_vibration_wherever_the_segment_began(shaft_angle_rad):
+    start = cmath.exp(1j * shaft_angle_rad)
+    read = (VIBRATION + VECTOR.phasor_um_pk) * start
+
+    phasor_um_pk, verdict = take_off_runout(read, VECTOR, "SN 4711", 92.3, shaft_angle_rad)
+
+    assert phasor_um_pk == pytest.approx(VIBRATION * start)
+    assert verdict is RunoutVerdict.APPLIED
+
+
+@pytest.mark.parametrize(
+    ("vector", "probe", "angle_rad", "verdict"),
+    [
+        (None, "SN 4711", 0.9, RunoutVerdict.NO_VECTOR),
+        (VECTOR, "SN 4712", 0.9, RunoutVerdict.OTHER_PROBE),
+        (replace(VECTOR, speed_rpm=60.0), "SN 4711", 0.9, RunoutVerdict.NOT_SLOW_ROLL),
+        (replace(VECTOR, speed_rpm=0.0), "SN 4711", 0.9, RunoutVerdict.NOT_SLOW_ROLL),
+        (VECTOR, "SN 4711", None, RunoutVerdict.NO_PHASE_REFERENCE),
+    ],
+)
+def test_a_vector_that_is_of_no_use_is_left_out_and_said_to_be(vector, probe, angle_rad, verdict):
+    found = take_off_runout(VIBRATION, vector, probe, 92.3, angle_rad)
+
+    assert found == (VIBRATION, verdict)
+
+
+PHASORS = np.array([30.0 + 10.0j, 20.0j, 5.0 + 0.0j, 5.0j])
+SURFACE = 8.0 * np.exp(0.5j)
+KEY_PHASE = KeyPhase(shaft_angle_rad=1.2, speed_rpm=92.3)
+UNDOUBTED = Speed(Reading(92.3), SpeedSource.KEY_PHASE)
+
+
+@pytest.fixture
+def rough(unit: Unit) -> Unit:
+    """The unit with a vector for its x probe alone."""
+    vector = SlowRollVector("sx", "SN1", complex(SURFACE), 8.0, 0)
+    first = replace(unit.channels[0], probe="SN1", slow_roll=vector)
+    return replace(unit, channels=(first, *unit.channels[1:]))
+
+
+def test_only_the_channel_with_a_vector_changes(rough):
+    found, verdicts = without_runout(PHASORS, rough, [0, 1], UNDOUBTED, KEY_PHASE)
+    assert found[0] == pytest.approx(PHASORS[0] - SURFACE * np.exp(1.2j))
+    assert np.array_equal(found[1:], PHASORS[1:])
+    assert verdicts == {"sx": RunoutVerdict.APPLIED, "sy": RunoutVerdict.NO_VECTOR}
+    assert PHASORS[0] == 30.0 + 10.0j
+
+
+@pytest.mark.parametrize(
+    "speed",
+    [
+        Speed(Reading(92.3), SpeedSource.SLOW_CHANNEL),
+        Speed(Reading(92.3, uncertain(Reason.SPEED_IMPLAUSIBLE)), SpeedSource.KEY_PHASE),
+    ],
+    ids=["another speed", "a doubted speed"],
+)
+def test_an_angle_without_its_own_speed_is_none(rough, speed):
+    found, verdicts = without_runout(PHASORS, rough, [0, 1], speed, KEY_PHASE)
+    assert np.array_equal(found, PHASORS)
+    assert verdicts["sx"] is RunoutVerdict.NO_PHASE_REFERENCE

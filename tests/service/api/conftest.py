@@ -1,6 +1,7 @@
 """The API over a real store and a real monitor, fed by the simulated plant, asked in process."""
 
 import asyncio
+import pickle
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -18,38 +19,40 @@ from rigs.described import described_app
 from rigs.probes import Probes
 from rigs.standing_clock import SetClock
 
-from acquisition.delivery.blocks import sample_block
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmRule
+from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmRule
 from core.alarms.life_cycle import update
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.api.auth.authenticator import Authenticator
 from service.api.context import Context
-from service.app.storage import (
-    built_configuration,
-    captures_of,
-    evidence_desk,
-    evidence_folders,
-    evidence_of,
-    watch,
-)
-from service.live.live_view import LinkState, LiveView
+from service.app.kept_files import captures_of, evidence_of, watch
+from service.app.serving_process import evidence_of as downloads_of
+from service.app.storage import built_configuration, evidence_folders
+from service.live.client import LiveClient, SocketOperators
+from service.live.exchange import Question
+from service.live.references import ReferencesInForce
+from service.live.snapshot import PlantSnapshot
+from service.live.status import LinkState
 from service.measuring.alarm_engine import AlarmEngine, alarm_engine
-from service.measuring.commands import LocalCommands
+from service.measuring.commands import CommandExecutor, Questions
 from service.measuring.films import FilmMonitor, film_monitor
+from service.measuring.integrity import IntegrityMonitor
+from service.measuring.live_view import LiveView
 from service.measuring.recorder import FILE, ParkedRows, Recorder
-from service.measuring.references import ReferencesInForce
 from service.measuring.simulated_sources import simulated_feed
+from service.measuring.snapshots import SnapshotBuilder, SocketReports
 from service.notifications.sender import Deliveries
 from service.recordings.segment import CaptureFile
 from service.reports.collector import EvidenceCollector
 from service.reports.routes import EvidenceService
-from service.settings.core_values import analysis_of, calibration_of, machine_of
+from service.settings.core_values import analysis_of, machine_of
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.access.identities import Role
+from service.store.access.tables import AccessStore
 from service.store.sqlite import SqliteStore
+from service.store.sqlite.store import open_access_file
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 
@@ -65,7 +68,7 @@ def assessments(plant: PlantFile) -> list[Assessment]:
     settings = analysis_of(plant.analysis)
     monitor = UnitMonitor(machine_of(unit), settings)
     n_samples = settings.segment_samples + (N_RESULTS - 1) * settings.hop_samples
-    return monitor.ingest(sample_block([feed.advance(n_samples)], calibration_of(unit)))
+    return monitor.ingest(feed.advance(n_samples))
 
 
 @dataclass
@@ -73,7 +76,10 @@ class Service:
     """Everything behind the API, for tests to change."""
 
     live: LiveView
+    serving: LiveClient
+    reports: SocketReports
     store: SqliteStore
+    access: AccessStore
     clock: SetClock
     references: ReferencesInForce
     alarms: AlarmEngine
@@ -89,10 +95,21 @@ class Service:
         """The application, built for the first test that sends a request to it."""
         return described_app(self.context, self.desk)
 
+    async def told(self) -> None:
+        """Let the measuring side report, and the serving side take the report."""
+        if (report := self.reports.report(False)) is not None:
+            copied = pickle.loads(pickle.dumps(report))  # noqa: S301
+            await self.serving.take(copied, is_direct=True)
+
     @cached_property
     def client(self) -> httpx2.AsyncClient:
         """A browser on the same computer."""
-        transport = httpx2.ASGITransport(self.app)
+
+        async def after_reports(*asgi: Any) -> None:
+            await self.told()
+            await self.app(*asgi)
+
+        transport = httpx2.ASGITransport(after_reports)
         return httpx2.AsyncClient(transport=transport, base_url="http://padwatch")
 
     @property
@@ -124,6 +141,21 @@ class Service:
 Serve = Callable[[PlantFile, Path], Service]
 
 
+class DirectExchange:
+    """Questions to the measuring side without the socket between two processes."""
+
+    def __init__(self, questions: Questions) -> None:
+        self._questions = questions
+
+    async def ask(self, kind: str, document: str, actor: str = "", peer: str | None = None) -> Any:
+        answer = await self._questions.answer(Question(1, kind, document, actor, peer))
+        return pickle.loads(pickle.dumps(answer))  # noqa: S301
+
+
+async def no_metrics() -> bytes:
+    return b""
+
+
 def problem_of(response: httpx2.Response) -> dict[str, Any]:
     """The problem document of a response, checked."""
     assert response.headers["content-type"] == "application/problem+json"
@@ -141,7 +173,7 @@ def as_problem() -> Callable[[httpx2.Response], dict[str, Any]]:
     return problem_of
 
 
-async def build(plant: PlantFile, store: SqliteStore, folder: Path) -> Service:
+async def build(plant: PlantFile, store: SqliteStore, access: AccessStore, folder: Path) -> Service:
     """Build a service that has just started: nothing is connected, nothing recorded yet."""
     clock = SetClock()
     live = LiveView([unit.id for unit in plant.unit], clock, STALE_AFTER_S)
@@ -159,29 +191,47 @@ async def build(plant: PlantFile, store: SqliteStore, folder: Path) -> Service:
     evidence = evidence_of(own, origin, live, films, store, captures, clock)
     watch(evidence, alarms, captures, origin)
     loops: dict[str, str | None] = {}
+    executor = CommandExecutor(alarms, films, live, recorder, store, clock)
+    integrity = IntegrityMonitor(store, clock, live)
+    exchange = DirectExchange(Questions(executor, live, integrity, no_metrics))
+    serving = LiveClient(plant, store.films, clock, exchange.ask)
+    serving.alarms.take_stored(store.alarms())
+    operators = SocketOperators(store, serving.alarms)
+    operators.exchange = exchange  # type: ignore[assignment]
+    builder = SnapshotBuilder(plant.unit, live, alarms, films, clock)
+    ids = [*(unit.id for unit in plant.unit), PLANT]
+
+    def plant_now() -> PlantSnapshot:
+        return PlantSnapshot(
+            loops=dict(loops),
+            checks={"stored data": integrity.trouble or "ok"},
+            audit_error=store.audit.head_error,
+            evidence=evidence.status,
+        )
+
+    reports = SocketReports(ids, builder, plant_now, clock)
     context = Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},
-        live=live,
+        live=serving.units,
         store=store,
         clock=clock,
         refresh_s=11.95,
         references=references,
-        alarms=alarms,
-        films=films,
-        operators=LocalCommands(alarms, films, recorder),
-        captures=captures,
+        alarms=serving.alarms,
+        films=serving.films,
+        plant=lambda: serving.plant,
+        operators=operators,
         receivers=Deliveries([], store.outbox, clock).look,
         max_shelf_s=7200.0,
-        evidence=lambda: evidence.status,
         configuration=built_configuration(own),
         recordings=[evidence_folders(own).captures],
-        loops=lambda: loops,
-        access=Authenticator(store.access, clock, Role.ADMIN),  # as in the demonstration
+        access=Authenticator(access, clock, Role.ADMIN),  # as in the demonstration
     )
-    desk = evidence_desk(own, store, evidence, clock, context.downloads)
+    desk = downloads_of(own, store, serving, clock, context.downloads)
     return Service(
-        live, store, clock, references, alarms, recorder, evidence, films, loops, context, desk
+        *(live, serving, reports, store, access, clock, references, alarms, recorder, evidence),
+        *(films, loops, context, desk),
     )
 
 
@@ -196,15 +246,17 @@ def show(service: Service, assessments: list[Assessment]) -> Service:
 
 
 @pytest.fixture(scope="session")
-def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serve]:
+def serve(tmp_path_factory: pytest.TempPathFactory, access_file: Path) -> Iterator[Serve]:
     """Builds services on copies of a database that several tests share, because these only read."""
     with ExitStack() as stack:
 
         def begin(plant: PlantFile, database_file: Path) -> Service:
             folder = tmp_path_factory.mktemp("shared")
             store = SqliteStore(copy_database(database_file, folder))
+            access = open_access_file(copy_database(access_file, folder))
             stack.callback(store.close)
-            return asyncio.run(build(plant, store, folder))
+            stack.callback(access.close)
+            return asyncio.run(build(plant, store, access, folder))
 
         yield begin
 
@@ -218,9 +270,11 @@ def read_only(
 
 
 @pytest.fixture
-async def service(plant: PlantFile, store: SqliteStore, tmp_path: Path) -> AsyncIterator[Service]:
+async def service(
+    plant: PlantFile, store: SqliteStore, access_store: AccessStore, tmp_path: Path
+) -> AsyncIterator[Service]:
     """A service of the test's own that has just started."""
-    built = await build(plant, store, tmp_path)
+    built = await build(plant, store, access_store, tmp_path)
     async with at_work(built.recorder.run()):
         yield built
 

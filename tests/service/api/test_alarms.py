@@ -1,21 +1,29 @@
-"""Alarms over HTTP: the list, the history, and what people may do."""
+"""Alarms over HTTP: the list, the history, what people may do, what is refused, who is told."""
 
 import csv
 import io
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from typing import Any
 
 import pytest
 from rigs.assessments import assessment
-from rigs.probes import ACKNOWLEDGE, ALARMS, ANNA, PROBE, SHELVE, Probes, post
+from rigs.probes import ACKNOWLEDGE, ALARMS, ANNA, PROBE, SHELVE, post
 
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.life_cycle import update
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
+from core.limits import AlarmLevel, Judgement
 from core.quality import Reason
 from service.api.routes.alarms import N_COMMENTS, S_PER_COMMENT
+from service.measuring import commands as in_process
+from service.store.outbox import MessageState, OutboxMessage
 
 
-async def test_a_plant_in_good_health_has_no_alarms(service: Any, probes: Probes) -> None:
+async def test_a_plant_in_good_health_has_no_alarms(service, probes):
     probes.send(3)
 
     found = await service.json(ALARMS)
@@ -29,7 +37,7 @@ async def test_a_plant_in_good_health_has_no_alarms(service: Any, probes: Probes
     assert found["count"]["n_unjudged"] == len(found["unjudged"])
 
 
-async def test_a_lost_probe_is_on_the_list_and_in_the_history(service: Any, probes: Probes) -> None:
+async def test_a_lost_probe_is_on_the_list_and_in_the_history(service, probes):
     probes.send(2)
     probes.send(2, Reason.SENSOR_FAILURE)
     await probes.stored()
@@ -54,9 +62,30 @@ async def test_a_lost_probe_is_on_the_list_and_in_the_history(service: Any, prob
     assert (alarm["condition"], alarm["condition_reason"]) == ("unknown", "not_connected")
 
 
+@pytest.mark.parametrize(
+    ("wanted", "other"),
+    [
+        ({"unit": "U1"}, {"unit": "U2"}),
+        ({"subject": "ujb_shaft_x"}, {"subject": "LJB"}),
+        ({"kind": "channel_not_ok"}, {"kind": "stiffness_x"}),
+        ({"level": "alert"}, {"level": "danger"}),
+        ({"acknowledged": False}, {"acknowledged": True}),
+    ],
+)
+async def test_the_alarm_list_is_filtered(service, probes, wanted, other):
+    probes.send(2, Reason.SENSOR_FAILURE)
+
+    found, none = [await service.json(ALARMS, **each) for each in (wanted, other)]
+
+    assert [alarm["id"] for alarm in found["alarms"]] == [PROBE]
+    assert none["alarms"] == []
+    assert found["count"] == none["count"]
+    await service.problem(ALARMS, 422, level="serious")
+
+
 async def test_an_acknowledgement_of_the_newest_occurrence_is_durable_when_it_is_answered(
-    service: Any, probes: Probes
-) -> None:
+    service, probes
+):
     probes.send(3, Reason.SENSOR_FAILURE)
 
     problem = await service.refused(ACKNOWLEDGE, 409, {**ANNA, "occurrence": 2})
@@ -78,7 +107,7 @@ async def test_an_acknowledgement_of_the_newest_occurrence_is_durable_when_it_is
     assert len((await service.json(f"{ALARMS}/events"))["events"]) == 2
 
 
-async def test_comments_without_end_have_to_wait(service: Any, probes: Probes) -> None:
+async def test_comments_without_end_have_to_wait(service, probes):
     probes.send(3, Reason.SENSOR_FAILURE)
     body = {**ANNA, "text": "seen"}
     path = f"{ALARMS}/{PROBE}/comment"
@@ -91,9 +120,7 @@ async def test_comments_without_end_have_to_wait(service: Any, probes: Probes) -
     assert (await post(service, path, body)).status_code == 200
 
 
-async def test_an_alarm_comes_back_from_its_shelf_and_from_out_of_service(
-    service: Any, probes: Probes
-) -> None:
+async def test_an_alarm_comes_back_from_its_shelf_and_from_out_of_service(service, probes):
     probes.send(3, Reason.SENSOR_FAILURE)
 
     body = {**ANNA, "reason": "probe is being changed", "duration_s": 3600}
@@ -121,9 +148,7 @@ async def test_an_alarm_comes_back_from_its_shelf_and_from_out_of_service(
     assert back.json()["state"] == "unacknowledged"
 
 
-async def test_the_history_comes_page_by_page_and_by_what_is_asked(
-    service: Any, probes: Probes
-) -> None:
+async def test_the_history_comes_page_by_page_and_by_what_is_asked(service, probes):
     for _ in range(3):
         probes.send(3, Reason.SENSOR_FAILURE)
         probes.send(12)
@@ -145,8 +170,8 @@ async def test_the_history_comes_page_by_page_and_by_what_is_asked(
 
 
 async def test_the_history_says_and_is_asked_by_the_condition_at_which_an_alarm_was_raised(
-    service: Any, probes: Probes
-) -> None:
+    service, probes
+):
     point = {"eccentricity_ratio": 0.37, "attitude_deg": 47.0, "oil_temperature_c": 46.2}
     found = assessment(attitude_angle_deg=point.pop("attitude_deg"), **point)
     settled = BearingCondition(OperatingState.FULL_LOAD, True, None)
@@ -177,3 +202,139 @@ async def test_the_history_says_and_is_asked_by_the_condition_at_which_an_alarm_
     [row] = csv.DictReader(io.StringIO(table, newline=""))
     assert row["operating_state"] == "full_load"
     assert float(row["oil_temperature_c [°C]"]) == pytest.approx(46.2)
+
+
+WRONG_BODIES: list[tuple[str, Any, str]] = [
+    (ACKNOWLEDGE, {"actor": "A. Name"}, "occurrence"),
+    (ACKNOWLEDGE, {"actor": "", "occurrence": 1}, "actor"),
+    (ACKNOWLEDGE, {"actor": "A\nName", "occurrence": 1}, "actor"),
+    (ACKNOWLEDGE, {"actor": "A" * 81, "occurrence": 1}, "actor"),
+    (ACKNOWLEDGE, {"actor": "A. Name", "occurrence": "1"}, "occurrence"),
+    (ACKNOWLEDGE, {"actor": "A. Name", "occurrence": 0}, "occurrence"),
+    (ACKNOWLEDGE, {"actor": "A. Name", "occurrence": 1, "force": True}, "force"),
+    (SHELVE, {"actor": "A. Name", "duration_s": 60.0}, "reason"),
+    (SHELVE, {"actor": "A. Name", "reason": "x", "duration_s": 0.0}, "duration_s"),
+    (SHELVE, {"actor": "A. Name", "reason": "x", "duration_s": 7201.0}, "duration_s"),
+    (SHELVE, {"actor": "A. Name", "reason": "x", "duration_s": "1 h"}, "duration_s"),
+]
+
+
+async def test_what_is_asked_wrongly_is_named_and_changes_nothing(service, probes):
+    probes.send(3, Reason.SENSOR_FAILURE)
+    before = await service.json(ALARMS)
+
+    for path, body, named in WRONG_BODIES:
+        problem = await service.refused(path, 422, body)
+
+        assert [mistake["parameter"] for mistake in problem["errors"]] == [named]
+        assert (await service.json(ALARMS))["alarms"] == before["alarms"]
+    # a form of another page is no request either
+    text, plain = '{"actor": "A. Name", "occurrence": 1}', {"Content-Type": "text/plain"}
+    form = await service.client.post(ACKNOWLEDGE, content=text, headers=plain)
+    assert form.status_code == 422
+
+
+async def test_an_unknown_alarm_is_not_found(read_only):
+    for alarm in ("U1:nothing:channel_not_ok", "U9:x:y", "%00", "U1", ":::"):
+        problem = await read_only.refused(f"{ALARMS}/{alarm}/unshelve", 404, ANNA)
+        assert problem["title"] == "Unknown alarm"
+    for alarm in ("U1:nothing:link_lost", "U9:link:link_lost", "plant:store:results_lost", "x"):
+        assert alarm in (await read_only.problem(f"{ALARMS}/{alarm}", 404))["detail"]
+
+
+async def test_a_wrong_question_is_refused_by_name(read_only):
+    for wanted, named in (
+        ({"kind": "earthquake"}, "kind"),
+        ({"limit": 0}, "limit"),
+        ({"limit": 1001}, "limit"),
+        ({"before": 0}, "before"),
+        ({"start": "2026-01-02T00:00:00Z", "end": "2026-01-01T00:00:00Z"}, "start"),
+    ):
+        problem = await read_only.problem(f"{ALARMS}/events", 422, **wanted)
+        assert problem["errors"][0]["parameter"] == named
+
+
+@contextmanager
+def refusing(service: Any, table: str) -> Iterator[None]:
+    """Let the database refuse new rows of a table, as a full disk does."""
+    with closing(sqlite3.connect(service.store.database._path)) as connection:
+        connection.execute(
+            f"CREATE TRIGGER no BEFORE INSERT ON {table} BEGIN SELECT RAISE(ABORT, 'full'); END"
+        )
+        yield
+        connection.execute("DROP TRIGGER no")
+
+
+@pytest.mark.parametrize(
+    ("table", "title"),
+    [("high_water", "Action not applied"), ("alarm_event", "Not stored yet")],
+)
+async def test_an_acknowledgement_that_cannot_be_stored_is_refused_and_may_be_repeated(
+    service, probes, monkeypatch, table, title
+):
+    body = {**ANNA, "occurrence": 1}
+    probes.send(3, Reason.SENSOR_FAILURE)
+    await probes.stored()
+    with refusing(service, table), monkeypatch.context() as impatient:
+        impatient.setattr(in_process, "WITHIN_S", 0.05)
+        assert (await service.refused(ACKNOWLEDGE, 503, body))["title"] == title
+        assert not service.store.alarms()[0].is_acknowledged
+    if table == "high_water":
+        (alarm,) = (await service.json(ALARMS))["alarms"]
+        assert (alarm["state"], alarm["is_acknowledged"]) == ("unacknowledged", False)
+    assert (await post(service, ACKNOWLEDGE, body)).status_code == 200
+    assert service.store.alarms()[0].is_acknowledged
+
+
+async def test_nothing_is_acknowledged_while_the_database_file_is_gone(service, probes):
+    body = {**ANNA, "occurrence": 1}
+    probes.send(3, Reason.SENSOR_FAILURE)
+    await probes.stored()
+    path = service.store.database._path
+    aside = path.rename(path.with_name("aside"))
+
+    problem = await service.refused(ACKNOWLEDGE, 503, body)
+
+    assert problem["title"] == "Action not applied"
+    assert "the database file was removed while padwatch runs" in problem["detail"]
+    aside.rename(path)
+    assert (await post(service, ACKNOWLEDGE, body)).status_code == 200
+    assert service.store.alarms()[0].is_acknowledged
+
+
+ALERT = Judgement(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
+
+
+def news(subject: str) -> AlarmNews:
+    identity = AlarmIdentity("U1", subject, "order1_shaft_x")
+    return AlarmNews(*update(Alarm(identity), ALERT, 5, AlarmRule()))
+
+
+async def test_what_waits_for_somebody_who_has_left_the_plant_file_is_not_forgotten(service, store):
+    found = await service.json("/api/v1/delivery")
+    assert (found["n_waiting"], found["n_failing"], found["receivers"]) == (0, 0, [])
+    ids = iter(("a", "b", "c"))
+    store._address = lambda *_: [
+        OutboxMessage(
+            "desk", next(ids), "{}", 10**18, is_urgent=False, is_active=True, closes=False
+        )
+    ]
+    for subject in ("UJB", "LJB", "TJB"):
+        store.append([], [], [news(subject)])
+    first, second, _ = store.outbox.waiting("desk", 9)
+    store.outbox.finish(first.id, MessageState.REFUSED, "410 Gone", 2 * 10**18)
+    store.outbox.finish(second.id, MessageState.DELIVERED, "200", 3 * 10**18)
+
+    found = await service.json("/api/v1/delivery")
+
+    (desk,) = found["receivers"]
+    assert (desk["id"], desk["state"], desk["kind"]) == ("desk", "not_in_the_plant_file", None)
+    assert (desk["n_waiting"], desk["waiting_since"]) == (1, "2001-09-09T01:46:40.000Z")
+    assert desk["n_dead"] == 1
+    assert desk["last_dead"] == {
+        "event_id": "a",
+        "outcome": "refused",
+        "reason": "410 Gone",
+        "time": "2033-05-18T03:33:20.000Z",
+    }
+    assert desk["last_delivered"] == "2065-01-24T05:20:00.000Z"

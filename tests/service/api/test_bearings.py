@@ -1,4 +1,4 @@
-"""What the API says of a bearing is what the monitor found, to the last bit."""
+"""What the API says of a bearing is what the monitor found, to the last bit; its references."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,8 +8,9 @@ import pytest
 
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
-from service.live.live_view import LinkState
+from service.live.status import LinkState
 from service.runtime.times import rfc3339
+from service.store.references import GapReference, ReferenceSource
 
 UJB = "/api/v1/units/U1/bearings/UJB"
 K = "order1_k_eff_xx_n_per_m"
@@ -22,9 +23,7 @@ def found(assessments: list[Assessment]) -> list[Assessment]:
     return [a for a in assessments if a.bearing == "UJB"]
 
 
-async def test_the_newest_readings_are_the_monitors_to_the_last_bit(
-    read_only: Any, found: list[Assessment]
-) -> None:
+async def test_the_newest_readings_are_the_monitors_to_the_last_bit(read_only, found):
     body = await read_only.json(f"{UJB}/latest")
 
     newest = found[-1]
@@ -34,7 +33,6 @@ async def test_the_newest_readings_are_the_monitors_to_the_last_bit(
         assert shown["value"] == reading.value
         assert shown["level"] == reading.quality.level.name.lower()
         assert shown["reason"] == reading.quality.reason.value
-        assert (shown["unit"], shown["label"]) == (quantity.unit, quantity.label)
     assert body["readings"][K]["value"] == pytest.approx(0.69e9, rel=0.1)
     assert body["quality"] == {"level": "good", "reason": "ok"}
     assert body["time"] == rfc3339(newest.time_ns)
@@ -52,15 +50,14 @@ async def test_the_newest_readings_are_the_monitors_to_the_last_bit(
     }
 
 
-async def test_a_result_that_is_too_old_or_of_a_lost_link_shows_no_number(running: Any) -> None:
-    running.clock.s += 29.5
+async def test_a_result_that_is_too_old_or_of_a_lost_link_shows_no_number(running):
+    running.clock.step(29_500_000_000)
     ageing = await running.json(f"{UJB}/latest")
-    running.clock.s += 1.0
+    running.clock.step(1_000_000_000)
     stale = await running.json(f"{UJB}/latest")
 
-    assert ageing["age_s"] == 29.5
+    assert ageing["received"] == stale["received"] == "2026-01-01T00:00:00.000Z"
     assert ageing["readings"][K]["value"] is not None
-    assert stale["age_s"] == 30.5
     assert stale["quality"] == {"level": "bad", "reason": "stale"}
     assert {r["value"] for r in stale["readings"].values()} == {None}
     assert {r["reason"] for r in stale["readings"].values()} == {"stale"}
@@ -81,19 +78,19 @@ async def test_a_result_that_is_too_old_or_of_a_lost_link_shows_no_number(runnin
         assert "no result yet" in problem["detail"]
 
 
-async def test_before_the_first_segment_a_bearing_waits_for_data(service: Any) -> None:
+async def test_before_the_first_segment_a_bearing_waits_for_data(service):
     service.live.set_link("U1", LinkState.CONNECTED)
 
     body = await service.json(f"{UJB}/latest")
 
     assert body["quality"] == {"level": "bad", "reason": "waiting_for_data"}
     assert {r["value"] for r in body["readings"].values()} == {None}
-    assert body["age_s"] is None
+    assert body["received"] is None
     assert body["speed_source"] is None
     assert body["runout"] == {"shaft_x": None, "shaft_y": None}
 
 
-async def test_a_bearing_is_described_as_configured(read_only: Any) -> None:
+async def test_a_bearing_is_described_as_configured(read_only):
     one = await read_only.json(UJB)
     all_of_them = await read_only.json("/api/v1/units/U1/bearings")
 
@@ -116,9 +113,7 @@ async def test_a_bearing_is_described_as_configured(read_only: Any) -> None:
     assert all_of_them[0] == one
 
 
-async def test_trends_are_the_stored_readings_to_the_last_bit_or_in_buckets(
-    read_only: Any, found: list[Assessment]
-) -> None:
+async def test_trends_are_the_stored_readings_to_the_last_bit_or_in_buckets(read_only, found):
     body = await read_only.json(
         f"{UJB}/trends",
         start="2026-01-01T00:00:00Z",
@@ -147,9 +142,7 @@ async def test_trends_are_the_stored_readings_to_the_last_bit_or_in_buckets(
     assert max(body["series"][K]["max"]) == max(v for v in values if v)
 
 
-async def test_a_hole_in_the_trend_is_a_point_without_a_value(
-    running: Any, found: list[Assessment]
-) -> None:
+async def test_a_hole_in_the_trend_is_a_point_without_a_value(running, found):
     late = replace(found[-1], time_ns=found[-1].time_ns + 600_000_000_000)
     running.store.append([late], [])
 
@@ -161,8 +154,8 @@ async def test_a_hole_in_the_trend_is_a_point_without_a_value(
 
 
 async def test_the_spectrum_shows_the_lines_of_the_readings_and_the_orbit_is_the_newest(
-    read_only: Any, found: list[Assessment]
-) -> None:
+    read_only, found
+):
     body = await read_only.json(f"{UJB}/spectrum")
 
     newest = found[-1]
@@ -184,7 +177,7 @@ async def test_the_spectrum_shows_the_lines_of_the_readings_and_the_orbit_is_the
     assert body["duration_s"] == pytest.approx(3 * 60 / 92.3, abs=1 / 600)  # three turns
 
 
-async def test_a_channel_that_failed_has_no_spectrum(running: Any, found: list[Assessment]) -> None:
+async def test_a_channel_that_failed_has_no_spectrum(running, found):
     n_segments = found[-1].spectrum.n_segments.copy()
     n_segments[2, :] = n_segments[:, 2] = 0
     spectrum = replace(found[-1].spectrum, n_segments=n_segments)
@@ -194,3 +187,56 @@ async def test_a_channel_that_failed_has_no_spectrum(running: Any, found: list[A
 
     assert channels["bearing_x"]["amplitude"] is None
     assert len(channels["bearing_y"]["amplitude"]) > 100
+
+
+T0 = 1_767_225_600_000_000_000
+
+
+def reference(n: int, **changes: Any) -> GapReference:
+    arguments = {"opposite_reference_um": None, "source": ReferenceSource.GIVEN} | changes
+    return GapReference("U1", "UJB", T0 + n * 10**9, "A. Name", (1990.0 + n, 2003.1), **arguments)
+
+
+async def test_a_reference_and_its_history_have_time_author_and_note(running):
+    running.store.add_reference(reference(1))
+    known = {"source": ReferenceSource.MEASURED, "opposite_reference_um": (1.0, 2.0)}
+    running.store.add_reference(reference(2, note="after the overhaul", **known))
+    assert (await running.json(UJB))["reference"]["source"] == "plant_file"  # not yet taken over
+    await running.references.look()
+
+    body = await running.json(UJB)
+
+    assert body["gap_reference_um"] == [1992.0, 2003.1]
+    assert body["reference"] == {
+        "source": "measured",
+        "set": "2026-01-01T00:00:02.000Z",
+        "author": "A. Name",
+        "note": "after the overhaul",
+    }
+    assert body in await running.json("/api/v1/units/U1/bearings")
+    other = await running.json("/api/v1/units/U1/bearings/LJB")
+    assert other["reference"]["source"] == "plant_file"
+
+    newest, oldest = await running.json(f"{UJB}/references")
+    assert oldest == {
+        "gap_reference_um": [1991.0, 2003.1],
+        "opposite_reference_um": None,
+        "source": "given",
+        "set": "2026-01-01T00:00:01.000Z",
+        "author": "A. Name",
+        "note": None,
+    }
+    assert newest["set"] == "2026-01-01T00:00:02.000Z"
+    assert newest["opposite_reference_um"] == [1.0, 2.0]
+    assert await running.json("/api/v1/units/U2/bearings/UJB/references") == []
+
+
+async def test_a_history_that_is_not_there_or_cannot_be_read_is_a_problem(running, tmp_path):
+    for path in ("U9/bearings/UJB", "U1/bearings/XJB"):
+        problem = await running.problem(f"/api/v1/units/{path}/references", 404)
+        assert path.partition("/")[0] in problem["detail"]
+    (tmp_path / "padwatch.sqlite3").rename(tmp_path / "away")
+
+    problem = await running.problem(f"{UJB}/references", 503)
+
+    assert problem["title"] == "Store not available"

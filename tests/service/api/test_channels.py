@@ -10,7 +10,7 @@ from rigs.blocks import given_block, with_quality
 from core.quality import GOOD, Reading, Reason, bad, missing
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import SampleAccount
-from service.live.live_view import HELD_S, LinkState
+from service.live.status import HELD_S, LinkState
 from service.settings.plant import PlantFile
 
 CHANNELS = "/api/v1/units/U1/channels"
@@ -53,9 +53,7 @@ def with_bad(block: SampleBlock, row: int) -> SampleBlock:
     return with_quality(block, tuple(quality))
 
 
-async def test_every_channel_is_listed_with_its_settings_in_wire_order(
-    read_only: Any, plant: PlantFile
-) -> None:
+async def test_every_channel_is_listed_with_its_settings_in_wire_order(read_only, plant):
     body = await read_only.json(CHANNELS)
 
     unit = plant.unit[0]
@@ -70,14 +68,12 @@ async def test_every_channel_is_listed_with_its_settings_in_wire_order(
     assert oil["used_by"] == ["UJB oil_temperature"]
 
 
-async def test_a_channel_shows_the_samples_of_its_newest_block(
-    running: Any, make_block: MakeBlock, receive: Any, plant: PlantFile
-) -> None:
+async def test_a_channel_shows_the_samples_of_its_newest_block(running, make_block, receive, plant):
     speed = plant.unit[0].speed_channel
     assert speed is not None
     receive(make_block(0))
     receive(with_bad(make_block(N, **{speed: Reading(90.9)}), 1))
-    running.clock.s += 2.0
+    running.clock.step(2_000_000_000)
 
     body = await running.json(CHANNELS)
 
@@ -87,14 +83,12 @@ async def test_a_channel_shows_the_samples_of_its_newest_block(
     assert lost["quality"] == {"level": "bad", "reason": "sensor_failure"}
     readings = {each["id"]: each for each in body["slow"]}
     assert readings[speed]["value"] == 90.9
-    assert body["age_s"] == 2.0
+    assert body["received"] == "2026-01-01T00:00:00.000Z"
     others = {each["quality"]["reason"] for id_, each in readings.items() if id_ != speed}
     assert others == {"not_measured"}
 
 
-async def test_channels_of_a_lost_link_show_no_number(
-    running: Any, make_block: MakeBlock, receive: Any
-) -> None:
+async def test_channels_of_a_lost_link_show_no_number(running, make_block, receive):
     waiting = await running.json(CHANNELS)
     receive(make_block(0, slow=missing(Reason.OUT_OF_RANGE)))
     running.live.set_link("U1", LinkState.NOT_CONNECTED, "timed out")
@@ -108,8 +102,8 @@ async def test_channels_of_a_lost_link_show_no_number(
 
 
 async def test_the_waveform_is_the_newest_samples_across_blocks(
-    running: Any, make_block: MakeBlock, receive: Any, plant: PlantFile
-) -> None:
+    running, make_block, receive, plant
+):
     for first in range(0, 200 * N, N):
         receive(make_block(first))
     assert sum(block.n_samples for block in running.live.blocks("U1")) <= (HELD_S + 2) * 600
@@ -124,9 +118,7 @@ async def test_the_waveform_is_the_newest_samples_across_blocks(
     assert body["time"] == "2026-01-01T00:00:19.750Z"
 
 
-async def test_missing_and_bad_samples_of_a_waveform_are_null(
-    running: Any, make_block: MakeBlock, receive: Any, plant: PlantFile
-) -> None:
+async def test_missing_and_bad_samples_of_a_waveform_are_null(running, make_block, receive, plant):
     receive(make_block(0))
     receive(with_bad(make_block(2 * N), 0))  # the block between never arrived
     x, y = (plant.unit[0].channel[n].id for n in (0, 1))
@@ -145,9 +137,7 @@ async def test_missing_and_bad_samples_of_a_waveform_are_null(
     assert (body["epoch"], body["first_index"], body["n_samples"]) == (2, 0, N)
 
 
-async def test_a_waveform_that_there_is_not_is_a_problem(
-    running: Any, make_block: MakeBlock, receive: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_a_waveform_that_there_is_not_is_a_problem(running, make_block, receive, monkeypatch):
     assert "has arrived" in (await running.problem(WAVEFORM, 409))["detail"]
     receive(make_block(0))
     unknown = await running.problem(WAVEFORM, 422, channel="no_such")
@@ -160,7 +150,7 @@ async def test_a_waveform_that_there_is_not_is_a_problem(
     await running.problem("/api/v1/units/U9/channels", 404)
 
 
-async def test_sources_count_failed_attempts(running: Any) -> None:
+async def test_sources_count_failed_attempts(running):
     for _ in range(2):
         running.live.set_link("U2", LinkState.NOT_CONNECTED, "127.0.0.1:502: Connection refused")
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs.blocks import cell_block
 
-from acquisition.delivery.blocks import RawBlock, sample_block
 from core.quality import Reason, bad, missing
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import SampleAccount
@@ -54,8 +54,8 @@ def blocks_of(plant: PlantFile) -> Make:
         moved = np.array(motion_um(index / RATE_HZ)) + np.array([CENTRE_UM]).T
         counts = np.zeros((len(unit.channel), index.size), dtype=np.int16)
         counts[rows] = np.round((reference - moved) / um_per_count)
-        raws = [
-            RawBlock(
+        return [
+            cell_block(
                 epoch=epoch,
                 first_index=first + at,
                 start_ns=START_NS + round((first + at) / RATE_HZ * 1e9),
@@ -63,10 +63,10 @@ def blocks_of(plant: PlantFile) -> Make:
                 counts=counts[:, at : at + N],
                 ok=(True,) * len(unit.channel),
                 slow=tuple(speed),
+                calibration=calibration,
             )
             for at in range(0, index.size, N)
         ]
-        return [sample_block([raw], calibration) for raw in raws]
 
     return make
 
@@ -97,8 +97,8 @@ def require_ellipse(body: dict[str, Any]) -> None:
 
 
 async def test_the_newest_motion_is_the_ellipse_and_the_vortex_since_the_restart(
-    running: Any, receive: Any, blocks_of: Make
-) -> None:
+    running, receive, blocks_of
+):
     receive(blocks_of(12.0))
 
     body = await running.json(MOTION, seconds=10.0)
@@ -119,16 +119,14 @@ async def test_the_newest_motion_is_the_ellipse_and_the_vortex_since_the_restart
     )
     assert (body["clearance_um"], body["speed_rpm"]) == (200.0, pytest.approx(92.3))
     assert {body[name] for name in ("mark", "recording", "offset_s")} == {None}
-    assert body["age_s"] == 0.0
+    assert body["received"] == "2026-01-01T00:00:00.000Z"
 
     receive(blocks_of(2.0, 100.0, epoch=2))
     body = await running.json(MOTION, seconds=10.0)
     assert (body["epoch"], body["first_index"], body["n_samples"]) == (2, 60_000, 1200)
 
 
-async def test_missing_samples_and_a_lost_probe_are_null_never_zero(
-    running: Any, receive: Any, blocks_of: Make
-) -> None:
+async def test_missing_samples_and_a_lost_probe_are_null_never_zero(running, receive, blocks_of):
     blocks = blocks_of(6.0)
     lost = list(blocks[20].channel_quality)
     lost[0] = bad(Reason.SENSOR_FAILURE)
@@ -144,9 +142,7 @@ async def test_missing_samples_and_a_lost_probe_are_null_never_zero(
     assert None not in body["order1"]["shaft_x_um"][900:2700]
 
 
-async def test_without_a_speed_there_is_no_motion_at_running_speed(
-    running: Any, receive: Any, blocks_of: Make
-) -> None:
+async def test_without_a_speed_there_is_no_motion_at_running_speed(running, receive, blocks_of):
     blocks = blocks_of(5.0)
     for block in blocks:
         object.__setattr__(block, "slow", {**block.slow, "speed": missing(Reason.NOT_MEASURED)})
@@ -158,9 +154,7 @@ async def test_without_a_speed_there_is_no_motion_at_running_speed(
     assert None not in body["shaft_x_um"]
 
 
-async def test_a_recording_plays_the_same_motion_at_any_moment(
-    running: Any, keep: Any, blocks_of: Make
-) -> None:
+async def test_a_recording_plays_the_same_motion_at_any_moment(running, keep, blocks_of):
     name = keep(blocks_of(30.0))
     path = f"/api/v1/recordings/{name}/motion"
 
@@ -180,8 +174,8 @@ async def test_a_recording_plays_the_same_motion_at_any_moment(
 
 
 async def test_a_hole_in_a_recording_is_null_and_behind_its_end_is_nothing(
-    running: Any, keep: Any, blocks_of: Make
-) -> None:
+    running, keep, blocks_of
+):
     path = f"/api/v1/recordings/{keep([*blocks_of(2.0), *blocks_of(2.0, 5.0)])}/motion"
 
     body = await running.json(path, bearing="UJB", start_s=1.0, seconds=5.0)
@@ -196,9 +190,7 @@ async def test_a_hole_in_a_recording_is_null_and_behind_its_end_is_nothing(
         assert "its length is 7 s" in problem["detail"]
 
 
-async def test_a_damaged_recording_is_not_played(
-    running: Any, keep: Any, blocks_of: Make, tmp_path: Path
-) -> None:
+async def test_a_damaged_recording_is_not_played(running, keep, blocks_of, tmp_path):
     name = keep(blocks_of(5.0))
     samples = tmp_path / "captures" / name / "samples.parquet"
     content = bytearray(samples.read_bytes())
@@ -210,7 +202,7 @@ async def test_a_damaged_recording_is_not_played(
     assert str(tmp_path) not in problem["detail"]
 
 
-async def test_what_is_asked_wrongly_is_refused(running: Any, keep: Any, blocks_of: Make) -> None:
+async def test_what_is_asked_wrongly_is_refused(running, keep, blocks_of):
     path = f"/api/v1/recordings/{keep(blocks_of(1.0))}/motion"
 
     nothing_yet = await running.problem(MOTION, 409)

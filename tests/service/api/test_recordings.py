@@ -5,7 +5,6 @@ import io
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from rigs.capturing import BLOCK, block, recorded_unit
@@ -29,7 +28,7 @@ def keep(capture: Keep) -> Keep:
     return make
 
 
-async def test_recordings_are_listed_with_what_they_are_for(service: Any, keep: Keep) -> None:
+async def test_recordings_are_listed_with_what_they_are_for(service, keep):
     assert (await service.json(RECORDINGS))["recordings"] == []
     await service.problem(f"{RECORDINGS}/U1-20260101T000000.000Z-shaft_x", 404)
     first, second = keep(10).name, keep(20, "U2").name
@@ -56,9 +55,7 @@ async def test_recordings_are_listed_with_what_they_are_for(service: Any, keep: 
     await service.problem(RECORDINGS, 404, unit="U9")
 
 
-async def test_a_recording_has_holes_and_checksums_and_its_samples_as_csv(
-    service: Any, keep: Keep
-) -> None:
+async def test_a_recording_has_holes_and_checksums_and_its_samples_as_csv(service, keep):
     folder = keep(10, lost=True)
 
     body = await service.json(f"{RECORDINGS}/{folder.name}")
@@ -81,9 +78,7 @@ async def test_a_recording_has_holes_and_checksums_and_its_samples_as_csv(
     assert lost == [str(index) for index in range(BLOCK, 2 * BLOCK)]
 
 
-async def test_the_files_of_a_recording_arrive_whole(
-    service: Any, keep: Keep, tmp_path: Path
-) -> None:
+async def test_the_files_of_a_recording_arrive_whole(service, keep, tmp_path):
     folder = keep(10)
 
     response = await service.get(f"{RECORDINGS}/{folder.name}/files.zip")
@@ -92,13 +87,11 @@ async def test_the_files_of_a_recording_arrive_whole(
     with zipfile.ZipFile(io.BytesIO(response.content)) as archive:
         archive.extractall(tmp_path / "taken")
     taken = open_recording(tmp_path / "taken" / folder.name)
-    numbers = [int(value) for raw in taken.raw_blocks() for value in raw.counts[0]]
+    numbers = [int(value) for raw in taken.blocks() for value in raw.counts[0]]
     assert numbers == [*range(30), *range(40, 50)]
 
 
-async def test_a_damaged_recording_is_said_to_be_and_shows_no_path(
-    service: Any, keep: Keep, tmp_path: Path
-) -> None:
+async def test_a_damaged_recording_is_said_to_be_and_shows_no_path(service, keep, tmp_path):
     whole, cut = keep(10), keep(20)
     (cut / "manifest.json").write_text("{")
     samples = whole / "samples.parquet"
@@ -114,9 +107,7 @@ async def test_a_damaged_recording_is_said_to_be_and_shows_no_path(
         assert str(tmp_path) not in problem["detail"]
 
 
-async def test_no_name_leads_out_of_the_folder_of_recordings(
-    service: Any, keep: Keep, tmp_path: Path
-) -> None:
+async def test_no_name_leads_out_of_the_folder_of_recordings(service, keep, tmp_path):
     folder = keep(10)
     (tmp_path / "captures" / "link").symlink_to(tmp_path)
     unfinished = folder.with_name(f"{folder.name}-2.incomplete")
@@ -129,9 +120,7 @@ async def test_no_name_leads_out_of_the_folder_of_recordings(
     assert len((await service.json(RECORDINGS))["recordings"]) == 1
 
 
-async def test_a_bit_that_flips_in_what_a_recording_was_made_for_hides_it(
-    service: Any, keep: Keep
-) -> None:
+async def test_a_bit_that_flips_in_what_a_recording_was_made_for_hides_it(service, keep):
     path = keep(10) / "alarm.json"
     path.write_text(path.read_text().replace('"occurrence": 1', '"occurrence": 3'))
 

@@ -3,8 +3,6 @@
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -58,8 +56,8 @@ def toned(plant: PlantFile) -> list[Assessment]:
 
 
 async def test_a_line_appears_where_it_is_with_its_amplitude_up_to_the_frequency_asked_for(
-    service: Any, toned: list[Assessment]
-) -> None:
+    service, toned
+):
     service.store.append(toned, [])
 
     body = await service.json(SPECTRA, **DAY, channel=["shaft_x", "shaft_y"])
@@ -84,9 +82,7 @@ async def test_a_line_appears_where_it_is_with_its_amplitude_up_to_the_frequency
     assert len(low["channels"]["shaft_x"]["amplitude"][0]) == len(low["frequency_hz"])
 
 
-async def test_a_kept_spectrum_is_the_one_that_was_shown_then(
-    service: Any, running: Any, assessments: list[Assessment]
-) -> None:
+async def test_a_kept_spectrum_is_the_one_that_was_shown_then(service, running, assessments):
     of_bearing = [each for each in assessments if each.bearing == "UJB"]
     service.live.set_assessment(of_bearing[0])
     then = await service.json(SPECTRA.replace("spectra", "spectrum"))
@@ -104,7 +100,7 @@ async def test_a_kept_spectrum_is_the_one_that_was_shown_then(
     assert (body["level"][0], body["reason"][0]) == (quality.level.name.lower(), quality.reason)
 
 
-async def test_nothing_kept_is_no_spectra_and_says_when_the_first_was(read_only: Any) -> None:
+async def test_nothing_kept_is_no_spectra_and_says_when_the_first_was(read_only):
     before = {"start": "2025-01-01T00:00:00Z", "end": "2025-02-01T00:00:00Z"}
     early = await read_only.json(SPECTRA, **before)
     assert early["time"] == []
@@ -116,9 +112,7 @@ async def test_nothing_kept_is_no_spectra_and_says_when_the_first_was(read_only:
     assert [each["amplitude"] for each in body["channels"].values()] == [[]] * 4
 
 
-async def test_a_channel_that_was_lost_has_null_for_a_spectrum(
-    service: Any, toned: list[Assessment]
-) -> None:
+async def test_a_channel_that_was_lost_has_null_for_a_spectrum(service, toned):
     n_segments = toned[0].spectrum.n_segments.copy()
     n_segments[1] = n_segments[:, 1] = 0
     lost = replace(toned[0], spectrum=replace(toned[0].spectrum, n_segments=n_segments))
@@ -130,9 +124,7 @@ async def test_a_channel_that_was_lost_has_null_for_a_spectrum(
     assert body["channels"]["shaft_x"]["amplitude"][0] is not None
 
 
-async def test_spectra_of_an_earlier_set_up_are_counted_and_left_out(
-    service: Any, toned: list[Assessment]
-) -> None:
+async def test_spectra_of_an_earlier_set_up_are_counted_and_left_out(service, toned):
     half = CrossSpectrum(
         toned[0].spectrum.frequency_hz[::2],
         toned[0].spectrum.matrix[::2],
@@ -149,9 +141,7 @@ async def test_spectra_of_an_earlier_set_up_are_counted_and_left_out(
     assert body["time"] == [T0_S + 60]
 
 
-async def test_damage_is_told_with_its_time_and_the_rest_is_given(
-    service: Any, toned: list[Assessment], tmp_path: Path
-) -> None:
+async def test_damage_is_told_with_its_time_and_the_rest_is_given(service, toned, tmp_path):
     service.store.append(toned, [])
     with closing(sqlite3.connect(tmp_path / "padwatch.sqlite3")) as connection:
         connection.execute(
@@ -176,7 +166,7 @@ WRONG: list[tuple[dict[str, object], str]] = [
 ]
 
 
-async def test_what_is_asked_wrongly_is_refused_by_name(read_only: Any) -> None:
+async def test_what_is_asked_wrongly_is_refused_by_name(read_only):
     for wrong, parameter in WRONG:
         problem = await read_only.problem(SPECTRA, 422, **{**DAY, **wrong})
 
@@ -185,9 +175,7 @@ async def test_what_is_asked_wrongly_is_refused_by_name(read_only: Any) -> None:
         await read_only.problem(SPECTRA.replace(known, unknown), 404, **DAY)
 
 
-async def test_more_numbers_than_fit_an_answer_are_refused_before_they_are_written(
-    service: Any, toned: list[Assessment]
-) -> None:
+async def test_more_numbers_than_fit_an_answer_are_refused_before_they_are_written(service, toned):
     fine = np.arange(1.0, 1001.0) * 0.01
     power = np.zeros((1000, 4, 4))
     spectrum = CrossSpectrum(fine, power.astype(complex), power, toned[0].spectrum.n_segments)

@@ -1,28 +1,29 @@
-"""The command line as a whole: exit codes, one line for people, and an end."""
+"""The command line as a whole: exit codes, one line for people, and commands on a server."""
 
 import json
 import re
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
 import pytest
 import typer
+from harness.places import PostgresPlace
 from rigs.command_line import padwatch, padwatch_program
 
 from service.cli import commands, main, options
-
-Changed = Callable[[str, str], tuple[str, int]]
+from service.cli.processes import NEEDS_POSTGRESQL
 
 
 @pytest.mark.parametrize("command", [("run",), ("config", "check"), ("daq",)], ids=" ".join)
 def test_a_wrong_plant_file_ends_every_command_with_2_and_a_line_for_each_mistake(
-    changed: Changed, tmp_path: Path, command: tuple[str, ...]
-) -> None:
+    changed, tmp_path, command
+):
     text, line = changed("bracket_stiffness_n_per_m = 1.18e9", "bracket_stiffness_n_per_m = 1.18")
     path = tmp_path / "plant.toml"
     path.write_text(text, encoding="utf-8")
@@ -37,14 +38,14 @@ def test_a_wrong_plant_file_ends_every_command_with_2_and_a_line_for_each_mistak
     assert result.stderr.count("\n") == 1
 
 
-def test_a_plant_file_that_is_not_there_ends_with_2_in_one_line(tmp_path: Path) -> None:
+def test_a_plant_file_that_is_not_there_ends_with_2_in_one_line(tmp_path):
     result = padwatch("run", tmp_path / "absent.toml")
 
     assert result.exit_code == 2
     assert result.stderr == f"{tmp_path / 'absent.toml'}: No such file or directory\n"
 
 
-def test_a_port_in_use_is_one_line_and_exit_1(plant_path: Path, tmp_path: Path) -> None:
+def test_a_port_in_use_is_one_line_and_exit_1(plant_path, tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
 
@@ -67,9 +68,7 @@ def test_a_port_in_use_is_one_line_and_exit_1(plant_path: Path, tmp_path: Path) 
         *("store check PLANT", "readings export PLANT OUT.csv"),
     ],
 )
-def test_a_command_that_looks_says_that_there_is_no_database_and_makes_none(
-    plant_path: Path, command: str
-) -> None:
+def test_a_command_that_looks_says_that_there_is_no_database_and_makes_none(plant_path, command):
     places = {"PLANT": plant_path, "OUT.csv": plant_path.with_name("out.csv")}
     result = padwatch(*(places.get(word, word) for word in command.split()))
     assert result.exit_code == 1
@@ -77,7 +76,7 @@ def test_a_command_that_looks_says_that_there_is_no_database_and_makes_none(
     assert [path.name for path in plant_path.parent.iterdir()] == ["plant.toml"]
 
 
-def test_the_example_is_a_plant_file_that_passes_the_check(tmp_path: Path) -> None:
+def test_the_example_is_a_plant_file_that_passes_the_check(tmp_path):
     path = tmp_path / "plant.toml"
     path.write_text(padwatch("config", "example").stdout, encoding="utf-8")
 
@@ -87,7 +86,7 @@ def test_the_example_is_a_plant_file_that_passes_the_check(tmp_path: Path) -> No
     assert json.loads(result.stdout)["units"] >= 1
 
 
-def test_the_schema_says_what_every_key_means() -> None:
+def test_the_schema_says_what_every_key_means():
     schema = json.loads(padwatch("config", "schema").stdout)
 
     assert schema["type"] == "object"
@@ -145,7 +144,7 @@ def python(program: str) -> "subprocess.CompletedProcess[str]":
     )
 
 
-def test_a_thread_without_end_does_not_hold_the_end_up() -> None:
+def test_a_thread_without_end_does_not_hold_the_end_up():
     ended = python(WAITS_FOR_EVER)
 
     assert ended.returncode == 0, ended.stderr
@@ -153,7 +152,7 @@ def test_a_thread_without_end_does_not_hold_the_end_up() -> None:
     assert "threads are still running" in ended.stdout + ended.stderr
 
 
-def test_a_command_ends_with_its_code_before_libraries_are_taken_down() -> None:
+def test_a_command_ends_with_its_code_before_libraries_are_taken_down():
     ended = python(ENDS_WITH_3)
 
     assert (ended.returncode, ended.stdout) == (3, "said"), ended.stderr
@@ -164,9 +163,7 @@ def test_a_command_ends_with_its_code_before_libraries_are_taken_down() -> None:
     [(None, 0), (SystemExit(0), 0), (SystemExit(None), 0), (SystemExit("why"), 1), (OSError(), 70)],
     ids=repr,
 )
-def test_every_end_of_a_command_has_its_exit_code(
-    monkeypatch: pytest.MonkeyPatch, raised: BaseException | None, expected: int
-) -> None:
+def test_every_end_of_a_command_has_its_exit_code(monkeypatch, raised, expected):
     def app() -> None:
         if raised is not None:
             raise raised
@@ -189,7 +186,7 @@ print("loaded", *sorted({name.partition(".")[0] for name in sys.modules}))
 """
 
 
-def test_the_help_of_all_commands_loads_none_of_them() -> None:
+def test_the_help_of_all_commands_loads_none_of_them():
     ended = python(HELP_LOADS)
 
     *text, loaded = ended.stdout.splitlines()
@@ -197,23 +194,114 @@ def test_the_help_of_all_commands_loads_none_of_them() -> None:
     assert not {"numpy", "scipy", "fastapi", "pydantic", "structlog"} & set(loaded.split())
 
 
-def test_the_help_of_all_commands_is_that_of_each_command() -> None:
+def test_the_help_of_all_commands_is_that_of_each_command():
     group = typer.main.get_command(commands.app)
     loaded = dict(group.commands.items())
-    whole = typer.core.TyperGroup(commands=loaded)
-
     for width in (60, 80, 200):
-        texts = []
-        for each in (group, whole):
-            formatter = typer.Context(each).make_formatter()
-            formatter.width = width
-            each.format_commands(typer.Context(each), formatter)
-            texts.append(formatter.getvalue())
-        assert texts[0] == texts[1]
-        assert texts[0].count("\n") > len(loaded)
+        formatter = typer.Context(group).make_formatter()
+        formatter.width = width
+        group.format_commands(typer.Context(group), formatter)
+        listed = formatter.getvalue()
+        limit = width - 6 - max(map(len, loaded))
+        for name, command in loaded.items():
+            words = f"{name} {command.get_short_help_str(limit)}".split()
+            assert " ".join(words) in " ".join(listed.split())
+        assert [line for line in listed.splitlines() if line.endswith(":")] == [
+            f"{heading}:" for heading in commands.GROUPS
+        ]
 
 
-def test_every_error_with_an_exit_code_exists() -> None:
+def command_paths() -> Iterator[tuple[str, ...]]:
+    """Every command and group of commands, as words after `padwatch`."""
+
+    def below(command: Any, path: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+        yield path
+        for name, its in getattr(command, "commands", {}).items():
+            yield from below(its, (*path, name))
+
+    return below(typer.main.get_command(commands.app), ())
+
+
+def test_every_command_has_a_help_text() -> None:
+    paths = list(command_paths())
+    for path in paths:
+        shown = padwatch(*path, "--help")
+        assert (shown.exit_code, shown.stderr) == (0, ""), path
+        assert " ".join(path) in shown.stdout
+    assert len(paths) > 40
+
+
+def test_the_version_is_that_of_the_package() -> None:
+    shown = padwatch("--version")
+    assert (shown.exit_code, shown.stdout) == (0, f"padwatch {version('padwatch')}\n")
+
+
+def test_every_error_with_an_exit_code_exists():
     for name in options.EXIT_CODES:
         module, _, error = name.rpartition(".")
         assert issubclass(resolve_name(f"{module}:{error}"), Exception)
+
+
+@pytest.fixture
+def server_plant(plant_path: Path, postgres_place: PostgresPlace) -> Path:
+    """A plant file that names the database; its data folder is empty."""
+    text, address = plant_path.read_text(), postgres_place.address.conninfo
+    plant_path.write_text(f'{text}\n[store]\npostgresql = "{address}"\n')
+    return plant_path
+
+
+def run(*arguments: object, exit_code: int = 0) -> str:
+    """Run a command; what it says."""
+    done = padwatch(*arguments)
+    assert done.exit_code == exit_code, done.output
+    return done.output
+
+
+def test_commands_work_on_a_postgresql_server_and_make_no_file(server_plant, tmp_path):
+    run("keys", "create", server_plant, "wall", "--role", "viewer")
+    gaps = ("--x-um", "2000", "--y-um", "2001")
+    place = ("--unit", "U1", "--bearing", "UJB")
+    run("reference", "set", server_plant, *place, *gaps, "--author", "Ada")
+    assert "wall" in run("keys", "list", server_plant)
+    assert "2 entries" in run("audit", "verify", server_plant)
+    assert "2001" in run("reference", "list", server_plant)
+    assert not list(tmp_path.rglob("*.sqlite3"))
+
+
+def test_copies_are_left_to_the_servers_own_tools(server_plant, tmp_path):
+    for arguments in (
+        ("backup", server_plant, tmp_path),
+        ("restore", server_plant, tmp_path / "copy"),
+    ):
+        said = run(*arguments, exit_code=1)
+        assert "must be copied with pg_dump or pg_basebackup" in said
+        assert len(said.strip().splitlines()) == 1
+
+
+NO_STREAM = "no [stream]: add one with the servers of NATS, or use `padwatch run`"
+
+# no server is there, and none is asked before the mistake is found
+STREAM = '[stream]\nservers = ["nats://127.0.0.1:1"]\n'
+SECRET = STREAM.replace("nats://", "nats://user:secret@")
+
+
+@pytest.mark.parametrize(
+    ("command", "stream", "options", "words"),
+    [
+        ("acquire", "", (), NO_STREAM),
+        ("analyse", "", (), NO_STREAM),
+        ("analyse", STREAM, ("--partition", "2"), "such as 1/2"),
+        ("analyse", STREAM, ("--partition", "3/2"), "such as 1/2"),
+        ("analyse", STREAM, ("--partition", "3/3"), "empty"),
+        ("acquire", STREAM, ("--unit", "U9"), "unknown unit 'U9'; known units: U1, U2"),
+        ("acquire", SECRET, (), "servers"),
+        ("serve", "", ("--port", "0"), NEEDS_POSTGRESQL),
+    ],
+)
+def test_what_is_missing_or_wrong_is_refused_with_what_to_do(
+    plant_path, command, stream, options, words
+):
+    plant_path.write_text(f"{plant_path.read_text()}\n{stream}")
+    done = padwatch(command, plant_path, *options)
+    assert done.exit_code == 2
+    assert words in done.output

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rigs.blocks import cell_block
 from typer.testing import CliRunner
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.simulated.devices.map_device import MapDevice
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice
+from core.samples.blocks import SampleBlock
 from core.samples.calibration import SlowCalibration, UnitCalibration
 from service.cli.probe import app
 from service.settings.sources.register_map import load_map_file
@@ -34,10 +35,10 @@ class SlowFeed:
     def __init__(self, slow: tuple[float, ...]) -> None:
         self._slow, self._n = slow, 0
 
-    def advance(self, n_samples: int) -> RawBlock:
+    def advance(self, n_samples: int) -> SampleBlock:
         first, self._n = self._n, self._n + n_samples
         counts = np.zeros((0, n_samples), dtype=np.int16)
-        return RawBlock(0, first, 1_800_000_000 * 10**9, 1.0, counts, (), self._slow)
+        return cell_block(0, first, 1_800_000_000 * 10**9, 1.0, counts, (), self._slow)
 
 
 @pytest.fixture
@@ -70,7 +71,7 @@ def at(server: ModbusTcpServer) -> str:
 
 async def test_registers_are_read_in_every_type_and_byte_order_and_the_likely_one_is_marked(
     probe, server
-) -> None:
+):
     look = ("modbus", at(server), "--address", "100", "--count", "2")
     result, table = await probe(*look, "--json"), await probe(*look)
 
@@ -92,7 +93,7 @@ async def test_registers_are_read_in_every_type_and_byte_order_and_the_likely_on
     assert [line.split()[-2] for line in marked] == ["92.25"]
 
 
-async def test_a_map_is_read_once_and_every_value_shown_with_its_registers(probe, server) -> None:
+async def test_a_map_is_read_once_and_every_value_shown_with_its_registers(probe, server):
     result = await probe("map", str(GATEWAY), "--at", at(server), "--json")
 
     assert result.exit_code == 0, result.output
@@ -112,7 +113,7 @@ async def test_a_map_is_read_once_and_every_value_shown_with_its_registers(probe
     assert found["ljb_oil_temperature"]["state"] == "invalid"
 
 
-async def test_a_flagged_value_is_shown_with_its_word(probe, server, gateway) -> None:
+async def test_a_flagged_value_is_shown_with_its_word(probe, server, gateway):
     gateway.spoil("flag", 1)
     gateway.produce()
     result = await probe("map", str(GATEWAY), "--at", at(server))
@@ -122,7 +123,7 @@ async def test_a_flagged_value_is_shown_with_its_word(probe, server, gateway) ->
     assert "40106=0x0003" in line
 
 
-async def test_a_block_ring_is_decoded_by_its_own_header(probe, counting_feed) -> None:
+async def test_a_block_ring_is_decoded_by_its_own_header(probe, counting_feed):
     device = RingDevice(counting_feed(n_channels=3, slow=(92.25, float("nan"))))
     device.produce(4)
     async with ModbusTcpServer(device) as server:
@@ -147,7 +148,7 @@ async def test_a_block_ring_is_decoded_by_its_own_header(probe, counting_feed) -
     assert "magic is" in other.stderr
 
 
-async def test_nothing_but_reads_is_sent(probe, server) -> None:
+async def test_nothing_but_reads_is_sent(probe, server):
     await probe("modbus", at(server), "--address", "100")
     await probe("map", str(GATEWAY), "--at", at(server))
     await probe("identity", at(server))
@@ -155,7 +156,7 @@ async def test_nothing_but_reads_is_sent(probe, server) -> None:
     assert set(server.function_codes) <= {3, 43}
 
 
-async def test_a_device_tells_who_it_is(probe, server, gateway) -> None:
+async def test_a_device_tells_who_it_is(probe, server, gateway):
     gateway.identification = {0: b"Maker", 1: b"Rack 7", 2: b"1.2"}
     result = await probe("identity", at(server), "--json")
 
@@ -188,9 +189,7 @@ async def test_a_device_tells_who_it_is(probe, server, gateway) -> None:
         (("map", "absent.toml"), 2, "No such file"),
     ],
 )
-async def test_what_cannot_be_read_is_one_sentence(
-    probe, server, arguments: tuple[str, ...], code: int, said: str
-) -> None:
+async def test_what_cannot_be_read_is_one_sentence(probe, server, arguments, code, said):
     result = await probe(*(a.format(port=server.port) for a in arguments))
 
     assert result.exit_code == code, result.output
@@ -198,7 +197,7 @@ async def test_what_cannot_be_read_is_one_sentence(
     assert "Traceback" not in result.output
 
 
-async def test_another_device_than_the_map_is_for_is_refused(probe, server, tmp_path: Path) -> None:
+async def test_another_device_than_the_map_is_for_is_refused(probe, server, tmp_path):
     path = tmp_path / "map.toml"
     signature = "[[signature]]\naddress = 40101\nexpected = 7\n"
     path.write_text(GATEWAY.read_text().replace("[heartbeat]", signature + "[heartbeat]"))
@@ -208,7 +207,7 @@ async def test_another_device_than_the_map_is_for_is_refused(probe, server, tmp_
     assert "wrong device: register 40101" in result.stderr
 
 
-async def test_the_map_of_a_plants_rack_is_read_with_units(probe, tmp_path: Path) -> None:
+async def test_the_map_of_a_plants_rack_is_read_with_units(probe, tmp_path):
     ids = [
         f"{b}_{p}_{a}" for b in ("ujb", "ljb", "tjb") for p in ("shaft", "bearing") for a in "xy"
     ]

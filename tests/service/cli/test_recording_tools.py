@@ -1,17 +1,30 @@
 """`padwatch recording info|verify|export|import` as a user sees them."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import can
 import numpy as np
 import pytest
 from click.testing import Result
+from rigs.blocks import cell_block
 from rigs.command_line import padwatch
 
-from acquisition.delivery.blocks import RawBlock, sample_block
+from acquisition.can.settings import CanLinkSettings, CanSettings
+from acquisition.delivery.blocks import BlockJoiner
+from acquisition.errors import ConfigError
+from acquisition.recordings.imports.job import ImportJob, TimeAxis
 from acquisition.recordings.reader import open_recording
-from core.samples.blocks import Rejection
+from acquisition.recordings.reading import imported_frames
+from acquisition.simulated.devices.can_device import CanDevice
+from acquisition.simulated.devices.can_frames import WireFrame
+from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_dbc, daq_settings
+from acquisition.simulated.feed import FeedEndedError
+from core.samples.blocks import Rejection, SampleBlock, SideValues
+from core.samples.calibration import UnitCalibration
 from service.app.recordings import recording_writer
+from service.cli.offline.importing import CanLogDecoder
 from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
 from service.settings.units import UnitSettings
@@ -28,7 +41,9 @@ def unit(plant_path: Path) -> UnitSettings:
     return load_plant_file(plant_path).unit[0]
 
 
-def raw_block(unit: UnitSettings, first_index: int, epoch: int = 1, **changes: object) -> RawBlock:
+def raw_block(
+    unit: UnitSettings, first_index: int, epoch: int = 1, **changes: object
+) -> SampleBlock:
     n_channels = len(unit.channel)
     index = np.arange(first_index, first_index + 50)
     values: dict[str, object] = {
@@ -39,8 +54,9 @@ def raw_block(unit: UnitSettings, first_index: int, epoch: int = 1, **changes: o
         "counts": (index + 1000 * np.arange(1, n_channels + 1)[:, np.newaxis]).astype(np.int16),
         "ok": (True,) * n_channels,
         "slow": tuple(20.0 + n for n in range(len(unit.slow_channel))),
+        "calibration": calibration_of(unit),
     }
-    return RawBlock(**(values | changes))
+    return cell_block(**(values | changes))
 
 
 @pytest.fixture
@@ -55,7 +71,7 @@ def folder(unit: UnitSettings, tmp_path: Path) -> Path:
     return tmp_path / "run"
 
 
-def test_info_counts_gaps_rejections_and_restarts_exactly(folder: Path, unit: UnitSettings) -> None:
+def test_info_counts_gaps_rejections_and_restarts_exactly(folder, unit):
     told = json.loads(padwatch_recording("info", folder, "--json").stdout)
     assert (told["unit"], told["sample_type"], told["rate_hz"]) == ("U1", "int16", 600.0)
     counted = [told[name] for name in ("samples", "offered", "gaps", "gap_samples")]
@@ -71,7 +87,13 @@ def test_info_counts_gaps_rejections_and_restarts_exactly(folder: Path, unit: Un
     assert len(told["files"]["samples.parquet"]["sha256"]) == 64
 
 
-def test_info_for_people_says_the_same(folder: Path) -> None:
+def test_missing_parent_folders_of_a_recording_are_created(unit, tmp_path):
+    with recording_writer(unit, tmp_path / "runs" / "march" / "run42", "a test") as writer:
+        writer.write(raw_block(unit, 0))
+    assert padwatch_recording("verify", tmp_path / "runs" / "march" / "run42").exit_code == 0
+
+
+def test_info_for_people_says_the_same(folder):
     result = padwatch_recording("info", folder)
     assert result.exit_code == 0
     for line in (
@@ -86,7 +108,7 @@ def test_info_for_people_says_the_same(folder: Path) -> None:
         assert f"{line}\n" in result.stdout
 
 
-def test_verify_reads_every_page(folder: Path) -> None:
+def test_verify_reads_every_page(folder):
     result = padwatch_recording("verify", folder)
     assert (result.exit_code, result.stdout) == (
         0,
@@ -100,7 +122,7 @@ def test_verify_reads_every_page(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["info", "verify"])
-def test_a_damaged_recording_is_one_sentence_and_exit_code_1(folder: Path, command: str) -> None:
+def test_a_damaged_recording_is_one_sentence_and_exit_code_1(folder, command):
     content = bytearray((folder / "samples.parquet").read_bytes())
     content[100] ^= 1
     (folder / "samples.parquet").write_bytes(content)
@@ -139,9 +161,7 @@ def mapping_of(unit: UnitSettings) -> str:
     return text
 
 
-def test_what_is_exported_can_be_imported_again(
-    folder: Path, plant_path: Path, unit: UnitSettings, tmp_path: Path
-) -> None:
+def test_what_is_exported_can_be_imported_again(folder, plant_path, unit, tmp_path):
     result = padwatch_recording("export", folder, "--format", "csv", "--out", tmp_path / "run.csv")
     assert (result.exit_code, result.stderr) == (0, "")
     assert result.stdout == f"{tmp_path}/run.csv: 200 samples of each channel\n"
@@ -153,10 +173,11 @@ def test_what_is_exported_can_be_imported_again(
     assert (result.exit_code, result.stderr) == (0, "")
     told = json.loads(result.stdout)
     assert (told["samples"], told["gap_samples"], told["sample_type"]) == (200, 200, "float32")
-    calibration = calibration_of(unit)
-    before = [sample_block([raw], calibration) for raw in open_recording(folder).raw_blocks()]
     again = open_recording(tmp_path / "again")
-    after = [sample_block([raw], calibration) for raw in again.raw_blocks()]
+    before, after = (
+        [cell for block in recording.blocks() for cell in block.cells()]
+        for recording in (open_recording(folder), again)
+    )
     for first, second in zip(before, after, strict=True):
         assert (first.start_ns, first.first_index) == (second.start_ns, second.first_index)
         assert first.slow == second.slow
@@ -179,7 +200,7 @@ def test_what_is_exported_can_be_imported_again(
             "ujb_shaft_x",
             "ujb_shaft_z",
             1,
-            "channel ujb_shaft_z is mapped, but unit U1 has ujb_shaft",
+            "channel ujb_shaft_z is mapped, but unit U1 has only ujb_shaft",
         ),
         ('zone = "UTC"', "", 2, "time.zone (by default): is required"),
         (
@@ -191,15 +212,8 @@ def test_what_is_exported_can_be_imported_again(
     ],
 )
 def test_a_mapping_that_does_not_fit_is_refused_and_leaves_nothing(
-    folder: Path,
-    plant_path: Path,
-    unit: UnitSettings,
-    tmp_path: Path,
-    old: str,
-    new: str,
-    code: int,
-    words: str,
-) -> None:
+    folder, plant_path, unit, tmp_path, old, new, code, words
+):
     padwatch_recording("export", folder, "--format", "csv", "--out", tmp_path / "run.csv")
     text = mapping_of(unit)
     assert old in text
@@ -212,7 +226,95 @@ def test_a_mapping_that_does_not_fit_is_refused_and_leaves_nothing(
     assert not list(tmp_path.glob("again*"))
 
 
-def test_nothing_that_exists_is_overwritten(folder: Path) -> None:
-    result = padwatch_recording("export", folder, "--format", "csv", "--out", folder)
-    assert result.exit_code == 1
-    assert "the file exists already and is not overwritten" in result.stderr
+START_S = 1_767_225_600
+
+
+class GappyFeed:
+    """The counting feed with holes, a sick channel and slow values that change."""
+
+    def __init__(self, feed) -> None:
+        self._feed, self.sent = feed, []
+
+    def advance(self, n_samples: int) -> SampleBlock:
+        number = len(self.sent)
+        if number == 200:
+            raise FeedEndedError
+        if number % 30 == 29:
+            self._feed.advance(7 * number)
+        raw = self._feed.advance(n_samples)
+        ok = (True, number % 13 != 0)
+        stamp_ns = raw.start_ns // 1000 * 1000
+        side = SideValues.of(stamp_ns, ok, (40.0 + number, float("nan")))
+        self.sent.append(replace(raw, side=side))
+        return self.sent[-1]
+
+
+@pytest.mark.parametrize("kind", ["candump", "blf"])
+@pytest.mark.parametrize("fd", [False, True])
+def test_every_sample_flag_and_stamp_comes_back(
+    counting_feed, counts_calibration, tmp_path, kind, fd
+):
+    shape = CanShape(
+        channels=(DaqSignal("c0", "V", 1.0), DaqSignal("c1", "V", 1.0)),
+        slow=(DaqSignal("slow0", "degC"), DaqSignal("slow1", "degC")),
+        fd=fd,
+    )
+    feed = GappyFeed(counting_feed())
+    device = CanDevice(feed, shape)
+    write_log(tmp_path / "log", kind, device)
+    (tmp_path / "daq.dbc").write_text(daq_dbc(shape), encoding="utf-8")
+    link = CanLinkSettings(interface="virtual", channel="none", fd=fd)
+    settings: CanSettings = daq_settings(shape, link, ("um", "um"))
+    decoder = CanLogDecoder(settings, counts_calibration())
+    job = ImportJob(format=kind, rate_hz=600.0, time=TimeAxis("file", 0))
+    read = imported_frames(tmp_path / "log", job)
+    raws = [raw for frames, _ in read for raw in decoder.take(frames)]
+    assert on_grid(raws, counts_calibration()) == on_grid(feed.sent, counts_calibration())
+
+
+def test_a_log_of_two_devices_under_the_same_ids_is_refused(
+    counting_feed, counts_calibration, tmp_path
+):
+    shape = CanShape(
+        channels=(DaqSignal("c0", "V", 1.0), DaqSignal("c1", "V", 1.0)),
+        slow=(DaqSignal("slow0", "degC"), DaqSignal("slow1", "degC")),
+    )
+    one, other = (CanDevice(GappyFeed(counting_feed()), shape) for _ in range(2))
+    for _ in range(20):  # of the same make, and on for a little longer
+        other.next_frames()
+        other.produce()
+    write_log(tmp_path / "log", "candump", one, other)
+    link = CanLinkSettings(interface="virtual", channel="none")
+    decoder = CanLogDecoder(daq_settings(shape, link, ("um", "um")), counts_calibration())
+    job = ImportJob(format="candump", rate_hz=600.0, time=TimeAxis("file", 0))
+    every_batch = (decoder.take(frames) for frames, _ in imported_frames(tmp_path / "log", job))
+    with pytest.raises(ConfigError, match="do two devices send the same CAN ids"):
+        list(every_batch)
+
+
+def write_log(path: Path, kind: str, *devices: CanDevice) -> None:
+    writer = can.CanutilsLogWriter if kind == "candump" else can.BLFWriter
+    with writer(path) as log:
+        n_frames = 0
+        while all(device.has_frames for device in devices):
+            for frame in (frame for device in devices for frame in device.next_frames()):
+                log(as_message(frame, n_frames))
+                n_frames += 1
+            for device in devices:
+                device.produce()
+
+
+def as_message(frame: WireFrame, number: int) -> can.Message:
+    return can.Message(
+        timestamp=START_S + number * 1e-4,
+        arbitration_id=frame.frame_id,
+        is_extended_id=frame.extended,
+        is_fd=frame.fd,
+        data=frame.data,
+    )
+
+
+def on_grid(raws: list[SampleBlock], calibration: UnitCalibration) -> list[SampleBlock]:
+    joiner = BlockJoiner(50)
+    blocks = [b for raw in raws for b in joiner.put([replace(raw, calibration=calibration)])]
+    return blocks + joiner.flush()

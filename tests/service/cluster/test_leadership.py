@@ -1,8 +1,9 @@
-"""Units and shared work are done by one process each, and by the next when that is gone."""
+"""Units and shared work are done by one process each, by the next when that is gone."""
 
 import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,12 +11,19 @@ from harness.waiting import at_work, until
 from rigs.standing_clock import StandingClock
 
 from acquisition.clock import SystemClock
+from core.alarms.alarm import PLANT, Alarm, AlarmChange, AlarmIdentity, AlarmNews, changed
+from core.alarms.statistics import ChatterRule
+from core.limits import AlarmLevel
 from service.cluster.ownership import HoldLostError, Holds, Leadership, Partition
+from service.live.current_state import LiveAlarms
+from service.measuring.alarm_engine import AlarmEngine, alarm_engine
+from service.measuring.service_alarms import ServiceHealth
 from service.notifications.channel import Delivered
 from service.notifications.sender import Deliveries, Receiver
 from service.runtime.heartbeats import UNHEARD, Heartbeats, Pulse
 from service.settings.loading import load_plant_file
 from service.settings.notifications import WebhookSettings
+from service.settings.storage import Origin
 from service.store.database import Hold
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
@@ -94,7 +102,7 @@ def name() -> Name:
     return Name()
 
 
-async def test_one_of_two_does_the_work(name: Name) -> None:
+async def test_one_of_two_does_the_work(name):
     first, second = Process(name), Process(name)
     first.start()
     await until(lambda: first.n_working)
@@ -111,7 +119,7 @@ async def test_one_of_two_does_the_work(name: Name) -> None:
     assert (first.n_working, second.n_working) == (0, 0)
 
 
-async def test_whoever_loses_the_name_stops_before_it_may_lead_again(name: Name) -> None:
+async def test_whoever_loses_the_name_stops_before_it_may_lead_again(name):
     process = Process(name)
     process.start()
     await until(lambda: process.n_working)
@@ -125,7 +133,7 @@ async def test_whoever_loses_the_name_stops_before_it_may_lead_again(name: Name)
     await process.stop()
 
 
-async def test_work_that_fails_ends_the_process(name: Name) -> None:
+async def test_work_that_fails_ends_the_process(name):
     async def broken(_: Pulse) -> None:
         raise ZeroDivisionError
 
@@ -136,9 +144,7 @@ async def test_work_that_fails_ends_the_process(name: Name) -> None:
     assert name.holder is None
 
 
-async def test_senders_of_a_process_that_lost_the_name_do_not_count_as_dead(
-    name: Name, tmp_path: Path
-) -> None:
+async def test_senders_of_a_process_that_lost_the_name_do_not_count_as_dead(name, tmp_path):
     clock = StandingClock()
     beats = Heartbeats(clock)
     with closing(SqliteStore(tmp_path / "padwatch.sqlite3")) as store:
@@ -180,7 +186,7 @@ async def waiting(holds: Holds) -> "asyncio.Task[None]":
     return taking
 
 
-async def test_a_second_process_stands_by_until_the_first_one_ends(begin: Begin) -> None:
+async def test_a_second_process_stands_by_until_the_first_one_ends(begin):
     first, second = begin("U1", "U2"), begin("U1", "U2")
     await first.take()
     assert first.waits_for is None
@@ -193,7 +199,7 @@ async def test_a_second_process_stands_by_until_the_first_one_ends(begin: Begin)
     assert second.waits_for is None
 
 
-async def test_shares_that_overlap_take_all_their_units_or_none(begin: Begin) -> None:
+async def test_shares_that_overlap_take_all_their_units_or_none(begin):
     first, second, third = begin("U2"), begin("U1", "U2"), begin("U1")
     await first.take()
     taking = await waiting(second)
@@ -208,7 +214,7 @@ class Lost:
     is_held = False
 
 
-async def test_who_has_lost_a_name_stops(begin: Begin) -> None:
+async def test_who_has_lost_a_name_stops(begin):
     holds = begin("U1")
     await holds.take()
     lost: Hold = Lost()
@@ -217,30 +223,30 @@ async def test_who_has_lost_a_name_stops(begin: Begin) -> None:
         holds.require()
 
 
-PLANT = load_plant_file(Path(__file__).parents[3] / "deploy" / "demo.toml")
+DEMO = load_plant_file(Path(__file__).parents[3] / "deploy" / "demo.toml")
 UNITS = [f"U{number:02}" for number in range(1, 21)]
 
 
 @pytest.mark.parametrize("n_parts", [1, 2, 3, 7, 20])
-def test_every_unit_is_in_exactly_one_share_and_all_have_about_as_many(n_parts: int) -> None:
+def test_every_unit_is_in_exactly_one_share_and_all_have_about_as_many(n_parts):
     shares = [Partition(number, n_parts).units(UNITS[::-1]) for number in range(1, n_parts + 1)]
     assert sorted(unit for share in shares for unit in share) == UNITS
     assert max(map(len, shares)) - min(map(len, shares)) <= 1
 
 
 @pytest.mark.parametrize("text", ["", "1", "0/2", "3/2", "-1/2", "1/2/3", "a/b", "1/0", "99999/1"])
-def test_what_is_no_share_is_refused_with_what_to_write(text: str) -> None:
+def test_what_is_no_share_is_refused_with_what_to_write(text):
     with pytest.raises(ValueError, match="such as 1/2"):
         Partition.of(text)
 
 
-def test_a_share_without_units_is_refused() -> None:
+def test_a_share_without_units_is_refused():
     with pytest.raises(ValueError, match="at most 2 parts"):
-        Partition(3, 3).part_of(PLANT)
+        Partition(3, 3).part_of(DEMO)
 
 
-def test_one_share_raises_the_alarms_that_are_of_no_unit() -> None:
-    first, second = (Partition(number, 2).share_of(PLANT) for number in (1, 2))
+def test_one_share_raises_the_alarms_that_are_of_no_unit():
+    first, second = (Partition(number, 2).share_of(DEMO) for number in (1, 2))
     assert first.looks_after("U1")
     assert not first.looks_after("U2")
     assert first.looks_after("plant")
@@ -248,3 +254,41 @@ def test_one_share_raises_the_alarms_that_are_of_no_unit() -> None:
     assert second.looks_after("U2")
     assert not second.looks_after("U1")
     assert not second.looks_after("plant")
+
+
+LOST = Alarm(AlarmIdentity(PLANT, "U2", "samples_lost"))
+
+
+async def test_a_standing_alarm_goes_on_with_the_process_of_its_unit(
+    deploy, tmp_path, stepped_clock
+):
+    plant = load_plant_file(deploy / "demo.toml")
+    raised = replace(LOST, level=AlarmLevel.ALERT, occurrence=1)
+    raised, event = changed(LOST, raised, AlarmChange.RAISED, stepped_clock.now_ns())
+    with closing(SqliteStore(tmp_path / "padwatch.sqlite3")) as store:
+        store.append([], [], [AlarmNews(raised, (event,))])
+
+        async def begun(share: str) -> AlarmEngine:
+            part = Partition.of(share)
+            return await alarm_engine(
+                part.part_of(plant),
+                Origin.LIVE,
+                store,
+                lambda _: None,
+                stepped_clock,
+                look=ServiceHealth,
+                part=part.share_of(plant),
+            )
+
+        standing = {
+            share: [alarm.identity.id for alarm in (await begun(share)).alarms if alarm.level]
+            for share in ("1/2", "2/2")
+        }
+
+    assert standing == {"1/2": [], "2/2": [LOST.identity.id]}
+
+
+def test_a_replica_asks_the_process_of_the_unit():
+    replica = LiveAlarms(["U1", "U2"], lambda _: True, ChatterRule())
+    replica.take_stored([LOST])
+    assert replica.owner(LOST.identity.id) == "U2"

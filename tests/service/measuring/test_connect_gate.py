@@ -39,7 +39,7 @@ class VirtualClock:
                     waiting.set_result(None)
 
 
-async def test_a_hundred_absent_devices_are_tried_evenly_and_a_single_one_is_not_held_up() -> None:
+async def test_a_hundred_absent_devices_are_tried_evenly_and_a_single_one_is_not_held_up():
     clock, jitter = VirtualClock(), np.random.default_rng(1)
     gate = ConnectGate(PER_S, clock)
     attempts: list[float] = []

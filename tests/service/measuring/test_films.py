@@ -32,7 +32,6 @@ from service.store.sqlite import SqliteStore
 
 DAY_NS = 86_400_000_000_000
 UJB = FilmPlace("U1", "UJB", Estimator.DYNAMIC)
-FilmLife = Callable[..., StiffnessHistory]
 Tell = Callable[..., list[FilmNews]]
 
 
@@ -105,9 +104,7 @@ def days_of(history: StiffnessHistory, first: float, end: float) -> StiffnessHis
     return history.where((day >= first) & (day < end))
 
 
-async def test_a_baseline_is_learned_after_its_days_and_put_in_force(
-    plant: Plant, film_life: FilmLife
-) -> None:
+async def test_a_baseline_is_learned_after_its_days_and_put_in_force(plant, film_life):
     keeper, history = await plant.start(learn_every_days=4), film_life(2, days=31)
 
     await plant.live(keeper, history, (0, 19))
@@ -122,7 +119,7 @@ async def test_a_baseline_is_learned_after_its_days_and_put_in_force(
     assert set(newest.baseline_version.tolist()) <= {versions[0], versions[0] - 1}
 
 
-async def test_learning_ends_with_its_period(plant: Plant, film_life: FilmLife) -> None:
+async def test_learning_ends_with_its_period(plant, film_life):
     keeper, history = await plant.start(learning_days=30, learn_every_days=5), film_life(2, days=37)
     await plant.live(keeper, history, (0, 37))
     last = plant.store.films.baselines("U1", "UJB")[0]
@@ -130,9 +127,7 @@ async def test_learning_ends_with_its_period(plant: Plant, film_life: FilmLife) 
     assert last.learned_until_ns > history.time_ns[0] + 29 * DAY_NS
 
 
-async def test_a_film_that_creeps_away_is_not_learned_little_by_little(
-    plant: Plant, film_life: FilmLife
-) -> None:
+async def test_a_film_that_creeps_away_is_not_learned_little_by_little(plant, film_life):
     """Too slow to differ much from one fortnight's baseline to the next."""
     creep = film_life(
         2, days=90, change=lambda h: np.log(1.0 - 0.2 * np.clip((h / 24 - 20) / 70, 0.0, 1.0))
@@ -150,9 +145,7 @@ async def test_a_film_that_creeps_away_is_not_learned_little_by_little(
     assert (found.change[:, -1] < -0.1).all()
 
 
-async def test_a_restart_goes_on_with_the_same_baseline_and_decisions(
-    plant: Plant, film_life: FilmLife
-) -> None:
+async def test_a_restart_goes_on_with_the_same_baseline_and_decisions(plant, film_life):
     history = film_life(2, days=26)
     keeper = await plant.start(learn_every_days=100)
     await plant.live(keeper, history, (0, 25), judged=True)
@@ -166,7 +159,7 @@ async def test_a_restart_goes_on_with_the_same_baseline_and_decisions(
     assert in_force(again) == in_force(keeper) == 1
 
 
-async def test_engineers_decide_where_it_is_left_to_them(plant: Plant, film_life: FilmLife) -> None:
+async def test_engineers_decide_where_it_is_left_to_them(plant, film_life):
     keeper = await plant.start(acceptance="by_engineer", learn_every_days=5)
     await plant.live(keeper, film_life(2, days=28), (0, 28))
     assert in_force(keeper) is None
@@ -192,9 +185,7 @@ async def test_engineers_decide_where_it_is_left_to_them(plant: Plant, film_life
     ]
 
 
-async def test_what_is_frozen_is_learned_no_further_until_it_is_thawed(
-    plant: Plant, film_life: FilmLife
-) -> None:
+async def test_what_is_frozen_is_learned_no_further_until_it_is_thawed(plant, film_life):
     keeper, history = await plant.start(learn_every_days=5), film_life(2, days=45)
     with pytest.raises(BaselineRefusedError, match="no baseline in force"):
         await keeper.act(UJB, Freeze(), "Ada", "too early")
@@ -209,7 +200,7 @@ async def test_what_is_frozen_is_learned_no_further_until_it_is_thawed(
     assert in_force(keeper) == 2
 
 
-async def test_an_overhaul_begins_everything_again(plant: Plant, film_life: FilmLife) -> None:
+async def test_an_overhaul_begins_everything_again(plant, film_life):
     keeper, history = await plant.start(), film_life(2, days=60)
     await plant.live(keeper, history, (0, 25))
     assert in_force(keeper) == 1
@@ -228,9 +219,7 @@ async def test_an_overhaul_begins_everything_again(plant: Plant, film_life: Film
     assert baseline.learned_from_ns >= event_ns
 
 
-async def test_readings_in_a_wrong_unit_are_mentioned_and_change_nothing(
-    plant: Plant, film_life: FilmLife
-) -> None:
+async def test_readings_in_a_wrong_unit_are_mentioned_and_change_nothing(plant, film_life):
     keeper, history = await plant.start(), film_life(2, days=25)
     ln_k = history.ln_k.copy()
     ln_k[0, 500:600] += np.log(1000.0)
@@ -238,4 +227,4 @@ async def test_readings_in_a_wrong_unit_are_mentioned_and_change_nothing(
     assert in_force(keeper) == 1
     learned = plant.store.films.steps("U1", "UJB")[0]
     assert learned.step is BaselineStep.LEARNED
-    assert "readings in x are at least twice or at most half of the others" in learned.reason
+    assert "readings in x are at least twice or at most half the baseline" in learned.reason

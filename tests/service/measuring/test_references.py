@@ -1,7 +1,6 @@
 """References: refused with the reason, or stored and taken over while the service runs."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,15 +13,8 @@ from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
 from core.quality import Reading, Reason, missing, uncertain
-from service.measuring.references import (
-    LOOK_EVERY_S,
-    ReferenceRefusedError,
-    ReferencesInForce,
-    doubts,
-    given_gaps,
-    measured_gaps,
-    with_reference,
-)
+from service.live.references import LOOK_EVERY_S, ReferencesInForce, with_reference
+from service.measuring.references import ReferenceRefusedError, doubts, given_gaps, measured_gaps
 from service.store.port import StoredReadings, StoreError
 from service.store.references import GapReference, ReferenceSource
 from service.store.sqlite import SqliteStore
@@ -58,9 +50,7 @@ def watched(monitor: UnitMonitor) -> dict[str, tuple[float, float]]:
     return {bearing.id: bearing.gap_reference_um for bearing in monitor.unit.bearings}
 
 
-async def test_a_bearing_is_watched_with_the_reference_set_last(
-    in_force: ReferencesInForce, monitor: UnitMonitor, store: SqliteStore
-) -> None:
+async def test_a_bearing_is_watched_with_the_reference_set_last(in_force, monitor, store):
     store.add_reference(reference(x_um=1.0))
     store.add_reference(reference())
     await in_force.look()
@@ -73,12 +63,8 @@ async def test_a_bearing_is_watched_with_the_reference_set_last(
 
 
 async def test_a_reference_set_while_the_service_runs_is_taken_over_at_the_next_look_and_said_once(
-    in_force: ReferencesInForce,
-    monitor: UnitMonitor,
-    store: SqliteStore,
-    stepped_clock: Clock,
-    logged: list[Any],
-) -> None:
+    in_force, monitor, store, stepped_clock, logged
+):
     async with at_work(in_force.run()):
         for x_um in (1990.0, 1991.0, 1992.0):
             store.add_reference(reference(x_um=x_um))
@@ -94,8 +80,8 @@ async def test_a_reference_set_while_the_service_runs_is_taken_over_at_the_next_
 
 
 async def test_a_reference_of_a_bearing_that_is_gone_is_ignored_and_said_once(
-    in_force: ReferencesInForce, monitor: UnitMonitor, store: SqliteStore, logged: list[Any]
-) -> None:
+    in_force, monitor, store, logged
+):
     store.add_reference(reference("TJB"))
     store.add_reference(reference(unit="U9"))
     store.add_reference(reference())
@@ -108,12 +94,8 @@ async def test_a_reference_of_a_bearing_that_is_gone_is_ignored_and_said_once(
 
 
 async def test_while_the_store_cannot_be_read_the_references_stay(
-    in_force: ReferencesInForce,
-    monitor: UnitMonitor,
-    store: SqliteStore,
-    tmp_path: Path,
-    logged: list[Any],
-) -> None:
+    in_force, monitor, store, tmp_path, logged
+):
     store.add_reference(reference())
     await in_force.look()
     path, away = tmp_path / "padwatch.sqlite3", tmp_path / "away"
@@ -132,7 +114,7 @@ async def test_while_the_store_cannot_be_read_the_references_stay(
     assert [line["log_level"] for line in logged] == ["info", "error", "info", "info"]
 
 
-def test_opposite_gaps_are_taken_over_where_there_are_such_gaps_and_such_probes() -> None:
+def test_opposite_gaps_are_taken_over_where_there_are_such_gaps_and_such_probes():
     both = GapReference("U1", "UJB", 7, "A. Name", (1e3, 2e3), (3e3, 4e3), ReferenceSource.MEASURED)
 
     assert with_reference(FOUR, reference()).opposite_reference_um == (1900.0, 1901.0)
@@ -161,7 +143,7 @@ def newest(age_min: float = 1.0, **readings: Reading) -> StoredReadings:
     return StoredReadings(NOW - round(age_min * MINUTE), everything | readings)
 
 
-def test_as_many_gaps_are_needed_as_there_are_probes() -> None:
+def test_as_many_gaps_are_needed_as_there_are_probes():
     assert given_gaps(bearing(), (1.0, 2.0), NONE) == ((1.0, 2.0), None)
     assert given_gaps(FOUR, (1.0, 2.0), (3.0, 4.0)) == ((1.0, 2.0), (3.0, 4.0))
     assert given_gaps(THREE, (1.0, 2.0), (3.0, None)) == ((1.0, 2.0), (3.0, 1901.0))
@@ -179,14 +161,12 @@ def test_as_many_gaps_are_needed_as_there_are_probes() -> None:
         (THREE, (1.0, 2.0), (3.0, 4.0), "no opposite probe in y"),
     ],
 )
-def test_gaps_that_do_not_fit_the_probes_are_refused(
-    of: Bearing, near: Any, opposite: Any, said: str
-) -> None:
+def test_gaps_that_do_not_fit_the_probes_are_refused(of, near, opposite, said):
     with pytest.raises(ReferenceRefusedError, match=said):
         given_gaps(of, near, opposite)
 
 
-def test_the_newest_mean_gaps_become_the_reference_and_doubtful_ones_are_named() -> None:
+def test_the_newest_mean_gaps_become_the_reference_and_doubtful_ones_are_named():
     for age_min in (0.0, 9.9, -9.9):
         assert measured_gaps(bearing(), newest(age_min), NOW) == ((1998.5, 2003.1), None)
     found = newest(opposite_gap_x_um=Reading(7.0), opposite_gap_y_um=Reading(8.0))
@@ -212,7 +192,7 @@ def test_the_newest_mean_gaps_become_the_reference_and_doubtful_ones_are_named()
         (StoredReadings(NOW, {"gap_y_um": Reading(1.0)}), "has no gap_x_um"),
     ],
 )
-def test_gaps_that_are_old_or_unusable_are_refused(found: StoredReadings | None, said: str) -> None:
+def test_gaps_that_are_old_or_unusable_are_refused(found, said):
     with pytest.raises(ReferenceRefusedError, match=said):
         measured_gaps(bearing(), found, NOW)
     with pytest.raises(ReferenceRefusedError, match=r"opposite_gap_y_um .* not_measured"):

@@ -5,16 +5,16 @@ import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from core.limits import AlarmLevel
 from core.monitor.assessment import Assessment
-from service.live.live_view import LiveView
 from service.measuring.integrity import LOOK_EVERY_S, IntegrityMonitor
-from service.measuring.metrics import soundness_metrics
+from service.measuring.live_view import LiveView
+from service.measuring.metrics import add_integrity
 from service.measuring.service_alarms import ServiceAlarms, ServiceHealth
+from service.runtime.metrics import Families
 from service.store.audit import AuditQuery
 from service.store.port import StoreError, TrendQuery
 from service.store.sqlite import SqliteStore
@@ -34,10 +34,12 @@ def path(tmp_path: Path, assessment: Build) -> Path:
 
 
 def told_to_prometheus(soundness: IntegrityMonitor) -> dict[str, float]:
-    return {s.name: s.value for metric in soundness_metrics(soundness) for s in metric.samples}
+    families = Families()
+    add_integrity(families, soundness)
+    return {s.name: s.value for metric in families.collect() for s in metric.samples}
 
 
-async def test_of_what_is_sound_nothing_is_said(path: Path, stepped_clock: Any) -> None:
+async def test_of_what_is_sound_nothing_is_said(path, stepped_clock):
     with closing(SqliteStore(path)) as store:
         soundness = IntegrityMonitor(store, stepped_clock, LiveView([], stepped_clock, 30.0))
         await soundness.look()
@@ -52,8 +54,8 @@ async def test_of_what_is_sound_nothing_is_said(path: Path, stepped_clock: Any) 
 
 
 async def test_a_database_that_was_rolled_back_is_told_as_long_as_the_service_runs(
-    path: Path, stepped_clock: Any, assessment: Build, tmp_path: Path
-) -> None:
+    path, stepped_clock, assessment, tmp_path
+):
     old = tmp_path / "old"
     shutil.copyfile(path, old)
     with closing(SqliteStore(path)) as store:
@@ -72,8 +74,8 @@ async def test_a_database_that_was_rolled_back_is_told_as_long_as_the_service_ru
 
 @pytest.mark.parametrize("word", ["removed", "replaced"])
 async def test_a_file_that_is_gone_is_told_and_nothing_is_written_until_it_is_back(
-    path: Path, stepped_clock: Any, assessment: Build, tmp_path: Path, word: str
-) -> None:
+    path, stepped_clock, assessment, tmp_path, word
+):
     assert LOOK_EVERY_S < 5.0
     live = LiveView([], stepped_clock, 30.0)
     with closing(SqliteStore(path)) as store:
@@ -101,8 +103,8 @@ async def test_a_file_that_is_gone_is_told_and_nothing_is_written_until_it_is_ba
 
 
 def test_a_log_is_not_taken_for_that_of_the_file_that_has_replaced_its_own(
-    path: Path, assessment: Build, tmp_path: Path
-) -> None:
+    path, assessment, tmp_path
+):
     shutil.copyfile(path, tmp_path / "old")
     with closing(SqliteStore(path)) as store:
         store.append([assessment(T0 + n, speed_rpm=9.0) for n in range(3, 50)], [])
@@ -113,7 +115,7 @@ def test_a_log_is_not_taken_for_that_of_the_file_that_has_replaced_its_own(
     assert len(list(path.parent.glob("*.replaced-*-wal"))) == 1
 
 
-async def test_rows_that_are_met_damaged_are_told_once_each(path: Path, stepped_clock: Any) -> None:
+async def test_rows_that_are_met_damaged_are_told_once_each(path, stepped_clock):
     with closing(sqlite3.connect(path)) as other, other:
         other.execute("UPDATE assessment SET coverage = 0.5")
     with closing(SqliteStore(path)) as store:
@@ -123,15 +125,15 @@ async def test_rows_that_are_met_damaged_are_told_once_each(path: Path, stepped_
             await soundness.look()
         told = store.audit.entries(AuditQuery(action="store.row_damaged"))
 
-        assert soundness.trouble == "3 stored rows are damaged and left out"
+        assert soundness.trouble == "damaged or missing rows: 3 (see the audit trail)"
         assert told_to_prometheus(soundness)["padwatch_store_damaged_rows"] == 3.0
         assert sorted(entry.object for entry in told) == [
             f"assessment: series 1, time_ns {T0 + n}" for n in range(3)
         ]
 
 
-def test_damage_is_an_alarm_of_danger_until_the_service_no_longer_knows_of_it() -> None:
-    trouble: list[str | None] = ["3 stored rows are damaged and left out"]
+def test_damage_is_an_alarm_of_danger_until_the_service_no_longer_knows_of_it():
+    trouble: list[str | None] = ["damaged or missing rows: 3 (see the audit trail)"]
     alarms = ServiceAlarms((), None, lambda: ServiceHealth({"stored_trouble": trouble[0]}))
     (raised,) = (e for news in alarms.tick(T0) for e in news.events)
     trouble[0] = None
@@ -140,6 +142,6 @@ def test_damage_is_an_alarm_of_danger_until_the_service_no_longer_knows_of_it() 
     assert raised.identity.kind == "stored_data_damaged"
     assert (raised.level, str(raised.reason)) == (
         AlarmLevel.DANGER,
-        "3 stored rows are damaged and left out",
+        "damaged or missing rows: 3 (see the audit trail)",
     )
     assert returned.change.value == "returned"

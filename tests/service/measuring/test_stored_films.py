@@ -4,7 +4,6 @@ import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from core.baseline.settings import BaselineSettings
 from core.change.cause import Attribution, Cause
 from core.change.decision import Decision, Verdict
 from core.change.evidence import Finding, GatheredEvidence, ScaleSums
-from core.change.film_judge import FilmFinding, FilmNews
+from core.change.film_judge import FilmFinding
 from core.change.shaft_response import learn_response
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel
@@ -24,10 +23,8 @@ from core.machine.unit import Estimator
 from service.store.baselines import BaselineStep, StoredStep
 from service.store.film_readings import FilmQuery
 from service.store.port import StoreError, ValueRange
-from service.store.sqlite import SqliteStore
 
 FilmLife = Callable[..., StiffnessHistory]
-Tell = Callable[..., list[FilmNews]]
 DECISION = Decision(
     Verdict.ALERT,
     Finding(4.0, -0.1, 0.01),
@@ -47,9 +44,7 @@ def query(**changes: object) -> FilmQuery:
     return replace(FilmQuery("U1", "UJB", Estimator.DYNAMIC), **changes)  # type: ignore[arg-type]
 
 
-def test_readings_are_read_back_to_the_last_bit(
-    store: SqliteStore, film_news: Tell, film_life: FilmLife
-) -> None:
+def test_readings_are_read_back_to_the_last_bit(store, film_news, film_life):
     history = film_life(2, days=3)
     ln_k = history.ln_k.copy()
     ln_k[0, 5] = np.nan
@@ -77,9 +72,7 @@ def test_readings_are_read_back_to_the_last_bit(
     assert store.films.first_ns("U1", "LJB", Estimator.DYNAMIC) is None
 
 
-def test_readings_are_picked_by_time_state_and_condition(
-    store: SqliteStore, film_news: Tell, film_life: FilmLife
-) -> None:
+def test_readings_are_picked_by_time_state_and_condition(store, film_news, film_life):
     history = film_life(2, days=3)
     store.append([], [], [], film_news(history))
     e, oil, time_ns = history.eccentricity_ratio, history.oil_temperature_c, history.time_ns
@@ -103,8 +96,8 @@ def test_readings_are_picked_by_time_state_and_condition(
 
 
 def test_what_is_written_twice_counts_once_and_simulated_readings_stay_marked(
-    store: SqliteStore, film_news: Tell, film_life: FilmLife
-) -> None:
+    store, film_news, film_life
+):
     news = film_news(film_life(2, days=1))
     store.films.add_simulated(news[:40])
     store.append([], [], [], news)
@@ -112,9 +105,7 @@ def test_what_is_written_twice_counts_once_and_simulated_readings_stay_marked(
     assert store.films.history(query()).is_simulated.tolist() == [i < 40 for i in range(len(news))]
 
 
-def test_decisions_go_on_where_they_stood(
-    store: SqliteStore, film_news: Tell, film_life: FilmLife
-) -> None:
+def test_decisions_go_on_where_they_stood(store, film_news, film_life):
     first, second, *_ = film_news(film_life(2, days=1))
     store.append([], [], [], [replace(first, findings=(FOUND, FOUND))])
     store.append(
@@ -138,9 +129,7 @@ def baseline(film_life: FilmLife) -> BearingBaseline:
 STEP = StoredStep("U1", "UJB", 1, BaselineStep.ACCEPTED, 78, "Ada", "looks right")
 
 
-def test_baselines_and_what_was_done_to_them_are_read_back_as_written_once(
-    store: SqliteStore, baseline: BearingBaseline
-) -> None:
+def test_baselines_and_what_was_done_to_them_are_read_back_as_written_once(store, baseline):
     renewed = StoredStep("U1", "UJB", None, BaselineStep.RENEWED, 80, "Bo", "overhaul", 79)
     for _ in range(2):  # again where nobody can tell whether it was written
         store.films.add_baseline(baseline, [STEP])
@@ -155,16 +144,14 @@ def test_baselines_and_what_was_done_to_them_are_read_back_as_written_once(
     assert store.films.steps("U1", "LJB") == []
 
 
-def test_a_version_is_written_once(store: SqliteStore, baseline: BearingBaseline) -> None:
+def test_a_version_is_written_once(store, baseline):
     store.films.add_baseline(baseline, [])
     with pytest.raises(StoreError, match="UNIQUE"):
         store.films.add_baseline(baseline, [STEP])
     assert store.films.steps("U1", "UJB") == []
 
 
-def test_no_baseline_is_ever_changed_or_taken_away(
-    store: SqliteStore, baseline: BearingBaseline, tmp_path: Path
-) -> None:
+def test_no_baseline_is_ever_changed_or_taken_away(store, baseline, tmp_path):
     store.films.add_baseline(baseline, [STEP])
     with closing(sqlite3.connect(tmp_path / "padwatch.sqlite3")) as connection:
         for statement in (
@@ -177,9 +164,7 @@ def test_no_baseline_is_ever_changed_or_taken_away(
                 connection.execute(statement)
 
 
-def test_a_baseline_that_makes_no_sense_is_refused_by_name(
-    store: SqliteStore, baseline: BearingBaseline
-) -> None:
+def test_a_baseline_that_makes_no_sense_is_refused_by_name(store, baseline):
     store.films.add_baseline(baseline, [])
     writer = store._writer
     writer.execute("DROP TRIGGER baseline_kept_as_learned")
@@ -189,7 +174,7 @@ def test_a_baseline_that_makes_no_sense_is_refused_by_name(
         store.films.baseline("U1", "UJB", 1)
 
 
-def test_the_response_of_a_shaft_is_read_back(store: SqliteStore, film_life: FilmLife) -> None:
+def test_the_response_of_a_shaft_is_read_back(store, film_life):
     history = film_life(2, days=60)
     response = learn_response({"UJB": history}, np.ones(len(history), bool))
     assert response is not None

@@ -1,8 +1,9 @@
-"""Mail over a real SMTP server that does all that mail servers do."""
+"""Mail over a real SMTP server, and names of receivers that name servers look up."""
 
 import asyncio
 import email
 import json
+import socket
 import ssl
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack
@@ -18,6 +19,7 @@ from hypothesis import strategies as st
 from service.notifications.channel import Delivered, Failed, Refused, TrustedAuthorities
 from service.notifications.mail import Mail, mail_of
 from service.notifications.message import Message
+from service.notifications.webhook import Webhook
 from service.settings.notifications import SmtpSettings
 
 MESSAGE: Message = {
@@ -106,9 +108,7 @@ def mail_to(server: MailServer, ca_file: Path | None = None, **changes: Any) -> 
     return Mail(valid, "desk@x.example", TrustedAuthorities(valid.ca_file))
 
 
-async def test_a_mail_says_what_where_since_when_by_how_much_and_under_which_condition(
-    serve: ServeMail,
-) -> None:
+async def test_a_mail_says_what_where_since_when_by_how_much_and_under_which_condition(serve):
     server = await serve()
 
     outcomes = [await mail_to(server).send(MESSAGE, BODY) for _ in range(2)]
@@ -144,16 +144,14 @@ async def test_a_mail_says_what_where_since_when_by_how_much_and_under_which_con
         ("EHLO", "endless", Failed("-1 Response too long")),
     ],
 )
-async def test_what_a_server_says_decides_between_later_and_never(
-    word: str, says: str, outcome: object, serve: ServeMail
-) -> None:
+async def test_what_a_server_says_decides_between_later_and_never(word, says, outcome, serve):
     server = await serve(**{word: says})
 
     assert await mail_to(server).send(MESSAGE, BODY) == outcome
 
 
 @pytest.mark.parametrize("word", ["GREETING", "EHLO", "MAIL", "TAKEN"])
-async def test_a_server_that_falls_silent_is_left(word: str, serve: ServeMail) -> None:
+async def test_a_server_that_falls_silent_is_left(word, serve):
     server = await serve(**{word: "nothing"})
 
     outcome = await mail_to(server, total_timeout_s=0.3).send(MESSAGE, BODY)
@@ -162,17 +160,15 @@ async def test_a_server_that_falls_silent_is_left(word: str, serve: ServeMail) -
 
 
 @pytest.mark.parametrize("says", ["nothing", "500 no goodbye", "endless"])
-async def test_a_mail_that_was_taken_is_delivered_whatever_comes_after(
-    says: str, serve: ServeMail
-) -> None:
+async def test_a_mail_that_was_taken_is_delivered_whatever_comes_after(says, serve):
     server = await serve(QUIT=says)
 
     assert await mail_to(server).send(MESSAGE, BODY) == Delivered("taken as 4711")
 
 
 async def test_login_and_mail_pass_only_under_tls_with_a_certificate_that_is_believed(
-    serve: ServeMail, server_tls: ssl.SSLContext, certificate: tuple[Path, Path], tmp_path: Path
-) -> None:
+    serve, server_tls, certificate, tmp_path
+):
     server = await serve(tls=server_tls)
     (tmp_path / "password").write_text("geheim\n")
     login = {
@@ -196,7 +192,7 @@ async def test_login_and_mail_pass_only_under_tls_with_a_certificate_that_is_bel
     assert server.commands[-5] == "AUTH PLAIN AHBhZHdhdGNoAGdlaGVpbQ=="
 
 
-async def test_a_missing_password_is_said_without_troubling_the_server(serve: ServeMail) -> None:
+async def test_a_missing_password_is_said_without_troubling_the_server(serve):
     server = await serve()
     missing = {
         "tls": "starttls",
@@ -220,7 +216,7 @@ TEXTS = ("plant", "unit", "unit_name", "subject", "kind", "change", "actor", "re
 @given(
     texts=st.fixed_dictionaries({key: st.text(max_size=60) for key in TEXTS}), extra=st.booleans()
 )
-def test_no_name_or_reason_can_forge_a_header(texts: dict[str, str], extra: bool) -> None:
+def test_no_name_or_reason_can_forge_a_header(texts, extra):
     if extra:
         texts = {
             key: f"{text}\r\nBcc: thief@evil.example\r\n\r\n.\r\n" for key, text in texts.items()
@@ -235,3 +231,55 @@ def test_no_name_or_reason_can_forge_a_header(texts: dict[str, str], extra: bool
     )  # fmt: skip
     assert parsed["To"] == "desk@x.example"
     assert mail.isascii()
+
+
+@pytest.fixture
+def _name_server(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The system's look-up, which knows one name."""
+
+    def getaddrinfo(host: str, port: int, **_: object) -> list[Any]:
+        if host == "desk.example":
+            return [(socket.AF_INET, socket.SOCK_STREAM, 6, "", ("127.0.0.1", port))] * 2
+        raise socket.gaierror(-2, "Name or service not known")
+
+    monkeypatch.setattr("acquisition.delivery.network.socket.getaddrinfo", getaddrinfo)
+
+
+@pytest.mark.usefixtures("_name_server")
+async def test_what_cannot_be_looked_up_or_trusted_is_said(room, tmp_path):
+    webhook = Webhook(room.settings("https://no.example/"), room.clock)
+    assert await webhook.send({"id": "1"}, "{}") == Failed("Name or service not known")
+
+    webhook = Webhook(
+        room.settings("https://127.0.0.1:1/", ca_file=str(tmp_path / "ca.pem")), room.clock
+    )
+    outcome = await webhook.send({"id": "1"}, "{}")
+    assert isinstance(outcome, Failed)
+    assert f"ca_file {tmp_path / 'ca.pem'}" in outcome.answer
+
+
+@pytest.mark.usefixtures("_name_server")
+async def test_a_message_goes_to_the_name_it_is_meant_for(room):
+    server = await room.web(room.answers("200 OK"))
+    url = f"http://desk.example:{server.port}/alarms?x=1"
+
+    await Webhook(room.settings(url), room.clock).send({"id": "1"}, "{}")
+
+    (request,) = server.requests
+    assert request.headers["host"] == f"desk.example:{server.port}"
+    assert request.line == "POST /alarms?x=1 HTTP/1.1"
+
+
+async def test_nothing_is_told_to_a_server_whose_certificate_is_not_believed(
+    room, server_tls, certificate
+):
+    server = await room.web(room.answers("200 OK"), context=server_tls)
+    trusting = room.settings(server.url, ca_file=str(certificate[0]))
+
+    refused = await Webhook(room.settings(server.url), room.clock).send({"id": "1"}, "{}")
+    assert isinstance(refused, Failed)
+    assert "certificate verify failed" in refused.answer.lower()
+    assert server.requests == []
+
+    await Webhook(trusting, room.clock).send({"id": "1"}, "{}")
+    assert len(server.requests) == 1

@@ -3,7 +3,6 @@
 import asyncio
 import json
 import random
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,15 +12,16 @@ from hypothesis import strategies as st
 from rigs.tiers import fast_and_long
 
 from core.limits import AlarmLevel, Judgement
+from service.live.receivers import SenderState
 from service.notifications.channel import Failed, SecretError, read_secret
-from service.notifications.sender import SenderState, wait_s
+from service.notifications.sender import wait_s
 from service.settings.notifications import SecretSettings
 from service.store.outbox import MessageState
 
 DANGER = Judgement(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
 
 
-async def test_news_is_told_as_soon_as_the_sender_is_woken(room: Any) -> None:
+async def test_news_is_told_as_soon_as_the_sender_is_woken(room):
     server, store = await room.web(room.answers("200 OK")), room.open_store()
     sender = room.sender(server, store)
 
@@ -71,9 +71,7 @@ ENDLESS_HEADERS = says(b"HTTP/1.1 200 OK\r\n", b"X-More: " + b"x" * 1000 + b"\r\
         pytest.param(INTERIM_FOR_EVER, id="interim answers"),
     ],
 )
-async def test_what_may_pass_is_tried_again_with_the_same_message_before_any_later_one(
-    fault: Any, room: Any
-) -> None:
+async def test_what_may_pass_is_tried_again_with_the_same_message_before_any_later_one(fault, room):
     elsewhere = await room.web(room.answers("200 OK"))
     location = f"Location: {elsewhere.url}"  # a redirect is not followed
     faulty = room.answers(fault, location) if isinstance(fault, str) else fault
@@ -91,7 +89,7 @@ async def test_what_may_pass_is_tried_again_with_the_same_message_before_any_lat
     assert elsewhere.requests == []
 
 
-async def test_a_receiver_that_asks_for_time_gets_it_up_to_the_limit(room: Any) -> None:
+async def test_a_receiver_that_asks_for_time_gets_it_up_to_the_limit(room):
     asks = [
         "Retry-After: 7",
         "Retry-After: 99999999999999",
@@ -113,9 +111,7 @@ async def test_a_receiver_that_asks_for_time_gets_it_up_to_the_limit(room: Any) 
 
 
 @pytest.mark.parametrize("status", ["400 Bad", "401 No", "404 Not Found", "410 Gone", "499 Odd"])
-async def test_what_is_refused_for_ever_is_kept_as_such_and_holds_up_nothing(
-    status: str, room: Any
-) -> None:
+async def test_what_is_refused_for_ever_is_kept_as_such_and_holds_up_nothing(status, room):
     server = await room.web(room.answers(status, body="no such\r\nplant"), room.answers("200 OK"))
     store = room.open_store()
     store.append([], [], [room.news(0), room.news(1)])
@@ -131,9 +127,7 @@ async def test_what_is_refused_for_ever_is_kept_as_such_and_holds_up_nothing(
 
 
 @pytest.mark.parametrize("n_events", fast_and_long(100, 1000))
-async def test_each_event_reaches_a_receiver_that_fails_at_random_once_and_in_order(
-    room: Any, n_events: int
-) -> None:
+async def test_each_event_reaches_a_receiver_that_fails_at_random_once_and_in_order(room, n_events):
     room.clock.held_from_s = 1e9
     chance, accepted = random.Random(5), []  # noqa: S311
     refusals = [room.answers("500 Oh"), room.answers("429 Slow")]
@@ -156,7 +150,7 @@ async def test_each_event_reaches_a_receiver_that_fails_at_random_once_and_in_or
     assert len(server.requests) > n_events
 
 
-async def test_what_grew_too_old_is_given_up_at_once_when_an_attempt_fails(room: Any) -> None:
+async def test_what_grew_too_old_is_given_up_at_once_when_an_attempt_fails(room):
     server = await room.web(room.answers("503 Away"), room.answers("200 OK"))
     store = room.open_store()
     store.append([], [], [room.news(n) for n in range(5)])
@@ -182,9 +176,7 @@ YEAR_NS = 365 * 86_400 * 10**9
         pytest.param(-50 * YEAR_NS, 0, id="set right before it was started again"),
     ],
 )
-async def test_a_clock_that_is_set_gives_nothing_up(
-    room: Any, queued_wrong_ns: int, sent_wrong_ns: int
-) -> None:
+async def test_a_clock_that_is_set_gives_nothing_up(room, queued_wrong_ns, sent_wrong_ns):
     server = await room.web(room.answers("503 Away"), room.answers("200 OK"))
     store = room.open_store()
     right_ns = room.clock.ns
@@ -204,9 +196,7 @@ async def until_quiet(sender: Any) -> None:
     await until(lambda: sender.status.state is SenderState.QUIET)
 
 
-async def test_quiet_hours_hold_what_is_no_danger_and_a_danger_ends_them_in_order(
-    room: Any,
-) -> None:
+async def test_quiet_hours_hold_what_is_no_danger_and_a_danger_ends_them_in_order(room):
     server, store = await room.web(room.answers("200 OK")), room.open_store()
     store.append([], [], [room.news(0), room.news(1)])
     always = {"start": "00:00", "end": "23:59", "time_zone": "UTC"}
@@ -224,9 +214,7 @@ async def test_quiet_hours_hold_what_is_no_danger_and_a_danger_ends_them_in_orde
     assert [letter.event_id for letter in store.outbox.waiting("desk", 9)] == ["id-3"]
 
 
-async def test_a_disk_that_refuses_to_note_a_delivery_never_makes_it_happen_twice(
-    room: Any,
-) -> None:
+async def test_a_disk_that_refuses_to_note_a_delivery_never_makes_it_happen_twice(room):
     server, store = await room.web(room.answers("200 OK")), room.open_store()
     store.append([], [], [room.news(0), room.news(1)])
     trigger = "CREATE TRIGGER refuse BEFORE UPDATE ON outbox BEGIN SELECT RAISE(ABORT, 'no'); END"
@@ -255,8 +243,8 @@ REFUSES_AT_LENGTH = says(
     ids=["delivered", "refused"],
 )
 async def test_the_status_counts_and_of_an_endless_answer_no_more_is_read_than_is_shown(
-    behave: Any, state: str, room: Any
-) -> None:
+    behave, state, room
+):
     server, store = await room.web(behave), room.open_store()
     store.append([], [], [room.news(0)])
 
@@ -279,9 +267,7 @@ async def dribbles(_: object, writer: asyncio.StreamWriter) -> None:
 
 
 @pytest.mark.parametrize("behave", [hangs, dribbles])
-async def test_a_receiver_that_never_answers_delays_neither_another_one_nor_the_end(
-    behave: Any, room: Any
-) -> None:
+async def test_a_receiver_that_never_answers_delays_neither_another_one_nor_the_end(behave, room):
     slow, quick = await room.web(behave), await room.web(room.answers("200 OK"))
     store = room.open_store(room.routed("slow"), room.routed("quick"))
     store.append([], [], [room.news(n) for n in range(30)])
@@ -297,9 +283,7 @@ async def test_a_receiver_that_never_answers_delays_neither_another_one_nor_the_
 
 
 @pytest.mark.parametrize("behave", [INTERIM_FOR_EVER, ENDLESS_HEADERS], ids=["interim", "headers"])
-async def test_a_flood_is_left_after_some_bytes_and_not_after_some_time(
-    behave: Any, room: Any
-) -> None:
+async def test_a_flood_is_left_after_some_bytes_and_not_after_some_time(behave, room):
     server = await room.web(behave)
     sender = room.sender(server, room.open_store())
 
@@ -314,8 +298,8 @@ LONGEST_S = st.floats(1.0, 86_400.0)
 
 @given(n=st.integers(1, 10**6), share=SHARES, longest_s=LONGEST_S, asked_s=st.floats(0.0, 1e12))
 def test_a_wait_is_never_longer_than_its_limit_nor_shorter_than_half_a_second(
-    n: int, share: float, longest_s: float, asked_s: float
-) -> None:
+    n, share, longest_s, asked_s
+):
     waited_s = wait_s(n, asked_s, longest_s, lambda: share)
 
     assert 0.5 <= waited_s <= longest_s
@@ -323,20 +307,18 @@ def test_a_wait_is_never_longer_than_its_limit_nor_shorter_than_half_a_second(
 
 
 @given(n=st.integers(1, 20), share=SHARES)
-def test_no_wait_is_shorter_than_one_before_it_could_have_been(n: int, share: float) -> None:
+def test_no_wait_is_shorter_than_one_before_it_could_have_been(n, share):
     assert wait_s(n + 1, None, 1e9, lambda: 1.0) >= wait_s(n, None, 1e9, lambda: share) * 0.999
 
 
-def test_a_secret_loses_the_end_of_its_line_and_nothing_else(tmp_path: Path) -> None:
+def test_a_secret_loses_the_end_of_its_line_and_nothing_else(tmp_path):
     (tmp_path / "key").write_text("s3cret with spaces\r\n")
 
     assert read_secret(SecretSettings(file=str(tmp_path / "key"))) == "s3cret with spaces"
 
 
 @pytest.mark.parametrize("content", [None, b"", b"\n", b"a\nb", b"\xff\xfe", b"a\x00b"])
-def test_what_is_no_line_of_text_is_refused_without_being_shown(
-    content: bytes | None, tmp_path: Path
-) -> None:
+def test_what_is_no_line_of_text_is_refused_without_being_shown(content, tmp_path):
     if content is not None:
         (tmp_path / "key").write_bytes(content)
 

@@ -13,9 +13,11 @@ from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
 from core.monitor.assessment import Assessment
 from core.quality import Reading
-from service.app.storage import captures_of, evidence_folders, evidence_of
-from service.live.live_view import LinkState, LiveView
+from service.app.kept_files import captures_of, evidence_of
+from service.app.storage import evidence_folders
+from service.live.status import LinkState
 from service.measuring.films import FilmMonitor, film_monitor
+from service.measuring.live_view import LiveView
 from service.reports.archive import EvidenceArchive
 from service.reports.folders import CapturePart, linked
 from service.settings.core_values import machine_of

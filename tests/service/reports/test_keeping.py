@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,11 +16,10 @@ from service.recordings.folders import ALARM
 from service.recordings.segment import write_alarms
 from service.reports import collector as module
 from service.reports.archive import DamagedEvidenceError
+from service.reports.collector import SnapshotTaker
 from service.reports.document import Evidence
 from service.reports.folders import INCOMPLETE, place_of
-from service.reports.snapshot import SnapshotTaker
 
-Make = Callable[..., Any]
 NOBODY: frozenset[tuple[str, int]] = frozenset()
 SHAFT = "U1:UJB:order1_shaft_x"
 CAPTURE = "U1-20260101T000000.000Z-x"
@@ -56,7 +54,7 @@ class Expecting(SnapshotTaker):
         return replace(super().take(event, now_ns, samples_expected), samples_expected=True)
 
 
-async def test_an_alarm_leaves_a_bundle_that_says_what_was_known(rig: Any, news: Make) -> None:
+async def test_an_alarm_leaves_a_bundle_that_says_what_was_known(rig, news):
     await rig.write(news(12.5))
 
     [folder] = rig.bundles
@@ -77,9 +75,7 @@ async def test_an_alarm_leaves_a_bundle_that_says_what_was_known(rig: Any, news:
     assert json.loads(stored.read_bytes())["settings"]["unit"][0]["id"] == "U1"
 
 
-async def test_what_comes_after_an_alarm_does_not_change_its_evidence(
-    rig: Any, news: Make, assessment: Make
-) -> None:
+async def test_what_comes_after_an_alarm_does_not_change_its_evidence(rig, news, assessment):
     rig.raise_(news())
     rig.live.set_assessment(assessment(order1_shaft_x_um_pk=Reading(20.0)))
     async with rig.running():
@@ -89,7 +85,7 @@ async def test_what_comes_after_an_alarm_does_not_change_its_evidence(
     assert reading.value == 160.0
 
 
-async def test_the_service_itself_and_lost_links_have_evidence_too(rig: Any, news: Make) -> None:
+async def test_the_service_itself_and_lost_links_have_evidence_too(rig, news):
     await rig.write(
         news(kind="link_lost", subject="link", unit="U2"),
         news(kind="results_lost", subject="store", unit="plant"),
@@ -101,7 +97,7 @@ async def test_the_service_itself_and_lost_links_have_evidence_too(rig: Any, new
     assert own.unit is None
 
 
-async def test_a_bundle_that_somebody_has_changed_is_no_evidence(rig: Any, news: Make) -> None:
+async def test_a_bundle_that_somebody_has_changed_is_no_evidence(rig, news):
     await rig.write(news())
     [found] = rig.archive.occurrences(SHAFT, NOBODY, 9)
     path = rig.bundles[0] / "evidence.json"
@@ -112,7 +108,7 @@ async def test_a_bundle_that_somebody_has_changed_is_no_evidence(rig: Any, news:
         rig.archive.document(found.place)
 
 
-async def test_a_full_disk_delays_evidence_and_loses_none(rig: Any, news: Make) -> None:
+async def test_a_full_disk_delays_evidence_and_loses_none(rig, news):
     raised = news()
     folder = place_of(rig.folders.evidence, raised.events[0]).folder
     aside = folder.with_name(folder.name + INCOMPLETE)
@@ -131,7 +127,7 @@ async def test_a_full_disk_delays_evidence_and_loses_none(rig: Any, news: Make) 
     assert (rig.keeper.error, states(rig)) == (None, [(1, "complete")])
 
 
-async def test_a_disk_that_refuses_is_tried_again_until_it_does_not(rig: Any, news: Make) -> None:
+async def test_a_disk_that_refuses_is_tried_again_until_it_does_not(rig, news):
     rig.folders.evidence.parent.mkdir(parents=True)
     rig.folders.evidence.write_text("in the way")
     async with rig.running():
@@ -144,9 +140,7 @@ async def test_a_disk_that_refuses_is_tried_again_until_it_does_not(rig: Any, ne
     assert states(rig) == [(1, "complete")]
 
 
-async def test_evidence_that_a_crash_has_cut_short_is_said_to_be_lost(
-    rig_of: Make, rig: Any, news: Make
-) -> None:
+async def test_evidence_that_a_crash_has_cut_short_is_said_to_be_lost(rig_of, rig, news):
     await rig.write(news(1.0))
     cut = news(2.0, occurrence=2)
     rig.store.append([], [], [cut])  # the service is killed while it writes
@@ -162,18 +156,14 @@ async def test_evidence_that_a_crash_has_cut_short_is_said_to_be_lost(
     assert states(again) == [(2, "lost"), (1, "complete")]
 
 
-async def test_an_alarm_from_before_evidence_was_kept_has_not_lost_any(
-    rig: Any, news: Make
-) -> None:
+async def test_an_alarm_from_before_evidence_was_kept_has_not_lost_any(rig, news):
     rig.store.append([], [], [news(-3600.0)])
     await rig.write(news(0.0, occurrence=2))
 
     assert states(rig) == [(2, "complete"), (1, "not_kept")]
 
 
-async def test_a_disk_that_stays_away_takes_no_more_memory_than_is_allowed(
-    rig: Any, news: Make, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_a_disk_that_stays_away_takes_no_more_memory_than_is_allowed(rig, news, monkeypatch):
     monkeypatch.setattr(module, "MAX_PENDING", 3)
     for number in range(1, 6):
         rig.raise_(news(float(number), occurrence=number))
@@ -184,8 +174,8 @@ async def test_a_disk_that_stays_away_takes_no_more_memory_than_is_allowed(
 
 
 async def test_old_evidence_makes_room_and_one_chattering_alarm_only_for_itself(
-    rig_of: Make, news: Make, plant: Any
-) -> None:
+    rig_of, news, plant
+):
     evidence = plant.evidence.model_copy(update={"max_per_alarm": 3})
     rig = await rig_of(plant.model_copy(update={"evidence": evidence}))
     async with rig.running():
@@ -201,7 +191,7 @@ async def test_old_evidence_makes_room_and_one_chattering_alarm_only_for_itself(
     assert states(rig, "U1:UJB:order1_shaft_y") == [(1, "complete")]
 
 
-async def test_a_finished_capture_is_linked_with_its_hash(rig: Any, news: Make) -> None:
+async def test_a_finished_capture_is_linked_with_its_hash(rig, news):
     raised = news()
     capture = recorded(rig.folders.captures / CAPTURE, raised.events[0])
     async with rig.running():
@@ -216,7 +206,7 @@ async def test_a_finished_capture_is_linked_with_its_hash(rig: Any, news: Make) 
     assert samples(rig) == "removed"
 
 
-async def test_samples_that_could_not_be_kept_are_said_to_be_lost(rig: Any, news: Make) -> None:
+async def test_samples_that_could_not_be_kept_are_said_to_be_lost(rig, news):
     raised = news()
     async with rig.running():
         rig.raise_(raised)
@@ -228,8 +218,8 @@ async def test_samples_that_could_not_be_kept_are_said_to_be_lost(rig: Any, news
 
 
 async def test_a_capture_that_was_finished_just_before_a_crash_is_linked_after_it(
-    rig_of: Make, rig: Any, news: Make
-) -> None:
+    rig_of, rig, news
+):
     raised = news()
     await rig.write(raised)
     assert samples(rig) == "none"  # this service has not kept any
@@ -241,7 +231,7 @@ async def test_a_capture_that_was_finished_just_before_a_crash_is_linked_after_i
     assert samples(again) == "complete"
 
 
-async def test_samples_that_were_expected_and_never_came_are_lost(rig: Any, news: Make) -> None:
+async def test_samples_that_were_expected_and_never_came_are_lost(rig, news):
     rig.keeper._taker = Expecting({u.id: u for u in rig.plant.unit}, rig.live, rig.films)
     await rig.write(news())
 

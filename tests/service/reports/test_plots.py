@@ -1,12 +1,18 @@
-"""Plots show what they are given, with units, and nothing that could do harm."""
+"""Plots show what they are given; a configuration has a version and keeps its secrets."""
 
+import json
 import math
 import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
 from service.reports.plots import BOTTOM, LEFT, RIGHT, TOP, Plot, Scale, TimeScale, around
+from service.settings.configuration import configuration_of
+from service.settings.loading import load_plant_file
 
 
 def plot(x_label: str = "Time, UTC", **changes: object) -> Plot:
@@ -23,7 +29,7 @@ def plot(x_label: str = "Time, UTC", **changes: object) -> Plot:
     return Plot(**{**arguments, **changes})  # type: ignore[arg-type]
 
 
-def test_points_are_where_their_values_are_and_error_bars_as_long_as_the_error() -> None:
+def test_points_are_where_their_values_are_and_error_bars_as_long_as_the_error():
     drawn = plot()
     drawn.points([0.0, 10.0, None], [0.0, 2e9, 1e9], "today")
     drawn.points([5.0], [1e9], "today", errors=[0.5e9])
@@ -34,7 +40,7 @@ def test_points_are_where_their_values_are_and_error_bars_as_long_as_the_error()
     assert f'd="M{LEFT + 100.0:.1f} {TOP + 75.0:.1f}V{TOP + 25.0:.1f}"' in drawn.svg()
 
 
-def test_a_line_breaks_where_nothing_was_measured() -> None:
+def test_a_line_breaks_where_nothing_was_measured():
     drawn = plot()
     drawn.line([0.0, 1.0, 2.0, 9.0, 10.0], [1e9, None, 1e9, 1e9, 1e9], "shaft", 2.0)
 
@@ -43,7 +49,7 @@ def test_a_line_breaks_where_nothing_was_measured() -> None:
     assert path.count("L") == 1
 
 
-def test_axes_carry_their_units_and_round_ticks() -> None:
+def test_axes_carry_their_units_and_round_ticks():
     words = "".join(ElementTree.fromstring(plot().svg()).itertext())  # noqa: S314  our own
 
     assert "Stiffness, GN/m" in words
@@ -59,7 +65,7 @@ def test_axes_carry_their_units_and_round_ticks() -> None:
 
 
 @pytest.mark.parametrize("hostile", ["</text><script>alert(1)</script>", '"><svg onload=x>'])
-def test_words_on_axes_are_words(hostile: str) -> None:
+def test_words_on_axes_are_words(hostile):
     drawn = plot(x_label=hostile, title=hostile)
     drawn.upright(5.0, "at", hostile)
 
@@ -70,8 +76,60 @@ def test_words_on_axes_are_words(hostile: str) -> None:
     assert hostile in "".join(svg.itertext())
 
 
-def test_values_that_are_all_alike_still_have_an_axis() -> None:
+def test_values_that_are_all_alike_still_have_an_axis():
     low, high = around([5.0, 5.0, None, math.nan]) or (0.0, 0.0)
     assert low < 5.0 < high
     assert around([None, math.nan]) is None
     assert Scale(*(around([0.0]) or (0.0, 0.0))).ticks()
+
+
+RECEIVERS = """
+[[delivery.receiver]]
+id = "hook"
+kind = "webhook"
+url = "https://alarms.example:8443/hooks/T0PS3CRET?token=S3CRETT0O"
+secret = { env = "HIDDEN_KEY" }
+authorization = { file = "/etc/padwatch/HIDDEN_FILE" }
+
+[[delivery.receiver]]
+id = "mail"
+kind = "smtp"
+host = "mail.example"
+username = "HIDDEN_USER"
+password = { env = "HIDDEN_PASSWORD" }
+sender = "padwatch@plant.example"
+recipients = ["night@plant.example"]
+"""
+
+
+@pytest.fixture
+def load(tmp_path: Path, plant_text: str) -> Callable[..., Any]:
+    def loaded(old: str = "", new: str = "") -> Any:
+        path = tmp_path / "plant.toml"
+        path.write_text(plant_text.replace(old, new, 1) + RECEIVERS, encoding="utf-8")
+        return load_plant_file(path)
+
+    return loaded
+
+
+def test_a_configuration_holds_no_secret(load):
+    text = configuration_of(load(), "0.1.0", None).text.decode()
+
+    assert "SECRET" not in text.upper().replace('"SECRET":', "")
+    assert "HIDDEN" not in text
+    hook, mail = json.loads(text)["settings"]["delivery"]["receiver"]
+    assert hook["url"].startswith("https://alarms.example/")
+    assert mail["host"] == "mail.example"
+
+
+def test_one_setting_more_or_less_is_another_version(load):
+    one = configuration_of(load(), "0.1.0", None)
+
+    assert configuration_of(load(), "0.1.0", None).version == one.version
+    assert len(one.version) == 64
+    others = [
+        configuration_of(load("rated_speed_rpm = 92.3", "rated_speed_rpm = 92.4"), "0.1.0", None),
+        configuration_of(load(), "0.1.1", None),
+        configuration_of(load(), "0.1.0", "c0ffee"),
+    ]
+    assert len({one.version, *(other.version for other in others)}) == 4

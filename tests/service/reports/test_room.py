@@ -53,7 +53,7 @@ def left(root: Path) -> list[str]:
     return [each.folder.name for each in places(root)]
 
 
-def test_the_oldest_goes_first_and_is_remembered(root: Path, room_of: RoomOf) -> None:
+def test_the_oldest_goes_first_and_is_remembered(root, room_of):
     assert room_of(4000).make() == []
     assert left(root) == [OLDEST, OLD, YOUNG, NEWEST]
     assert room_of(3000).make() == [OLDEST]
@@ -62,23 +62,19 @@ def test_the_oldest_goes_first_and_is_remembered(root: Path, room_of: RoomOf) ->
 
 
 @pytest.mark.parametrize(("hard", "kept"), [(8000, [YOUNG, NEWEST]), (1, [NEWEST])])
-def test_what_is_young_stays_until_the_hard_limit(
-    root: Path, room_of: RoomOf, hard: int, kept: list[str]
-) -> None:
+def test_what_is_young_stays_until_the_hard_limit(root, room_of, hard, kept):
     room_of(1, hard).make()
     assert left(root) == kept
 
 
-def test_an_alarm_that_chatters_loses_its_own_oldest(root: Path, room_of: RoomOf) -> None:
+def test_an_alarm_that_chatters_loses_its_own_oldest(root, room_of):
     other = bundle(root, "20250101T000000.000Z-LJB-stiffness_x-1").folder.name
     assert room_of(8000, most=2).make() == [OLDEST, OLD]
     assert left(root) == [other, YOUNG, NEWEST]
 
 
 @pytest.mark.parametrize("limits", [{"soft": 4000}, {"soft": 8000, "most": 4}])
-def test_a_bundle_that_was_written_makes_its_room(
-    root: Path, room_of: RoomOf, limits: dict[str, int]
-) -> None:
+def test_a_bundle_that_was_written_makes_its_room(root, room_of, limits):
     room = room_of(**limits)
     assert room.make() == []
     room.note(bundle(root, FIFTH))
@@ -86,9 +82,7 @@ def test_a_bundle_that_was_written_makes_its_room(
     assert room.make() == []
 
 
-def test_a_bundle_that_has_become_larger_counts_once_with_its_new_size(
-    root: Path, room_of: RoomOf
-) -> None:
+def test_a_bundle_that_has_become_larger_counts_once_with_its_new_size(root, room_of):
     room = room_of(4500)
     room.make()
     room.note(bundle(root, NEWEST, KB + b"x" * 400))
@@ -97,9 +91,7 @@ def test_a_bundle_that_has_become_larger_counts_once_with_its_new_size(
     assert room.make() == [OLDEST]
 
 
-def test_what_was_taken_away_by_hand_is_found_out_within_an_hour(
-    root: Path, room_of: RoomOf, stepped_clock: Any
-) -> None:
+def test_what_was_taken_away_by_hand_is_found_out_within_an_hour(root, room_of, stepped_clock):
     room = room_of(4000)
     room.make()
     shutil.rmtree(root / "U1" / OLDEST)
@@ -109,9 +101,7 @@ def test_what_was_taken_away_by_hand_is_found_out_within_an_hour(
 
 
 @pytest.mark.parametrize("all_are_gone", [False, True])
-def test_what_cannot_be_removed_is_looked_for_again_while_it_is_there(
-    root: Path, room_of: RoomOf, all_are_gone: bool
-) -> None:
+def test_what_cannot_be_removed_is_looked_for_again_while_it_is_there(root, room_of, all_are_gone):
     room, in_the_way = room_of(8000, most=3), root / "U1" / (OLDEST + ".incomplete")
     in_the_way.write_bytes(b"not a folder")
     with pytest.raises(OSError, match=OLDEST):
@@ -126,7 +116,7 @@ def test_what_cannot_be_removed_is_looked_for_again_while_it_is_there(
     assert removed(root, "U1") == found
 
 
-def test_what_is_none_of_ours_is_left_alone(root: Path, room_of: RoomOf) -> None:
+def test_what_is_none_of_ours_is_left_alone(root, room_of):
     notes = root / "U1" / "my notes"
     notes.mkdir()
     clear_leftovers(root)
@@ -135,8 +125,8 @@ def test_what_is_none_of_ours_is_left_alone(root: Path, room_of: RoomOf) -> None
 
 
 def test_names_of_what_was_removed_are_not_lost_where_there_is_no_room_to_write_them(
-    root: Path, room_of: RoomOf, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    root, room_of, monkeypatch
+):
     assert room_of(3000).make() == [OLDEST]
     full = Mock(side_effect=OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     monkeypatch.setattr(os, "fsync", full)

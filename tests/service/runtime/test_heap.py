@@ -20,6 +20,6 @@ print((before - process.memory_info().rss) >> 20)
 """
 
 
-def test_arrays_of_a_result_leave_no_holes_between_what_stays() -> None:
+def test_arrays_of_a_result_leave_no_holes_between_what_stays():
     done = subprocess.run([sys.executable, "-c", HOLES], capture_output=True, text=True, check=True)
     assert 120 <= int(done.stdout) <= 130

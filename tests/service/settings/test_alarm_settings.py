@@ -19,16 +19,14 @@ from core.condition.operating_state import STEADY, OperatingState
 from core.limits import Limits
 from core.machine.unit import Bearing
 from core.monitor.catalogue import CATALOGUE
+from service.app.kept_files import captures_of
 from service.app.service_health import health_of
-from service.app.storage import captures_of
 from service.measuring.service_alarms import ServiceRules
 from service.settings.alarm_kinds import ALARM_KINDS, SERVICE_KINDS
 from service.settings.core_values import chatter_rule_of, references_of, rules_of
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 
-Changed = Callable[[str, str], tuple[str, int]]
-Mistakes = Callable[[str | bytes], list[str]]
 PlantOf = Callable[..., PlantFile]
 
 SECOND = 1_000_000_000
@@ -63,8 +61,8 @@ def rules(plant_of: PlantOf) -> Callable[[str], BearingRules]:
 
 
 def test_without_limits_nothing_of_a_bearing_is_watched_and_in_a_replay_neither_link_nor_clock(
-    plant_of: PlantOf,
-) -> None:
+    plant_of,
+):
     plant = plant_of()
 
     rules = rules_of(plant.unit[0], plant.alarms, Origin.LIVE)
@@ -82,9 +80,7 @@ def test_without_limits_nothing_of_a_bearing_is_watched_and_in_a_replay_neither_
     assert set(captures_of(plant, Origin.LIVE, None)._histories) == {"U1", "U2"}  # type: ignore[arg-type]
 
 
-def test_limits_of_a_bearing_become_its_rules_at_speed_unless_said_otherwise(
-    rules: Callable[[str], BearingRules],
-) -> None:
+def test_limits_of_a_bearing_become_its_rules_at_speed_unless_said_otherwise(rules):
     found = rules(
         "alarms.shaft_order1_um_pk = { alert = 150.0, danger = 250.0, on_delay_s = 0.0 }\n"
         "alarms.oil_temperature_c = { danger = 75.0, deadband = 2.0, off_delay_s = 1.5 }\n"
@@ -114,7 +110,7 @@ def test_limits_of_a_bearing_become_its_rules_at_speed_unless_said_otherwise(
         assert not rule.rule.is_latching
 
 
-def test_zones_differ_from_state_to_state(rules: Callable[[str], BearingRules]) -> None:
+def test_zones_differ_from_state_to_state(rules):
     found = rules(
         "alarms.zones.shaft_um_pp = { off_delay_s = 5.0, table = [\n"
         '  { states = ["full_load"], a_b = 100.0, b_c = 200.0, c_d = 300.0 },\n'
@@ -129,9 +125,7 @@ def test_zones_differ_from_state_to_state(rules: Callable[[str], BearingRules]) 
     assert found.rule.off_delay_ns == 5 * SECOND
 
 
-def test_every_limit_may_differ_by_operating_state_and_by_condition_cell(
-    rules: Callable[[str], BearingRules],
-) -> None:
+def test_every_limit_may_differ_by_operating_state_and_by_condition_cell(rules):
     cell = "eccentricity_ratio = [0.35, 0.4], oil_temperature_c = [45.0, 47.5]"
     found = rules(
         "alarms.shaft_order1_um_pk = { alert = 150.0, danger = 250.0, table = ["
@@ -157,7 +151,7 @@ def test_every_limit_may_differ_by_operating_state_and_by_condition_cell(
     assert region == Region(STEADY, (0.35, 0.4), (45.0, 47.5))
 
 
-def test_a_reference_holds_in_each_state_it_names(plant_of: PlantOf) -> None:
+def test_a_reference_holds_in_each_state_it_names(plant_of):
     found = references_of(
         plant_of(
             "alarms.order1_reference = ["
@@ -170,7 +164,7 @@ def test_a_reference_holds_in_each_state_it_names(plant_of: PlantOf) -> None:
     assert sorted(found, key=lambda r: r.state) == expected
 
 
-def test_clocks_captures_and_chattering_can_be_set(plant_of: PlantOf) -> None:
+def test_clocks_captures_and_chattering_can_be_set(plant_of):
     plant = plant_of(
         tables='[alarms]\nclock = "ignored"\nchattering_activations = 5\n'
         'chattering_window_s = 600.0\n[capture]\nsamples = "not_kept"'
@@ -244,8 +238,8 @@ BETWEEN = "alert_below = 600.0, alert = 700.0"
     ],
 )
 def test_limits_that_do_not_fit_are_named_with_what_is_allowed(
-    changed: Changed, mistakes: Mistakes, name: str, value: str, key: str, said: str
-) -> None:
+    changed, mistakes, name, value, key, said
+):
     text, line = changed(OIL, f"{OIL}\nalarms.{name} = {value}")
 
     [mistake] = mistakes(text)
@@ -263,9 +257,7 @@ def names_of(*classes: type) -> set[str]:
     return {field.name for each in classes for field in fields(each)}
 
 
-def test_every_kind_names_a_rule_and_a_reading_that_exist(
-    rules: Callable[[str], BearingRules],
-) -> None:
+def test_every_kind_names_a_rule_and_a_reading_that_exist(rules):
     readings = {quantity.name for quantity in CATALOGUE}
     readings |= {"shaft_x", "shaft_y", "bearing_x", "bearing_y"}
     for kind in units.ALARM_KINDS.values():
@@ -275,13 +267,13 @@ def test_every_kind_names_a_rule_and_a_reading_that_exist(
         assert kind.rule in names_of(ServiceRules), kind.name
     parts = MagicMock()
     parts.oldest_wait_s, parts.depth, parts.capacity = 0.0, 0, 1
-    look = health_of([], *([parts] * 9))
+    look = health_of([], *([parts] * 8))
     assert set(look().readings) == {kind.reading for kind in SERVICE_KINDS.values()} - {None}
     assert len(ALARM_KINDS) == len(units.ALARM_KINDS) + len(SERVICE_KINDS)
 
 
 @pytest.mark.parametrize("pattern", ["*.py", "*.js"])
-def test_no_other_module_of_the_service_lists_kinds_of_alarms(pattern: str) -> None:
+def test_no_other_module_of_the_service_lists_kinds_of_alarms(pattern):
     other = {quantity.name for quantity in CATALOGUE} | names_of(Bearing, ServiceRules)
     wanted = "|".join(ALARM_KINDS.keys() - other)
     for path in (ROOT / "service").rglob(pattern):

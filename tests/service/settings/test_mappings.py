@@ -52,14 +52,14 @@ def refusal(tmp_path: Path, text: str, load: Callable[[Path], object] = mapping_
 
 
 @pytest.mark.parametrize("text", [CSV, MDF])
-def test_a_right_mapping_is_read(tmp_path: Path, text: str) -> None:
+def test_a_right_mapping_is_read(tmp_path, text):
     (tmp_path / "map.toml").write_text(text)
     mapping = mapping_of(tmp_path / "map.toml")
     assert mapping.channel[0].column == "UJB X"
     assert mapping.time.zone == "-03:00"
 
 
-def test_a_start_needs_no_time_zone_beside_its_own(tmp_path: Path) -> None:
+def test_a_start_needs_no_time_zone_beside_its_own(tmp_path):
     old, start = MDF[MDF.index("source") : MDF.index("[[")], "2026-01-01T10:00:00-03:00"
     text = MDF.replace(old, f'source = "start"\nstart = {start}\n')
     (tmp_path / "map.toml").write_text(text)
@@ -104,14 +104,12 @@ WRONG_MDF = [
         (CANDUMP, "-03:00", "UTC", "channel: comes from the DBC file for"),
     ],
 )
-def test_a_wrong_mapping_is_refused_with_line_and_key(
-    tmp_path: Path, text: str, old: str, new: str, says: str
-) -> None:
+def test_a_wrong_mapping_is_refused_with_line_and_key(tmp_path, text, old, new, says):
     assert old in text
     assert says in refusal(tmp_path, text.replace(old, new, 1))
 
 
-def test_the_example_in_the_guide_is_a_right_mapping(tmp_path: Path) -> None:
+def test_the_example_in_the_guide_is_a_right_mapping(tmp_path):
     guide = (Path(__file__).parents[3] / "docs" / "how-to" / "recordings.md").read_text()
     blocks = [block.split("```")[0] for block in guide.split("```toml\n")[1:]]
     mapping = next(block for block in blocks if "slow_channel" in block)
@@ -123,14 +121,14 @@ MAPS = Path(__file__).parents[3] / "deploy" / "maps"
 
 
 @pytest.mark.parametrize("path", sorted(MAPS.glob("*.toml")), ids=lambda path: path.name)
-def test_every_example_can_be_read(path: Path) -> None:
+def test_every_example_can_be_read(path):
     decoder = MapDecoder(load_map_file(path).register_map())
 
     assert decoder.plan.spans
     assert all(request.count <= 125 for request in decoder.plan.spans)
 
 
-def test_an_skf_like_rack_is_read_as_its_manual_demands() -> None:
+def test_an_skf_like_rack_is_read_as_its_manual_demands():
     registers = load_map_file(MAPS / "vector-rack-skf-like.toml").register_map()
     requests = [(r.address, r.count) for r in MapDecoder(registers).plan.spans]
 
@@ -149,7 +147,7 @@ flag = [{ address = 11, type = "bit", bit = 7, set_means = "ok" }]
 """
 
 
-def test_a_status_of_a_single_bit_needs_no_mask(tmp_path: Path) -> None:
+def test_a_status_of_a_single_bit_needs_no_mask(tmp_path):
     (tmp_path / "map.toml").write_text(FLAGGED)
     [value] = load_map_file(tmp_path / "map.toml").register_map().values
     assert [flag.mask for flag in value.flags] == [1]
@@ -225,9 +223,7 @@ BEHIND = [
         *((END, f"{END}{text}\n", said) for text, said in BEHIND),
     ],
 )
-def test_a_wrong_value_of_a_map_is_refused_with_line_key_and_fix(
-    tmp_path: Path, old: str, new: str, said: str
-) -> None:
+def test_a_wrong_value_of_a_map_is_refused_with_line_key_and_fix(tmp_path, old, new, said):
     assert old in MINIMAL
     assert said in refusal(tmp_path, MINIMAL.replace(old, new, 1), load_map_file)
     assert "value is missing" in refusal(tmp_path, "", load_map_file)

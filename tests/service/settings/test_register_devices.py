@@ -1,4 +1,4 @@
-"""A simulated machine says the same by a rack, by queues and as waveforms; retries."""
+"""A simulated machine says the same by a rack, by queues, over CAN and as waveforms; retries."""
 
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquisition.can.source import CanSource
 from acquisition.delivery.blocks import BlockAssembler
+from acquisition.simulated.devices.can_shape import daq_dbc
 from core.machine.unit import Unit
 from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
@@ -22,13 +24,16 @@ from service.measuring.sources import (
     polled_settings,
     retry_s,
 )
+from service.settings.can_values import can_daq_of, can_settings_of, can_shape_of
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.loading import load_plant_file
+from service.settings.sources.can import CanSettings
 from service.settings.sources.devices import (
     ModbusFifoSettings,
     ModbusPolledSettings,
     ModbusVectorSettings,
 )
+from service.settings.transducers import FOLDER
 from service.settings.units import UnitSettings
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
@@ -70,11 +75,11 @@ def by_waveforms(settings: UnitSettings, unit: Unit, clock) -> Iterator[Assessme
     feed, delivery = simulated_feed(settings, clock), BlockAssembler(calibration_of(settings))
     monitor = UnitMonitor(unit, AnalysisSettings())
     for _ in range(8192 * N_SEGMENTS // 600):
-        for block in delivery.take(feed.advance(600)):
+        for block in delivery.take([feed.advance(600)]):
             yield from monitor.ingest(block)
 
 
-async def test_a_rack_agrees_with_the_waveforms(settings, unit, stepped_clock) -> None:
+async def test_a_rack_agrees_with_the_waveforms(settings, unit, stepped_clock):
     expected = {a.bearing: a.readings for a in by_waveforms(settings, unit, stepped_clock)}
     given = {"kind": "modbus_vector", "poll_period_s": 1.0, "map": vector_map(unit)}
     given |= {"n_polls": 60, "hop_polls": 60, "timeout_s": 5.0, "host": "127.0.0.1"}
@@ -102,7 +107,7 @@ async def test_a_rack_agrees_with_the_waveforms(settings, unit, stepped_clock) -
     assert compared >= 4
 
 
-async def test_queues_bring_the_very_counts(settings, unit, stepped_clock) -> None:
+async def test_queues_bring_the_very_counts(settings, unit, stepped_clock):
     plan = ModbusFifoSettings(kind="modbus_fifo", host="127.0.0.1", addresses=(7,), timeout_s=5.0)
     feed = simulated_feed(settings, stepped_clock)
     blocks: list[SampleBlock] = []
@@ -119,7 +124,7 @@ async def test_queues_bring_the_very_counts(settings, unit, stepped_clock) -> No
         np.testing.assert_array_equal(block.counts, twin.advance(block.n_samples).counts)
 
 
-async def test_polled_registers_show_the_newest_sample(settings, unit, stepped_clock) -> None:
+async def test_polled_registers_show_the_newest_sample(settings, unit, stepped_clock):
     ids = [channel.id for channel in unit.channels]
     values = [{"channel": id_} | address(n) for n, id_ in enumerate(ids)]
     given = {"kind": "modbus_polled", "poll_period_s": 0.01, "host": "127.0.0.1"}
@@ -140,7 +145,7 @@ async def test_polled_registers_show_the_newest_sample(settings, unit, stepped_c
 
 
 @pytest.mark.parametrize(("use", "keeps"), [("kept", True), ("per_reply", False)])
-def test_how_long_a_connection_is_kept_reaches_the_adapter(use: str, keeps: bool) -> None:
+def test_how_long_a_connection_is_kept_reaches_the_adapter(use, keeps):
     given = {"kind": "modbus_polled", "host": "192.0.2.1", "poll_period_s": 60.0}
     given |= {"stale_after_s": 600.0, "map": {"value": [{"channel": "a", "address": 1}]}}
 
@@ -162,5 +167,68 @@ QUEUE = ModbusFifoSettings(kind="modbus_fifo", host="127.0.0.1", addresses=[1000
         (QUEUE, 0.25),
     ],
 )
-def test_a_device_is_called_once_a_poll_period(settings, source, expected_s) -> None:
+def test_a_device_is_called_once_a_poll_period(settings, source, expected_s):
     assert retry_s(settings.model_copy(update={"source": source})) == expected_s
+
+
+DEPLOY = Path(__file__).parents[3] / "deploy"
+PLACE = {"kind": "can", "interface": "slcan", "channel": "socket://127.0.0.1:0"}
+
+
+def can_keys(**keys) -> CanSettings:
+    return CanSettings.model_validate(PLACE | keys, context={FOLDER: DEPLOY / "can"})
+
+
+@pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
+async def test_a_simulated_unit_is_read_over_can_as_without_a_wire(fd, settings, stepped_clock):
+    source = can_keys(profile="padwatch_int16", fd=fd)
+    feed, same = (simulated_feed(settings, stepped_clock) for _ in range(2))
+    async with can_daq_of(settings, source, feed, None, patient=False) as server:
+        found = can_keys(profile="padwatch_int16", fd=fd, **server.endpoint)
+        reader = CanSource(
+            can_settings_of(settings, found), calibration_of(settings), stepped_clock
+        )
+        async with reader.connect() as stream:
+            for _ in range(3):
+                block = await anext(stream)
+                raw = same.advance(block.n_samples)
+                gains = [c.unit_per_count for c in calibration_of(settings).channels]
+                expected = raw.counts.astype(np.float32) * np.float32(gains)[:, np.newaxis]
+                np.testing.assert_array_equal(block.samples, expected)
+                assert (block.epoch, block.first_index) == (raw.epoch, raw.first_index)
+                assert block.side.slow[0, 0] == pytest.approx(raw.side.slow[0, 0], rel=1e-7)
+
+
+def test_the_example_dbc_is_that_of_the_demo_plant(settings):
+    for name, fd in (("demo_classic.dbc", False), ("demo_fd.dbc", True)):
+        shape = can_shape_of(settings, can_keys(profile="padwatch_int16", fd=fd))
+        assert daq_dbc(shape) == (DEPLOY / "can" / name).read_text(encoding="utf-8")
+
+
+def test_the_example_dbc_can_be_named_as_any_other(settings, stepped_clock):
+    waves = {c.id: f"WAVE_{n // 3}.{c.id}" for n, c in enumerate(settings.channel)}
+    source = can_keys(
+        dbc="demo_classic.dbc",
+        signals=waves,
+        slow={s.id: f"SLOW_{n}.{s.id}" for n, s in enumerate(settings.slow_channel)},
+        counters=[f"WAVE_{n}.counter" for n in range(4)],
+    )
+    source.check_channels([c.id for c in settings.channel], [s.id for s in settings.slow_channel])
+    CanSource(can_settings_of(settings, source), calibration_of(settings), stepped_clock)
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"profile": "padwatch_int16", "channel": "can0"}, "a simulated DAQ cannot use channel"),
+        (
+            {"profile": "padwatch_int16", "channel": "socket://127.0.0.1:x"},
+            "a simulated DAQ cannot use channel",
+        ),
+        ({"dbc": "demo_classic.dbc", "signals": {"x": "A.b"}}, "reads CAN by its own DBC"),
+    ],
+)
+def test_a_daq_that_cannot_be_simulated_is_refused(keys, said, settings, stepped_clock):
+    feed = simulated_feed(settings, stepped_clock)
+    with pytest.raises(LookupError, match=said):
+        can_daq_of(settings, can_keys(**keys), feed, None, patient=False)

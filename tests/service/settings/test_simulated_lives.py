@@ -3,7 +3,6 @@
 import re
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -52,9 +51,7 @@ def plant_with(life: str, folder: Path) -> PlantFile:
     return load_plant_file(path)
 
 
-def test_the_films_of_a_living_unit_are_read_as_its_past_says(
-    tmp_path: Path, stepped_clock: Any
-) -> None:
+def test_the_films_of_a_living_unit_are_read_as_its_past_says(tmp_path, stepped_clock):
     """Five minutes of samples, of films of which one has been damaged two hours ago."""
     now_ns = stepped_clock.now_ns()
     onset = datetime.fromtimestamp(now_ns // NS_PER_S - 7200, UTC).isoformat()
@@ -65,7 +62,7 @@ def test_the_films_of_a_living_unit_are_read_as_its_past_says(
     monitor = UnitMonitor(machine_of(unit), analysis_of(plant.analysis))
     newest: list[Assessment] = []
     for _ in range(300):
-        for block in delivery.take(feed.advance(600)):
+        for block in delivery.take([feed.advance(600)]):
             newest = monitor.ingest(block) or newest
 
     history = simulated_history(unit, now_ns + 300 * NS_PER_S)
@@ -84,11 +81,11 @@ def test_the_films_of_a_living_unit_are_read_as_its_past_says(
         assert shaft_um == pytest.approx(past.shaft_um_pk[:, -1].tolist(), rel=0.1)
 
 
-def test_a_unit_with_fixed_films_has_no_past(stepped_clock: Any) -> None:
+def test_a_unit_with_fixed_films_has_no_past(stepped_clock):
     assert simulated_history(load_plant_file(DEMO).unit[0], stepped_clock.now_ns()) == {}
 
 
-def test_a_unit_that_cannot_have_this_life_is_refused(tmp_path: Path, stepped_clock: Any) -> None:
+def test_a_unit_that_cannot_have_this_life_is_refused(tmp_path, stepped_clock):
     odd = plant_with(LIFE.replace("life_seed = 2", "life_seed = 3"), tmp_path).unit[0]
     with pytest.raises(ConfigError, match=r"rated_speed_rpm = 92\.3, but life_seed requires 90\.9"):
         simulated_feed(odd, stepped_clock)
@@ -99,7 +96,7 @@ def test_a_unit_that_cannot_have_this_life_is_refused(tmp_path: Path, stepped_cl
         simulated_history(unit, stepped_clock.now_ns())
 
 
-def test_a_life_is_no_fixed_scenario(tmp_path: Path) -> None:
+def test_a_life_is_no_fixed_scenario(tmp_path):
     simulation = plant_with(LIFE, tmp_path).unit[0].simulation
     assert simulation is not None
     with pytest.raises(LookupError, match="no constant scenario"):
@@ -123,9 +120,7 @@ def test_a_life_is_no_fixed_scenario(tmp_path: Path) -> None:
         ("after_s = 120.0", "at = 2026-01-01T00:00:00", "timezone"),
     ],
 )
-def test_a_wrong_life_is_refused_with_key_and_value(
-    tmp_path: Path, old: str, new: str, said: str
-) -> None:
+def test_a_wrong_life_is_refused_with_key_and_value(tmp_path, old, new, said):
     assert old in LIFE
     with pytest.raises(TomlFileError) as refusal:
         plant_with(LIFE.replace(old, new, 1), tmp_path)

@@ -44,7 +44,7 @@ def load(model, **settings: Any):
 polled, vector, fifo, slow_device = (partial(load, model) for model in RIGHT)
 
 
-def test_a_polled_source_gives_a_value_for_every_channel() -> None:
+def test_a_polled_source_gives_a_value_for_every_channel():
     source = polled()
 
     source.require_fit(IDS, ("speed",))
@@ -58,7 +58,7 @@ def test_a_polled_source_gives_a_value_for_every_channel() -> None:
     assert refusal.value.at == ("source", "map", "value", 3, "channel")
 
 
-def test_a_rack_gives_the_amplitude_of_every_channel() -> None:
+def test_a_rack_gives_the_amplitude_of_every_channel():
     source = vector()
 
     source.require_fit(IDS, ("speed",))
@@ -70,7 +70,7 @@ def test_a_rack_gives_the_amplitude_of_every_channel() -> None:
     assert refusal.value.at == ("source", "map_file")
 
 
-def test_vectors_and_samples_are_not_taken_for_each_other() -> None:
+def test_vectors_and_samples_are_not_taken_for_each_other():
     with pytest.raises(MisfitError, match='requires kind "modbus_vector"'):
         polled(map=None, map_file=SKF, poll_period_s=5.0).require_fit(IDS, ("speed",))
     amplitudes = [
@@ -94,25 +94,25 @@ def test_vectors_and_samples_are_not_taken_for_each_other() -> None:
         ({"min_polls": 61}, "must not be above n_polls, 60"),
     ],
 )
-def test_a_rack_that_can_never_work_is_refused(settings: dict[str, Any], said: str) -> None:
+def test_a_rack_that_can_never_work_is_refused(settings, said):
     with pytest.raises(ValidationError) as refusal:
         vector(**settings)
     assert said in str(refusal.value)
 
 
-def test_a_device_is_not_given_less_time_than_its_map_asks() -> None:
+def test_a_device_is_not_given_less_time_than_its_map_asks():
     with pytest.raises(
         ValidationError, match="must be at least 1 s, the minimum in the register map"
     ):
         polled(map=WAVES | {"min_timeout_s": 1.0}, timeout_s=0.9)
 
 
-def test_a_serial_line_cannot_be_connected_for_each_reply() -> None:
+def test_a_serial_line_cannot_be_connected_for_each_reply():
     with pytest.raises(ValidationError, match='must be "kept" on a serial line'):
         polled(host=None, device="/dev/ttyUSB0", connection="per_reply")
 
 
-def test_a_map_with_many_mistakes_is_refused_in_one_line(tmp_path: Path) -> None:
+def test_a_map_with_many_mistakes_is_refused_in_one_line(tmp_path):
     path = tmp_path / "map.toml"
     path.write_text("bass = 1\nbast = 2\n")
     with pytest.raises(ValidationError) as refusal:
@@ -122,7 +122,7 @@ def test_a_map_with_many_mistakes_is_refused_in_one_line(tmp_path: Path) -> None
     assert "\n" not in said
 
 
-def test_a_slow_device_measures_slow_channels_alone() -> None:
+def test_a_slow_device_measures_slow_channels_alone():
     slow = slow_device()
     known = ("speed", "active_power", "ujb_oil_temperature", "ljb_oil_temperature")
 
@@ -133,7 +133,7 @@ def test_a_slow_device_measures_slow_channels_alone() -> None:
     assert refusal.value.at == ("slow_source", "map_file")
 
 
-def test_a_queue_of_twelve_channels_fits_into_a_reading() -> None:
+def test_a_queue_of_twelve_channels_fits_into_a_reading():
     layout = fifo().fifo_layout(12)
 
     assert layout.record_registers == 13
@@ -148,7 +148,7 @@ def test_a_queue_of_twelve_channels_fits_into_a_reading() -> None:
         ({"layout": "per_channel"}, 2, "number of addresses must be 2, got 1"),
     ],
 )
-def test_queues_that_do_not_fit_the_channels_are_refused(settings, n_channels: int, said) -> None:
+def test_queues_that_do_not_fit_the_channels_are_refused(settings, n_channels, said):
     with pytest.raises(MisfitError, match=said) as refusal:
         fifo(**settings).fifo_layout(n_channels)
     assert refusal.value.at[0] == "source"
@@ -166,7 +166,7 @@ TWO = {"layout": "per_channel", "addresses": [0, 1]}
         ({"addresses": [70_000]}, "less than or equal to 65535"),
     ],
 )
-def test_a_queue_that_cannot_be_followed_is_refused(settings, said: str) -> None:
+def test_a_queue_that_cannot_be_followed_is_refused(settings, said):
     with pytest.raises(ValidationError, match=said):
         fifo(**settings)
 
@@ -174,7 +174,7 @@ def test_a_queue_that_cannot_be_followed_is_refused(settings, said: str) -> None
 IDENTITY: TypeAdapter[IdentitySettings] = TypeAdapter(IdentitySettings)
 
 
-def test_an_identity_reaches_the_adapter_as_it_was_written() -> None:
+def test_an_identity_reaches_the_adapter_as_it_was_written():
     signature = {"kind": "signature", "address": 1000, "words": [0x0102, 7], "function": 4}
     assert identity_of(IDENTITY.validate_python(signature)) == ExpectedRegisters(
         address=1000, words=(0x0102, 7), function=4
@@ -197,7 +197,7 @@ def test_an_identity_reaches_the_adapter_as_it_was_written() -> None:
         ({"kind": "face"}, "'signature', 'identification'"),
     ],
 )
-def test_an_identity_that_cannot_be_is_refused(wrong: dict[str, object], complaint: str) -> None:
+def test_an_identity_that_cannot_be_is_refused(wrong, complaint):
     with pytest.raises(ValidationError, match=complaint):
         IDENTITY.validate_python(wrong)
 

@@ -6,7 +6,7 @@ from itertools import count
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rigs.store_fixtures import Execute, gap
+from rigs.store_fixtures import gap
 
 from core.alarms.alarm import Alarm, AlarmEvent, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
@@ -15,7 +15,6 @@ from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import INACTIVE, AlarmLevel, Judgement, unknown
 from service.store.port import AlarmQuery, StoreError, ValueRange
-from service.store.sqlite import SqliteStore
 
 T0 = 1_767_225_600_000_000_000
 FULL, PART = OperatingState.FULL_LOAD, OperatingState.PART_LOAD
@@ -64,7 +63,7 @@ LIFE = st.lists(
 )
 
 
-def test_an_alarm_and_its_events_are_read_as_they_were_written(store: SqliteStore) -> None:
+def test_an_alarm_and_its_events_are_read_as_they_were_written(store):
     numbers = count()
 
     @given(steps=LIFE)
@@ -87,9 +86,7 @@ def test_an_alarm_and_its_events_are_read_as_they_were_written(store: SqliteStor
     check()
 
 
-def test_news_that_is_written_twice_counts_once_and_never_undoes_what_came_later(
-    store: SqliteStore,
-) -> None:
+def test_news_that_is_written_twice_counts_once_and_never_undoes_what_came_later(store):
     first = raised()
     second = then(first, Judgement(), T0 + 5)
 
@@ -101,9 +98,7 @@ def test_news_that_is_written_twice_counts_once_and_never_undoes_what_came_later
     assert [s.event.number for s in store.alarm_events(AlarmQuery())] == [2, 1]
 
 
-def test_news_of_alarms_stands_or_falls_with_the_gap_it_came_with(
-    store: SqliteStore, execute: Execute
-) -> None:
+def test_news_of_alarms_stands_or_falls_with_the_gap_it_came_with(store, execute):
     with pytest.raises(StoreError, match="NOT NULL"):
         store.append([], [gap(unit=None)], [raised()])
     assert store.alarms() == []
@@ -115,7 +110,7 @@ def test_news_of_alarms_stands_or_falls_with_the_gap_it_came_with(
     assert store.alarm_events(AlarmQuery()) == []
 
 
-def test_events_are_found_by_alarm_unit_kind_and_time_page_by_page(store: SqliteStore) -> None:
+def test_events_are_found_by_alarm_unit_kind_and_time_page_by_page(store):
     store.append([], [], [raised(T0 + n, "UJB" if n % 2 else "LJB", f"U{n}") for n in range(10)])
 
     def found(**wanted: object) -> list[str]:
@@ -147,8 +142,8 @@ def test_events_are_found_by_alarm_unit_kind_and_time_page_by_page(store: Sqlite
     ],
 )
 def test_events_are_found_by_the_condition_at_which_their_occurrence_was_raised(
-    store: SqliteStore, wanted: dict[str, object], found: str
-) -> None:
+    store, wanted, found
+):
     others = (OperatingPoint(FULL, 0.5, 10.0, 40.0), OperatingPoint(PART, 0.38, 20.0, 48.0))
     points = dict(zip("ABCDE", (POINT, *others, OperatingPoint(), None), strict=True))
     for subject, point in points.items():

@@ -1,12 +1,11 @@
-"""What was appended is read back, to the last bit."""
+"""What was appended is read back, to the last bit, or in buckets that keep what matters."""
 
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rigs.assessments import assessment
 from rigs.store_fixtures import at, gap, query
@@ -14,9 +13,11 @@ from rigs.store_fixtures import at, gap, query
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
 from core.quality import Level, Quality, Reading, Reason, missing, uncertain
+from core.units import DAY_NS
 from service.runtime.asker import ASKER, Asker
 from service.store import store as sql_store
 from service.store import trends
+from service.store.buckets import NICE_WIDTHS_NS, Summaries, bucket_width_ns, bucketed
 from service.store.port import QueryTooLargeError, RefusedRowError, StoreError, ValueRange
 from service.store.series import Layout
 from service.store.sqlite import SqliteStore
@@ -37,7 +38,7 @@ def readings(draw: st.DrawFn) -> dict[str, Reading]:
 
 @given(readings())
 @settings(max_examples=25, deadline=None)
-def test_a_row_decodes_to_the_readings_it_was_made_of(given_: dict[str, Reading]) -> None:
+def test_a_row_decodes_to_the_readings_it_was_made_of(given_):
     layout = Layout.of(NAMES)
 
     values, qualities = layout.encode(given_)
@@ -52,8 +53,8 @@ def test_a_row_decodes_to_the_readings_it_was_made_of(given_: dict[str, Reading]
 
 @pytest.mark.parametrize("spoilt", [{"time_ns": 2**63}, {"bearing": "\ud800"}])
 def test_a_row_that_no_database_takes_is_told_apart_from_a_database_that_takes_nothing(
-    store: SqliteStore, spoilt: dict[str, object]
-) -> None:
+    store, spoilt
+):
     good = assessment(at(0), speed_rpm=1.0)
 
     with pytest.raises(RefusedRowError):
@@ -63,7 +64,7 @@ def test_a_row_that_no_database_takes_is_told_apart_from_a_database_that_takes_n
     assert list(store.trend(query()).time_ns) == [at(0)]
 
 
-def test_what_was_appended_is_read_back_to_the_last_bit(store: SqliteStore) -> None:
+def test_what_was_appended_is_read_back_to_the_last_bit(store):
     values = [0.6914e9, 0.1 + 0.2, 5e-324, 1.7976931348623157e308, -0.0]
     store.append([assessment(at(i), speed_rpm=v) for i, v in enumerate(values)], [])
 
@@ -79,7 +80,7 @@ def test_what_was_appended_is_read_back_to_the_last_bit(store: SqliteStore) -> N
     assert list(series.count) == [1] * 5
 
 
-def test_a_missing_value_stays_missing_and_a_doubtful_one_doubtful(store: SqliteStore) -> None:
+def test_a_missing_value_stays_missing_and_a_doubtful_one_doubtful(store):
     doubtful = Reading(92.3, uncertain(Reason.SPEED_UNKNOWN))
     store.append(
         [
@@ -97,7 +98,7 @@ def test_a_missing_value_stays_missing_and_a_doubtful_one_doubtful(store: Sqlite
     assert list(series.worst_level) == [Level.GOOD, Level.UNCERTAIN, Level.BAD]
 
 
-def test_the_same_assessment_twice_counts_once(store: SqliteStore) -> None:
+def test_the_same_assessment_twice_counts_once(store):
     store.append([assessment(at(0), speed_rpm=90.0), assessment(at(0), speed_rpm=91.0)], [gap()])
     store.append([assessment(at(0), speed_rpm=92.0), assessment(at(1), speed_rpm=93.0)], [gap()])
 
@@ -105,7 +106,7 @@ def test_the_same_assessment_twice_counts_once(store: SqliteStore) -> None:
     assert len(store.gaps("U1", 0, 2 * at(0))) == 1
 
 
-def test_bearings_and_units_do_not_mix(store: SqliteStore) -> None:
+def test_bearings_and_units_do_not_mix(store):
     for number, (unit, bearing) in enumerate([("U1", "UJB"), ("U1", "LJB"), ("U2", "UJB")]):
         store.append(
             [assessment(unit=unit, bearing=bearing, speed_rpm=float(number))], [gap(unit=unit)]
@@ -116,7 +117,7 @@ def test_bearings_and_units_do_not_mix(store: SqliteStore) -> None:
     assert list(store.trend(query(unit="U3")).time_ns) == []
 
 
-def test_a_range_of_time_holds_its_start_but_not_its_end(store: SqliteStore) -> None:
+def test_a_range_of_time_holds_its_start_but_not_its_end(store):
     store.append(
         [assessment(at(i), speed_rpm=float(i)) for i in range(5)],
         [gap(at(i), first_index=i) for i in range(5)],
@@ -128,7 +129,7 @@ def test_a_range_of_time_holds_its_start_but_not_its_end(store: SqliteStore) -> 
     assert [g.stop_ns for g in store.gaps("U1", at(1), at(3))] == [at(1), at(2)]
 
 
-def test_readings_are_filtered_by_eccentricity_and_oil_temperature(store: SqliteStore) -> None:
+def test_readings_are_filtered_by_eccentricity_and_oil_temperature(store):
     for i in range(10):
         store.append(
             [
@@ -152,7 +153,7 @@ def test_readings_are_filtered_by_eccentricity_and_oil_temperature(store: Sqlite
     assert len(speeds()) == 11
 
 
-def test_a_hole_is_marked_so_that_no_line_spans_it(store: SqliteStore) -> None:
+def test_a_hole_is_marked_so_that_no_line_spans_it(store):
     store.append([assessment(at(i), speed_rpm=float(i)) for i in (0, 1, 5, 6)], [])
 
     trend = store.trend(query("speed_rpm", hole_ns=at(2) - at(0)))
@@ -165,9 +166,7 @@ def test_a_hole_is_marked_so_that_no_line_spans_it(store: SqliteStore) -> None:
     assert at(1) < trend.time_ns[2] < at(5)
 
 
-def test_a_quantity_that_an_older_padwatch_did_not_know_is_null_there(
-    path: object, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_quantity_that_an_older_padwatch_did_not_know_is_null_there(path, monkeypatch):
     older = tuple(q for q in reversed(CATALOGUE) if q.name != "vortex_coherence_xx")
     with monkeypatch.context() as at_that_time:
         at_that_time.setattr(sql_store, "CATALOGUE", older)
@@ -185,9 +184,7 @@ def test_a_quantity_that_an_older_padwatch_did_not_know_is_null_there(
     assert list(trend.series["vortex_coherence_xx"].worst_level) == [Level.BAD, Level.GOOD]
 
 
-def test_a_query_that_could_take_all_memory_is_refused_with_its_size(
-    store: SqliteStore, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_query_that_could_take_all_memory_is_refused_with_its_size(store, monkeypatch):
     store.append([assessment(at(i), speed_rpm=92.3) for i in range(11)], [])
     monkeypatch.setattr(trends, "MAX_ROWS", 10)
 
@@ -197,7 +194,7 @@ def test_a_query_that_could_take_all_memory_is_refused_with_its_size(
 
 
 @pytest.mark.parametrize("reach", [2**63 - 1, 10**21])
-def test_a_range_wider_than_any_date_is_everything(store: SqliteStore, reach: int) -> None:
+def test_a_range_wider_than_any_date_is_everything(store, reach):
     store.append([assessment(at(i), speed_rpm=float(i)) for i in range(4)], [gap()])
 
     single = store.trend(query(start_ns=-reach, end_ns=reach))
@@ -208,7 +205,7 @@ def test_a_range_wider_than_any_date_is_everything(store: SqliteStore, reach: in
     assert len(store.gaps("U1", -reach, reach)) == 1
 
 
-def test_a_closed_store_says_so(store: SqliteStore) -> None:
+def test_a_closed_store_says_so(store):
     store.close()
     store.close()
 
@@ -216,7 +213,7 @@ def test_a_closed_store_says_so(store: SqliteStore) -> None:
         store.append([assessment()], [])
 
 
-def test_a_result_of_all_quantities_takes_no_page_of_its_own(path: Path) -> None:
+def test_a_result_of_all_quantities_takes_no_page_of_its_own(path):
     SqliteStore(path).close()
     before = path.stat().st_size
     everything = {
@@ -229,7 +226,7 @@ def test_a_result_of_all_quantities_takes_no_page_of_its_own(path: Path) -> None
     assert (path.stat().st_size - before) / 400 < 2500
 
 
-def test_what_a_clock_shows_for_the_second_time_is_no_repetition(store: SqliteStore) -> None:
+def test_what_a_clock_shows_for_the_second_time_is_no_repetition(store):
     def measured(epoch: int, speed_rpm: float) -> Assessment:
         made = assessment(at(0), speed_rpm=speed_rpm)
         return replace(made, window=replace(made.window, epoch=epoch))
@@ -242,9 +239,7 @@ def test_what_a_clock_shows_for_the_second_time_is_no_repetition(store: SqliteSt
     assert list(series.mean) == [90.0, 91.0, 92.0]
 
 
-def test_a_read_ends_when_its_asker_has_gone(
-    store: SqliteStore, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_read_ends_when_its_asker_has_gone(store, monkeypatch):
     monkeypatch.setattr(readers, "LOOK_AFTER_STEPS", 1)
     asker = Asker()
     before = ASKER.set(asker)
@@ -260,12 +255,90 @@ def test_a_read_ends_when_its_asker_has_gone(
     assert store.trend(query()).time_ns == []
 
 
-def test_more_gaps_than_anybody_reads_are_refused(
-    store: SqliteStore, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_more_gaps_than_anybody_reads_are_refused(store, monkeypatch):
     monkeypatch.setattr(sql_store, "MAX_GAPS", 2)
     store.append([], [gap(stop_ns, first_index=stop_ns) for stop_ns in (1, 2, 3)])
 
     assert len(store.gaps("U1", 0, 3)) == 2
     with pytest.raises(QueryTooLargeError, match="more than 2 gaps"):
         store.gaps("U1", 0, 4)
+
+
+T0 = 1_767_225_600_000_000_000
+SECOND_NS = 1_000_000_000
+
+VALUES = st.one_of(st.none(), st.floats(-1e100, 1e100), st.sampled_from([0.1, 0.7e9]))
+
+
+def readings_of(points: list[tuple[int, float | None, Level]]) -> Summaries:
+    points = sorted(points, key=lambda point: point[0])
+    value = [[np.nan if v is None else v] for _, v, _ in points]
+    level = [[level] for _, _, level in points]
+    return Summaries.of(
+        ("q",),
+        np.array([T0 + t * SECOND_NS // 10 for t, _, _ in points], dtype=np.int64),
+        np.array(value, dtype=np.float64).reshape(-1, 1),
+        np.array(level, dtype=np.uint8).reshape(-1, 1),
+    )
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 5000), VALUES, st.sampled_from(Level)),
+        min_size=1,
+        max_size=60,
+    ),
+    st.sampled_from(NICE_WIDTHS_NS[:8]),
+)
+@settings(max_examples=100, deadline=None)
+def test_buckets_lose_no_reading_no_extreme_and_no_doubt(points, width_ns):
+    readings = readings_of(points)
+
+    trend = bucketed(readings, width_ns)
+    series = trend.series["q"]
+
+    values = [v for _, v, _ in points if v is not None]
+    assert sum(series.count) == len(values)
+    assert all(time_ns % width_ns == 0 for time_ns in trend.time_ns)
+    assert set(np.diff(trend.time_ns)) <= {width_ns}
+    for i, start_ns in enumerate(trend.time_ns):
+        inside = (readings.time_ns >= start_ns) & (readings.time_ns < start_ns + width_ns)
+        numbers = readings.mean[inside, 0]
+        usable = numbers[np.isfinite(numbers)]
+        assert series.count[i] == usable.size
+        if usable.size:
+            low, mean, high = series.minimum[i], series.mean[i], series.maximum[i]
+            assert (low, high) == (usable.min(), usable.max())
+            assert mean is not None
+            assert usable.min() <= mean <= usable.max()
+            assert mean == pytest.approx(usable.mean(), rel=1e-9, abs=1e-9 * abs(usable).max())
+        else:
+            assert series.minimum[i] is series.mean[i] is series.maximum[i] is None
+        levels = readings.level[inside, 0]
+        assert series.worst_level[i] == (Level(levels.max()) if levels.size else None)
+
+
+@given(
+    st.integers(0, 2**62),
+    st.integers(1, 2**62 - 1),
+    st.integers(2, 5000),
+    st.floats(0.0, 1.0),
+    st.floats(0.0, 1.0),
+)
+@example(999_999_999, 10_000_000_000, 10, 0.0, 1.0)
+@settings(max_examples=150, deadline=None)
+def test_a_range_never_takes_more_buckets_than_asked_for(
+    start_ns, length_ns, max_points, first, last
+):
+    width_ns = bucket_width_ns(start_ns, start_ns + length_ns, max_points)
+    inside = sorted(start_ns + min(int(f * length_ns), length_ns - 1) for f in (first, last))
+
+    assert width_ns in NICE_WIDTHS_NS or width_ns % DAY_NS == 0
+    assert inside[1] // width_ns - inside[0] // width_ns + 1 <= max_points
+
+
+def test_no_reading_at_all_makes_no_bucket():
+    trend = bucketed(readings_of([]), SECOND_NS)
+
+    assert list(trend.time_ns) == []
+    assert list(trend.series["q"].mean) == []

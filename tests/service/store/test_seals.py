@@ -8,17 +8,19 @@ from pathlib import Path
 import pytest
 from rigs.assessments import assessment
 from rigs.rolled_trends import gather_all
-from rigs.store_fixtures import Execute, at, gap, query
+from rigs.store_fixtures import at, query
 
 from service.store.access.identities import Role
-from service.store.port import StoreError, TrendQuery
+from service.store.access.tables import AccessStore
+from service.store.port import StoreError, TrendQuery, ValueRange
 from service.store.references import GapReference, ReferenceSource
 from service.store.seals import MAX_PLACES, DamageLog, Place, initial_crc, seal_of
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.checking import findings
+from service.store.sqlite.store import open_access_file
 
 
-def test_whatever_is_changed_in_a_row_changes_its_seal() -> None:
+def test_whatever_is_changed_in_a_row_changes_its_seal():
     row = (1, 2.5, b"text", None, b"\0\0")
     others = [
         (1, 2.5, b"text", None, b"\0\1"),
@@ -35,7 +37,7 @@ def test_whatever_is_changed_in_a_row_changes_its_seal() -> None:
     assert seal_of(initial_crc("t"), row) != seal_of(initial_crc("u"), row)
 
 
-def test_equal_rows_have_equal_seals_wherever_their_values_come_from() -> None:
+def test_equal_rows_have_equal_seals_wherever_their_values_come_from():
     text = b"text"
     row = (1, 2**40, -(2**63), 2.5, -0.0, text, None, b"", text)
     same = (1, 2**40, -(2**63), 2.5, -0.0, bytes(bytearray(text)), None, b"", bytes([*text]))
@@ -57,9 +59,7 @@ def test_equal_rows_have_equal_seals_wherever_their_values_come_from() -> None:
         "time_ns = time_ns + 1",
     ],
 )
-def test_a_reading_that_was_altered_or_moved_is_not_shown(
-    store: SqliteStore, execute: Execute, change: str
-) -> None:
+def test_a_reading_that_was_altered_or_moved_is_not_shown(store, execute, change):
     store.append([assessment(at(n), speed_rpm=float(n)) for n in range(5)], [])
 
     execute(f"UPDATE assessment SET {change} WHERE time_ns = {at(2)}")  # noqa: S608
@@ -70,7 +70,7 @@ def test_a_reading_that_was_altered_or_moved_is_not_shown(
     assert store.integrity.damaged == [Place("assessment", f"series 1, time_ns {found_ns}")]
 
 
-def test_a_bearing_whose_name_was_altered_is_neither(store: SqliteStore, execute: Execute) -> None:
+def test_a_bearing_whose_name_was_altered_is_neither(store, execute):
     store.append([assessment(speed_rpm=92.3)], [])
     execute("UPDATE series SET bearing = 'LJB'")
 
@@ -80,40 +80,42 @@ def test_a_bearing_whose_name_was_altered_is_neither(store: SqliteStore, execute
     assert [place.table for place in store.integrity.damaged] == ["series"]
 
 
-def test_readings_of_a_layout_that_was_altered_are_an_error(
-    store: SqliteStore, execute: Execute
-) -> None:
+def test_readings_of_a_layout_that_was_altered_are_an_error(store, execute):
     store.append([assessment(speed_rpm=92.3)], [])
     execute("UPDATE layout SET quantities = replace(quantities, 'speed_rpm', 'power_mw')")
 
     assert store.newest("U1", "UJB") is None
-    with pytest.raises(StoreError, match="layout 1 of readings"):
+    with pytest.raises(StoreError, match="layout 1 of stored readings"):
         store.trend(query("speed_rpm"))
     assert store.integrity.n_damaged == 1
 
 
-def test_text_that_is_none_stops_no_other_row(store: SqliteStore, execute: Execute) -> None:
-    store.append([], [gap(at(n), first_index=100 * n) for n in range(3)])
-    store.access.accounts.add("A. Name", Role.ADMIN, "hash", 1)
-    store.access.accounts.add("B. Name", Role.VIEWER, "hash", 1)
+@pytest.fixture
+def access(path: Path) -> Iterator[AccessStore]:
+    """Accounts in place of a store."""
+    with closing(open_access_file(path)) as opened:
+        yield opened
+
+
+def test_text_that_is_none_stops_no_other_row(access, execute):
+    access.accounts.add("A. Name", Role.ADMIN, "hash", 1)
+    access.accounts.add("B. Name", Role.VIEWER, "hash", 1)
     execute("UPDATE account SET password_hash = CAST(x'ff80' AS TEXT) WHERE name = 'A. Name'")
 
-    assert [account.name for account in store.access.accounts.all()] == ["B. Name"]
-    assert store.access.accounts.get("A. Name") is None
-    assert len(store.gaps("U1", 0, 2**62)) == 3
+    assert [account.name for account in access.accounts.all()] == ["B. Name"]
+    assert access.accounts.get("A. Name") is None
+    assert access.trouble == "damaged or missing rows: 1"
 
 
-def test_a_damaged_account_lets_nobody_in_and_nobody_set_up_anew(
-    store: SqliteStore, execute: Execute
-) -> None:
-    store.access.accounts.add("A. Name", Role.VIEWER, "hash", 1)
+def test_a_damaged_account_lets_nobody_in_and_nobody_set_up_anew(access, execute):
+    access.accounts.add("A. Name", Role.VIEWER, "hash", 1)
     execute("UPDATE account SET role = 'admin'")
 
-    assert store.access.accounts.get("A. Name") is None
-    assert not store.access.set_up.offer(b"1" * 32, 2**62)
+    assert access.accounts.get("A. Name") is None
+    assert not access.set_up.offer(b"1" * 32, 2**62)
 
 
-def test_a_reference_that_was_altered_does_not_rule(store: SqliteStore, execute: Execute) -> None:
+def test_a_reference_that_was_altered_does_not_rule(store, execute):
     source = ReferenceSource.GIVEN
     store.add_reference(GapReference("U1", "UJB", 1, "A", (2000.0, 2001.0), None, source, ""))
     execute("DROP TRIGGER gap_reference_kept_as_set")
@@ -124,7 +126,7 @@ def test_a_reference_that_was_altered_does_not_rule(store: SqliteStore, execute:
     assert store.integrity.n_damaged == 1
 
 
-def test_seals_hold_after_a_restart_and_go_with_their_rows(path: Path, execute: Execute) -> None:
+def test_seals_hold_after_a_restart_and_go_with_their_rows(path, execute):
     with closing(SqliteStore(path)) as store:
         store.append([assessment(at(n), speed_rpm=float(n)) for n in range(4)], [])
         with store.database.writing() as writer:
@@ -137,9 +139,7 @@ def test_seals_hold_after_a_restart_and_go_with_their_rows(path: Path, execute: 
     assert n_seals == 2
 
 
-def test_what_came_from_before_there_were_seals_is_sealed_at_the_upgrade(
-    path: Path, execute: Execute
-) -> None:
+def test_what_came_from_before_there_were_seals_is_sealed_at_the_upgrade(path, execute):
     with closing(SqliteStore(path)) as store:
         store.append([assessment(speed_rpm=92.3)], [])
     execute("DROP TABLE seal_assessment")
@@ -150,7 +150,7 @@ def test_what_came_from_before_there_were_seals_is_sealed_at_the_upgrade(
         assert store.integrity.n_damaged == 0
 
 
-def test_a_schema_whose_names_are_no_text_is_refused_and_found(path: Path) -> None:
+def test_a_schema_whose_names_are_no_text_is_refused_and_found(path):
     SqliteStore(path).close()
     with closing(sqlite3.connect(path)) as other, other:
         other.execute("CREATE TABLE strange (x)")
@@ -165,7 +165,7 @@ def test_a_schema_whose_names_are_no_text_is_refused_and_found(path: Path) -> No
     assert [finding.kind for finding in findings(path)] == ["structure"]
 
 
-def test_damage_is_remembered_once_a_place_and_counted_beyond_the_limit() -> None:
+def test_damage_is_remembered_once_a_place_and_counted_beyond_the_limit():
     log = DamageLog()
     for _ in range(2):
         for n in range(MAX_PLACES):
@@ -179,6 +179,7 @@ def test_damage_is_remembered_once_a_place_and_counted_beyond_the_limit() -> Non
 MINUTE_NS, HOUR_NS = 60_000_000_000, 3_600_000_000_000
 T0 = 1_767_225_600_000_000_000
 N_HOURS = 3
+ANY = ValueRange()
 
 
 @pytest.fixture
@@ -186,24 +187,22 @@ def full_store(path: Path) -> Iterator[SqliteStore]:
     """One reading a minute, of as many turns a minute as minutes have passed."""
     with closing(SqliteStore(path)) as opened:
         readings = [
-            assessment(T0 + n * MINUTE_NS, speed_rpm=float(n)) for n in range(60 * N_HOURS + 1)
+            assessment(T0 + n * MINUTE_NS, speed_rpm=float(n), oil_temperature_c=45.0)
+            for n in range(60 * N_HOURS + 1)
         ]
         opened.append(readings, [])
         yield opened
 
 
-def extremes(full_store: SqliteStore) -> list[tuple[float, float]]:
+def extremes(full_store: SqliteStore, oil_c: ValueRange = ANY) -> list[tuple[float, float]]:
     """Least and greatest speed of each hour that is gathered."""
-    asked = TrendQuery(
-        *("U1", "UJB", ("speed_rpm",), T0, T0 + N_HOURS * HOUR_NS, N_HOURS + 1, HOUR_NS)
-    )
+    whole = (T0, T0 + N_HOURS * HOUR_NS, N_HOURS + 1, HOUR_NS)
+    asked = TrendQuery("U1", "UJB", ("speed_rpm",), *whole, oil_temperature_c=oil_c)
     found = full_store.trend(asked).series["speed_rpm"]
     return list(zip(found.minimum, found.maximum, strict=True))  # type: ignore[arg-type]
 
 
-def test_a_damaged_reading_is_in_no_roll_up_and_is_counted(
-    full_store: SqliteStore, execute: Execute
-) -> None:
+def test_a_damaged_reading_is_in_no_roll_up_and_is_counted(full_store, execute):
     for minute in (0, 119):  # in what was not read since it was written
         execute(
             "UPDATE assessment SET reading_values = zeroblob(length(reading_values))"
@@ -219,9 +218,7 @@ def test_a_damaged_reading_is_in_no_roll_up_and_is_counted(
     assert extremes(full_store) == [(1.0, 59.0), (60.0, 118.0), (120.0, 179.0)]
 
 
-def test_a_damaged_roll_up_is_not_gathered_into_a_wider_one(
-    full_store: SqliteStore, execute: Execute
-) -> None:
+def test_a_damaged_roll_up_is_not_gathered_into_a_wider_one(full_store, execute):
     gather_all(full_store, T0 + 30 * MINUTE_NS)
     execute("UPDATE rollup_cell SET n_readings = 1 WHERE width_s = 600 AND start_ns = ?", (T0,))
 
@@ -232,9 +229,9 @@ def test_a_damaged_roll_up_is_not_gathered_into_a_wider_one(
 
 
 @pytest.mark.parametrize("hour", range(N_HOURS))
-def test_numbers_whose_cell_is_damaged_are_not_taken_for_those_of_another(
-    full_store: SqliteStore, execute: Execute, hour: int
-) -> None:
+def test_numbers_whose_cell_is_damaged_are_not_taken_for_those_of_another_condition(
+    full_store, execute, hour
+):
     gather_all(full_store)
     right = extremes(full_store)
     execute(
@@ -242,5 +239,29 @@ def test_numbers_whose_cell_is_damaged_are_not_taken_for_those_of_another(
         (T0 + hour * HOUR_NS,),
     )
 
-    left = [found for found in extremes(full_store) if found[0] is not None]
-    assert left == right[:hour] + right[hour + 1 :]
+    assert extremes(full_store) == right, "in any condition, and the numbers are intact"
+    assert full_store.integrity.damaged == []
+    found = extremes(full_store, ValueRange(0.0, 100.0))
+    assert [each for each in found if each[0] is not None] == right[:hour] + right[hour + 1 :]
+    assert [place.table for place in full_store.integrity.damaged] == ["rollup_cell"]
+
+
+@pytest.mark.parametrize(
+    ("damage", "table"),
+    [
+        ("UPDATE rollup_cell SET slot = 7", "rollup_cell"),
+        ("UPDATE rollup_numbers SET slot = 7", "rollup_numbers"),
+        ("UPDATE rollup_numbers SET numbers = zeroblob(length(numbers))", "rollup_numbers"),
+    ],
+)
+@pytest.mark.parametrize("hour", range(N_HOURS))
+def test_numbers_and_cells_that_do_not_belong_together_are_in_no_trend(
+    full_store, execute, hour, damage, table
+):
+    gather_all(full_store)
+    right = extremes(full_store)
+    execute(f"{damage} WHERE width_s = 3600 AND start_ns = ?", (T0 + hour * HOUR_NS,))
+
+    found = [each for each in extremes(full_store) if each[0] is not None]
+    assert found == right[:hour] + right[hour + 1 :]
+    assert table in {place.table for place in full_store.integrity.damaged}

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rigs.assessments import assessment
-from rigs.store_fixtures import Execute
 
 from core.arrays import FloatArray
 from core.condition.cells import BearingCondition
@@ -72,9 +71,7 @@ amplitudes = st.floats(0.0, 1e6, allow_subnormal=False)
 
 
 @given(st.lists(st.tuples(*[amplitudes] * 4), min_size=1, max_size=30))
-def test_an_amplitude_comes_back_within_two_hundredths_of_a_percent(
-    lines: list[tuple[float, ...]],
-) -> None:
+def test_an_amplitude_comes_back_within_two_hundredths_of_a_percent(lines):
     written: FloatArray = np.array(lines).T
 
     back = decode(encode(written))
@@ -85,7 +82,7 @@ def test_an_amplitude_comes_back_within_two_hundredths_of_a_percent(
     assert np.all(back[~told] == 0.0)
 
 
-def test_a_spectrum_comes_back_with_what_it_was_found_under(kept: SqliteStore) -> None:
+def test_a_spectrum_comes_back_with_what_it_was_found_under(kept):
     kept.append([found(5.0)], [])
 
     [one] = read(kept).spectra
@@ -99,9 +96,7 @@ def test_a_spectrum_comes_back_with_what_it_was_found_under(kept: SqliteStore) -
     assert one.amplitude_um_pk == pytest.approx(expected, rel=2.1e-4)
 
 
-def test_a_channel_that_was_not_usable_has_no_amplitudes_rather_than_none_moving(
-    kept: SqliteStore,
-) -> None:
+def test_a_channel_that_was_not_usable_has_no_amplitudes_rather_than_none_moving(kept):
     kept.append([found(0.0, lost=(1,)), found(120.0, lost=(0, 1, 2, 3))], [])
 
     [one] = read(kept).spectra
@@ -109,16 +104,14 @@ def test_a_channel_that_was_not_usable_has_no_amplitudes_rather_than_none_moving
     assert np.isnan(one.amplitude_um_pk).all(axis=1).tolist() == [False, True, False, False]
 
 
-def test_the_first_spectrum_of_each_minute_is_kept_and_no_other(kept: SqliteStore) -> None:
+def test_the_first_spectrum_of_each_minute_is_kept_and_no_other(kept):
     kept.append([found(12.0 * n) for n in range(16)], [])
     kept.append([found(12.0 * n) for n in range(16)], [])  # the answer to the first got lost
 
     assert times_s(read(kept)) == [0.0, 60.0, 120.0, 180.0]
 
 
-def test_old_spectra_thin_out_and_their_number_stays_bounded(
-    kept: SqliteStore, execute: Execute
-) -> None:
+def test_old_spectra_thin_out_and_their_number_stays_bounded(kept, execute):
     for minute in range(60):
         kept.append([found(60.0 * minute), found(60.0 * minute, "LJB")], [])
 
@@ -131,7 +124,7 @@ def test_old_spectra_thin_out_and_their_number_stays_bounded(
     assert per_tier == {Tier.DENSE: 10, Tier.SPARSE: 8}
 
 
-def test_a_clock_that_was_years_ahead_for_a_while_drives_nothing_out(kept: SqliteStore) -> None:
+def test_a_clock_that_was_years_ahead_for_a_while_drives_nothing_out(kept):
     for n in range(5):
         kept.append([found(3e8 + 60.0 * n)], [])
     for n in range(5):
@@ -140,7 +133,7 @@ def test_a_clock_that_was_years_ahead_for_a_while_drives_nothing_out(kept: Sqlit
     assert times_s(read(kept)) == [0.0, 60.0, 120.0, 180.0, 240.0]
 
 
-def test_spectra_are_there_after_a_restart_and_a_minute_is_not_kept_twice(path: Path) -> None:
+def test_spectra_are_there_after_a_restart_and_a_minute_is_not_kept_twice(path):
     for at_s in (0.0, 30.0, 60.0):
         with closing(SqliteStore(path, spectra=LIMITS)) as store:
             store.append([found(at_s)], [])
@@ -149,14 +142,14 @@ def test_spectra_are_there_after_a_restart_and_a_minute_is_not_kept_twice(path: 
         assert times_s(read(store)) == [0.0, 60.0]
 
 
-def test_a_gap_in_the_samples_is_a_gap_in_the_spectra(kept: SqliteStore) -> None:
+def test_a_gap_in_the_samples_is_a_gap_in_the_spectra(kept):
     kept.append([found(at_s) for at_s in (0.0, 60.0, 86_400.0)], [])
 
     assert times_s(read(kept)) == [0.0, 60.0, 86_400.0]
     assert times_s(read(kept, start_s=60.0, end_s=86_400.0)) == [60.0]
 
 
-def test_of_too_many_spectra_those_that_lie_evenly_in_time_are_read(path: Path) -> None:
+def test_of_too_many_spectra_those_that_lie_evenly_in_time_are_read(path):
     with closing(SqliteStore(path)) as store:
         store.append([found(60.0 * n) for n in range(101)], [])
 
@@ -166,7 +159,7 @@ def test_of_too_many_spectra_those_that_lie_evenly_in_time_are_read(path: Path) 
     assert times_s(spectra) == [0.0, 1500.0, 3000.0, 4500.0, 6000.0]
 
 
-def test_lines_beyond_the_limit_are_not_kept(kept: SqliteStore) -> None:
+def test_lines_beyond_the_limit_are_not_kept(kept):
     kept.append([found(0.0, n_lines=50)], [])
 
     assert read(kept).spectra[0].resolution == (0.1, 12)
@@ -183,9 +176,7 @@ def test_lines_beyond_the_limit_are_not_kept(kept: SqliteStore) -> None:
         "checksum = zeroblob(8)",
     ],
 )
-def test_a_damaged_spectrum_is_told_of_and_not_handed_out(
-    kept: SqliteStore, execute: Execute, damage: str
-) -> None:
+def test_a_damaged_spectrum_is_told_of_and_not_handed_out(kept, execute, damage):
     kept.append([found(0.0), found(60.0)], [])
     execute(f"UPDATE spectrum SET {damage} WHERE time_ns = {T0 + 60 * S}")  # noqa: S608
 
@@ -195,7 +186,7 @@ def test_a_damaged_spectrum_is_told_of_and_not_handed_out(
     assert list(spectra.damaged_ns) == [T0 + 60 * S]
 
 
-def test_a_result_without_a_spectrum_is_stored_without_one(kept: SqliteStore) -> None:
+def test_a_result_without_a_spectrum_is_stored_without_one(kept):
     empty = np.empty((0, 4, 4))
     none = CrossSpectrum(np.empty(0), empty.astype(complex), empty, np.zeros((4, 4), np.int64))
     kept.append([replace(assessment(T0, speed_rpm=missing(Reason.STALE)), spectrum=none)], [])

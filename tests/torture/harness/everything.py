@@ -6,10 +6,12 @@ from pathlib import Path
 
 from harness.deeds import T0_NS, Build, deed
 from service.store.access.audit_entries import AuditAction
-from service.store.access.identities import ApiKey, Role
+from service.store.access.identities import ApiKey, Role, Session
+from service.store.access.tables import AccessStore
 from service.store.port import StoreError
 from service.store.references import GapReference, ReferenceSource
 from service.store.sqlite import SqliteStore
+from service.store.sqlite.store import open_access_file
 
 Rows = Mapping[str, frozenset[tuple[object, ...]]]
 
@@ -23,7 +25,6 @@ OTHERS = (
     "INSERT INTO simulated_past VALUES (1, 5, 50) ON CONFLICT DO NOTHING",
     "INSERT INTO vector_reference (unit, bearing, state, set_ns, author, note, vectors)"
     " VALUES ('U1', 'UJB', 5, 1, 'A', 'a note', '{\"shaft_x\": [12.5, 30.0]}')",
-    "INSERT INTO session VALUES (randomblob(32), 'A. Name', 5, 6)",
 )
 """Rows that a store takes only from those who can make them."""
 
@@ -50,9 +51,6 @@ def _others(store: SqliteStore) -> None:
     for n in range(3):
         gaps = (2000.0 + n, 2001.5)
         store.add_reference(GapReference("U1", "UJB", T0_NS + n, "A", gaps, None, source, "note"))
-    store.access.accounts.add("A. Name", Role.ADMIN, "$argon2id$" + "x" * 80, T0_NS)
-    store.access.accounts.add("B. Name", Role.VIEWER, "$argon2id$" + "y" * 80, T0_NS)
-    store.access.keys.add(ApiKey("k1", "wall", b"d" * 32, Role.VIEWER, ("U1",), 5, 9, None, None))
     store.audit.record(
         [AuditAction(T0_NS + n, "A", "told", "something", after={"n": n}) for n in range(9)]
     )
@@ -61,14 +59,27 @@ def _others(store: SqliteStore) -> None:
             writer.execute(statement)
 
 
-def served(store: SqliteStore) -> tuple[Rows, list[str]]:
+def fill_access(path: Path) -> None:
+    """Write accounts, sessions and keys; all of it is still in the log."""
+    store = open_access_file(path)
+    store.accounts.add("A. Name", Role.ADMIN, "$argon2id$" + "x" * 80, T0_NS)
+    store.accounts.add("B. Name", Role.VIEWER, "$argon2id$" + "y" * 80, T0_NS)
+    store.keys.add(ApiKey("k1", "wall", b"d" * 32, Role.VIEWER, ("U1",), 5, 9, None, None))
+    for n in range(9):
+        store.sessions.add(Session(bytes([n]) * 32, "A. Name", 5, 6), 1, 0)
+        store.audit.record([AuditAction(T0_NS + n, "A", "told", "something", after={"n": n})])
+
+
+def served(*stores: SqliteStore | AccessStore) -> tuple[Rows, list[str]]:
     """What is in each table for those who read it, and what was refused with an error."""
     rows, errors = {}, []
-    for table in store.database.seals.tables:
-        try:
-            with store.database.reading() as reader:
-                found = reader.execute(f"SELECT {WHAT.get(table, '*')} FROM {table}").fetchall()  # noqa: S608
-            rows[table] = frozenset(found)
-        except (StoreError, sqlite3.Error) as error:
-            errors.append(f"{table}: {error}")
+    for store in stores:
+        for table in store.database.seals.tables:
+            name = f"{store.audit.chain} {table}"
+            try:
+                with store.database.reading() as reader:
+                    found = reader.execute(f"SELECT {WHAT.get(table, '*')} FROM {table}").fetchall()  # noqa: S608
+                rows[name] = frozenset(found)
+            except (StoreError, sqlite3.Error) as error:
+                errors.append(f"{name}: {error}")
     return rows, errors

@@ -21,13 +21,14 @@ from typing import IO
 
 import uvloop
 
-from acquisition.clock import FastClock, SystemClock
+from acquisition.clock import SystemClock
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from acquisition.simulated.feed import Ledger
 from harness.ledger_plant import LedgerFeed, LedgerPlant
 from harness.tape import environment, python
 from service.app.simulated_daq import run_daq
+from service.cli.daq import FastClock
 
 
 class OfferedLog(Ledger):

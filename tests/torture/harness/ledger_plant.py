@@ -5,7 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition.delivery.blocks import RawBlock
+from rigs.blocks import cell_block
+
+from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
 from harness.truth import BEARINGS, N_CHANNELS, SPEED_RPM, Truth
 
@@ -132,11 +134,11 @@ class LedgerFeed:
         self._truth = Truth(plant.seed, unit, plant.rate_hz, epoch)
         self._slot, self._t0_ns, self._next = plant.slot_samples, t0_ns, first_index
 
-    def advance(self, n_samples: int) -> RawBlock:
+    def advance(self, n_samples: int) -> SampleBlock:
         """Produce the next samples, as one slot."""
         first, self._next = self._next, self._next + n_samples
         truth = self._truth
-        return RawBlock(
+        return cell_block(
             epoch=truth.epoch,
             first_index=first,
             start_ns=self._t0_ns + round(first * NS_PER_S / truth.rate_hz) // 1000 * 1000,

@@ -5,13 +5,13 @@ from one start of the process to its end; a monitor lives as long, and averages 
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from acquisition.delivery.blocks import RawBlock, sample_block
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
 from core.monitor.monitor import UnitMonitor
+from core.samples.blocks import SampleBlock
 from core.samples.calibration import UnitCalibration
 from core.samples.gaps import Gap
 from harness.ledger_plant import LedgerFeed, LedgerPlant
@@ -114,9 +114,9 @@ class Replay:
             if monitor is None or run.life != life:
                 monitor, life = UnitMonitor(self._machine, self._analysis), run.life
             for raw in self._slots(run, epoch):
-                yield from monitor.steps(sample_block([raw], self._calibration))
+                yield from monitor.steps(replace(raw, calibration=self._calibration))
 
-    def _slots(self, run: Run, epoch: int) -> Iterator[RawBlock]:
+    def _slots(self, run: Run, epoch: int) -> Iterator[SampleBlock]:
         slot = self._plant.slot_samples
         feed = LedgerFeed(self._plant, self._number, self._t0_ns, epoch, run.start)
         for _ in range(run.start, run.stop, slot):

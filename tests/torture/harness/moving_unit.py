@@ -114,7 +114,7 @@ class MovingUnit:
         found = store.position(unit.id)
         memories = memories_of([found] if found else [])
         analysis = await analysis_on(
-            ground, monitors, Bus(512, clock), LiveContext(live), memories=memories
+            ground, monitors, Bus(512, clock), LiveContext(live.assessment), memories=memories
         )
         parts = (analysis.analyser, live, analysis.recorder, clock)
         stored, memory = usable(found, STREAM, newest), memories.get(unit.id)

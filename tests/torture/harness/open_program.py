@@ -2,10 +2,10 @@
 
 from functools import partial
 
-from service.cli import run
+from service.cli import processes
 from service.cli.main import main
 
-run.run_plant = partial(run.run_plant, is_demo=True)
+processes.run_plant = partial(processes.run_plant, is_demo=True)
 
 if __name__ == "__main__":
     main()

@@ -8,9 +8,12 @@ from typing import Any
 import psycopg
 
 from harness.postgres_server import PostgresServer
+from service.store.access.tables import AccessStore
 from service.store.postgres import PostgresStore
 from service.store.postgres.connection import PostgresAddress
+from service.store.postgres.store import open_server_access
 from service.store.sqlite import SqliteStore
+from service.store.sqlite.store import open_access_file
 from service.store.store import Store
 
 
@@ -26,6 +29,10 @@ class SqlitePlace:
     def open(self, *how: Any, **more: Any) -> Store:
         """Open a store there."""
         return SqliteStore(self.path, *how, **more)
+
+    def open_access(self) -> AccessStore:
+        """Open accounts there, in place of a store."""
+        return open_access_file(self.path)
 
     def execute(self, statement: str, parameters: tuple[Any, ...] = ()) -> list[Any]:
         """Do something to the database from outside, for good."""
@@ -51,6 +58,10 @@ class PostgresPlace:
     def open(self, *how: Any, **more: Any) -> Store:
         """Open a store there."""
         return PostgresStore(self.address, self.head, *how, **more)
+
+    def open_access(self) -> AccessStore:
+        """Open the accounts there."""
+        return open_server_access(self.address, self.head)
 
     def execute(self, statement: str, parameters: tuple[Any, ...] = ()) -> list[Any]:
         """Do something to the database from outside, for good; ``?`` as in SQLite."""

@@ -1,12 +1,14 @@
 """The service with one bug in it: ``python -m harness.planted run FILE --port 0``.
 
-The environment variable PLANTED names the bug; it is planted as the process starts, and the product
-knows nothing of it. Among them is a host whose wall clock is wrong.
+The environment variable PLANTED names the bug; it is planted as each process starts, measuring and
+serving, and the product knows nothing of it. Among them is a host whose wall clock is wrong.
 """
 
 import asyncio
 import os
+import runpy
 import signal
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -21,13 +23,14 @@ from core.samples.blocks import SampleBlock
 from core.samples.ring import Ring
 from core.units import NS_PER_S
 from harness.open_program import main
-from service.live.live_view import LiveView
+from service.live.current_state import LiveUnits
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.recorder import Findings, Recorder
 from service.recordings import continuous_recorder as tape
 from service.recordings import continuous_recorder as unit_tape
 from service.recordings import segment as joining
 from service.recordings.segment import Segment
+from service.runtime import child
 from service.store import store as sql_store
 
 SLOW_S = 1.5
@@ -66,7 +69,7 @@ def gap_closed_up() -> None:
 
 def stale_shown_as_current() -> None:
     """Show the newest result for as long as there is none newer."""
-    LiveView._why_not_current = lambda self, unit, age_s: None  # type: ignore[method-assign]  # noqa: ARG005
+    LiveUnits._why_not_current = lambda self, unit, age_s: None  # type: ignore[method-assign]  # noqa: ARG005
 
 
 def promised_before_commit() -> None:
@@ -206,4 +209,9 @@ TAPES: list[unit_tape.UnitRecorder] = []
 
 if __name__ == "__main__":
     globals()[os.environ["PLANTED"]]()
-    main()
+    if sys.argv[1:2] == ["run"]:
+        child.PROGRAM = "harness.planted"
+    if sys.argv[1].isdecimal():  # as a serving process, which gets the number of its socket
+        runpy.run_module("service.app.serving_process", run_name="__main__")
+    else:
+        main()

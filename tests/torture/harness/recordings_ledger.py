@@ -12,7 +12,6 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.messages import BlockHead
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.summary import summary_of
 from harness.ledger_daq import Offered
@@ -62,7 +61,7 @@ def promised(url: str) -> int:
 def recorded(root: Path, plant: LedgerPlant, unit: int, offered: Offered) -> Recorded:
     """Read all recordings of a unit, and compute every sample again."""
     found = Recorded()
-    heads: list[BlockHead] = []
+    heads: list[tuple[int, int]] = []
     for folder in sorted(root.glob(f"{plant.units[unit - 1]}-*")):
         try:
             recording = open_recording(folder)
@@ -77,29 +76,32 @@ def recorded(root: Path, plant: LedgerPlant, unit: int, offered: Offered) -> Rec
 
 def _compared(
     recording: Recording, plant: LedgerPlant, unit: int, found: Recorded
-) -> list[BlockHead]:
-    summary, heads = summary_of(recording), list(recording.heads())
+) -> list[tuple[int, int]]:
+    """Return the first index and the number of samples of each block."""
+    summary, heads = summary_of(recording), []
+    for some, _ in recording.heads():
+        heads += some[["first_index", "n_samples"]].tolist()
     found.told.update(summary.rejected)
     found.told["gap"] += summary.n_gap_samples
-    for raw in recording.raw_blocks():
+    for raw in recording.blocks():
         truth = Truth(plant.seed, unit, plant.rate_hz, raw.epoch)
         if not np.array_equal(raw.counts, truth.counts(raw.first_index, raw.n_samples)):
             found.wrong.append(f"altered: samples from {raw.first_index} on")
     return heads
 
 
-def _account(heads: list[BlockHead], n_offered: int, found: Recorded) -> None:
-    heads.sort(key=lambda head: head.first_index)
-    for one, next_one in pairwise(heads):
-        hole = next_one.first_index - one.first_index - one.n_samples
+def _account(heads: list[tuple[int, int]], n_offered: int, found: Recorded) -> None:
+    heads.sort()
+    for (first_index, n_samples), (next_index, _) in pairwise(heads):
+        hole = next_index - first_index - n_samples
         found.longest_hole = max(found.longest_hole, hole)
         if hole < 0:
-            found.wrong.append(f"duplicated: {-hole} samples from {next_one.first_index} on")
-    found.n_samples = sum(head.n_samples for head in heads)
+            found.wrong.append(f"duplicated: {-hole} samples from {next_index} on")
+    found.n_samples = sum(n_samples for _, n_samples in heads)
     if not heads:
         return
-    stop = heads[-1].first_index + heads[-1].n_samples
-    found.n_span = stop - heads[0].first_index
+    stop = sum(heads[-1])
+    found.n_span = stop - heads[0][0]
     if stop > n_offered:
         found.wrong.append(f"unexpected: up to {stop}, offered were {n_offered}")
     if found.n_samples + found.told.total() != found.n_span:

@@ -2,13 +2,15 @@
 
 import http.client
 import json
-import os
 import signal
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 from urllib.parse import urlsplit
+
+import psutil
 
 from harness.tape import environment, python
 
@@ -132,16 +134,33 @@ class ServiceRig:
         return Api(self.url)
 
     def kill(self) -> None:
-        """End it without a word, as kill -9 does."""
+        """Kill -9 of the measuring process, which is the program; its serving process ends, too."""
+        children = [] if self.process is None else psutil.Process(self.pid).children()
         self._end(signal.SIGKILL)
+        _, alive = psutil.wait_procs(children, PATIENCE_S)
+        assert not alive, f"still running after the kill: {alive}"
+
+    def kill_serving(self) -> int:
+        """Kill -9 of the serving process, if it runs; its process id, or 0."""
+        for child in psutil.Process(self.pid).children():
+            with suppress(psutil.NoSuchProcess):  # it has ended meanwhile
+                child.kill()
+                return child.pid
+        return 0
 
     def stop(self) -> int:
         """Ask it to end; its exit code."""
         return self._end(signal.SIGTERM)
 
+    def processes(self) -> list[psutil.Process]:
+        """Return the program and, in the role ``run``, its serving process."""
+        program = psutil.Process(self.pid)
+        return [program, *program.children()]
+
     def signal(self, number: int) -> None:
-        """Send a signal, such as SIGSTOP."""
-        os.kill(self.pid, number)
+        """Send a signal, such as SIGSTOP, to all processes of the program."""
+        for process in self.processes():
+            process.send_signal(number)
 
     def newest_log(self) -> str:
         """The end of what it has logged."""

@@ -32,7 +32,7 @@ T_95 = 2.1
 
 @dataclass(frozen=True)
 class Usage:
-    """One look at a process and its write-ahead log."""
+    """One look at the measuring and the serving process, together, and the write-ahead log."""
 
     at_s: float
     rss_mib: float
@@ -41,22 +41,21 @@ class Usage:
     log_mib: float
     cpu_s: float
     waited_s: float
-    """Time for which the event loop was ready to run and waited for a processor."""
+    """Time for which measuring's event loop was ready to run and waited for a processor."""
 
 
-def look(process: psutil.Process, log: Path) -> Usage:
-    """Look once."""
-    with process.oneshot():
-        cpu = process.cpu_times()
-        return Usage(
-            at_s=time.monotonic(),
-            rss_mib=process.memory_info().rss / MIB,
-            n_files=process.num_fds(),
-            n_threads=process.num_threads(),
-            log_mib=log.stat().st_size / MIB if log.exists() else 0.0,
-            cpu_s=cpu.user + cpu.system,
-            waited_s=int(Path(f"/proc/{process.pid}/schedstat").read_text().split()[1]) / 1e9,
-        )
+def look(processes: Sequence[psutil.Process], log: Path) -> Usage:
+    """Look once at measuring and serving, in this order."""
+    waited = Path(f"/proc/{processes[0].pid}/schedstat").read_text().split()[1]
+    return Usage(
+        at_s=time.monotonic(),
+        rss_mib=sum(process.memory_info().rss for process in processes) / MIB,
+        n_files=sum(process.num_fds() for process in processes),
+        n_threads=sum(process.num_threads() for process in processes),
+        log_mib=log.stat().st_size / MIB if log.exists() else 0.0,
+        cpu_s=sum(sum(process.cpu_times()[:2]) for process in processes),
+        waited_s=int(waited) / 1e9,
+    )
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,7 @@ class Soaked:
 
     @property
     def cores(self) -> float:
-        """Share of a core that the service took."""
+        """Share of a core that measuring and serving took together."""
         first, last = self.settled[0], self.settled[-1]
         return (last.cpu_s - first.cpu_s) / max(last.at_s - first.at_s, 1e-9)
 
@@ -178,7 +177,7 @@ def soak(bench: Bench, seconds: float, checked: Sequence[str]) -> Soaked:
     ready_s = bench.begin()
     bench.watch.wait_for_result()
     log = bench.plant_file.parent / "data" / f"{DATABASE}-wal"
-    service, device = psutil.Process(bench.rig.pid), psutil.Process(bench.daq.process.pid)
+    service, device = bench.rig.processes(), psutil.Process(bench.daq.process.pid)
     begun_s, device_s = time.monotonic(), sum(device.cpu_times()[:2])
     usages = [look(service, log)]
     while usages[-1].at_s - begun_s < seconds:
@@ -186,7 +185,7 @@ def soak(bench: Bench, seconds: float, checked: Sequence[str]) -> Soaked:
         usages.append(look(service, log))
     passed_s = time.monotonic() - begun_s
     device_s = sum(device.cpu_times()[:2]) - device_s
-    sources = {unit["id"]: unit["source"] for unit in bench.get("overview")["units"]}
+    sources = {unit["id"]: unit["source"] for unit in bench.get("units")}
     return Soaked(
         seconds=passed_s,
         ready_s=ready_s,

@@ -20,19 +20,19 @@ from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer
 from harness.waiting import at_work
 from service.app.cluster_processes import Analysing
-from service.app.measuring_process import analysis_on
-from service.app.process import ProcessContext, live_view
+from service.app.measuring_process import ProcessContext, analysis_on
 from service.app.storage import open_store
 from service.cluster.frames import Taken, decoded
 from service.cluster.ownership import Partition
 from service.cluster.publisher import Publisher
 from service.cluster.session import identity_of, stream_name, subject
-from service.live.live_view import LinkState
+from service.live.status import LinkState
 from service.measuring.acquirer import Bus, LinkNews
+from service.measuring.live_view import LiveView
 from service.measuring.sources import monitor_of
-from service.measuring.timings import Timings
 from service.notifications.message import LiveContext
 from service.runtime.heartbeats import Heartbeats
+from service.settings.core_values import stale_after_s
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
@@ -104,8 +104,9 @@ async def publish(plant: PlantFile, sent: Iterable[SampleBlock]) -> None:
 def ground_of(plant: PlantFile, clock: Clock, store: Store) -> tuple[ProcessContext, Monitors]:
     """What the roles of a process stand on, and the monitors of all units."""
     monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in plant.unit}
-    beats, timings, live = Heartbeats(clock), Timings(monitors, clock), live_view(plant, clock)
-    return ProcessContext(plant, Origin.LIVE, clock, store, live, beats, timings), monitors
+    beats = Heartbeats(clock)
+    live = LiveView(monitors, clock, stale_after_s(plant))
+    return ProcessContext(plant, Origin.LIVE, clock, store, live, beats), monitors
 
 
 @asynccontextmanager
@@ -114,7 +115,7 @@ async def analysing(plant: PlantFile) -> AsyncIterator[tuple[Analysing, ProcessC
     store = open_store(plant)
     ground, monitors = ground_of(plant, SystemClock(), store)
     assert plant.stream is not None
-    context = LiveContext(ground.live)
+    context = LiveContext(ground.live.assessment)
     process = Analysing(plant, Partition(), plant.stream, monitors, ground, context)
     task = asyncio.create_task(process.run())
     try:
@@ -153,7 +154,9 @@ async def single_process(plant_file: Path, sent: Sequence[Sent]) -> Path:
     path = Path(plant.service.data_folder) / "padwatch.sqlite3"
     store = SqliteStore(path)
     ground, monitors = ground_of(plant, clock, store)
-    analysis = await analysis_on(ground, monitors, Bus(512, clock), LiveContext(ground.live))
+    analysis = await analysis_on(
+        ground, monitors, Bus(512, clock), LiveContext(ground.live.assessment)
+    )
     try:
         for unit, message in sent:
             if isinstance(message, LinkNews):

@@ -166,5 +166,6 @@ def python(*arguments: object) -> list[str]:
 
 
 def environment() -> dict[str, str]:
-    """Return the environment in which a Python program finds padwatch and this package."""
-    return os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'tests' / 'torture'}"}
+    """Return the environment in which a program finds padwatch, this package and the rigs."""
+    folders = (ROOT, ROOT / "tests" / "torture", ROOT / "tests" / "contract")
+    return os.environ | {"PYTHONPATH": os.pathsep.join(map(str, folders))}

@@ -39,7 +39,7 @@ class Look:
     result_ns
         End of the samples of the result that was shown.
     is_good
-        Whether it was shown without any reserve; it was shown as current anyhow.
+        Whether it was shown without any reserve; it was shown as current anyhow, with values.
     """
 
     at_ns: int
@@ -112,7 +112,7 @@ class Watch:
     def _look(self, overview: dict[str, Any], at_ns: int) -> None:
         for unit in overview["units"]:
             for bearing in unit["bearings"]:
-                if bearing["quality"]["level"] != "bad":
+                if any(one["value"] is not None for one in bearing["readings"].values()):
                     time_ns = round(datetime.fromisoformat(bearing["time"]).timestamp() * NS_PER_S)
                     good = bearing["quality"]["level"] == "good"
                     self.looks.append(Look(at_ns, unit["id"], bearing["bearing"], time_ns, good))

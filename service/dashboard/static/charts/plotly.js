@@ -1,5 +1,7 @@
 /** The chart library, loaded when the first chart needs it and tried again if that failed. */
 
+import { LIBRARIES } from "../libraries.js";
+
 let library = null;
 
 /** Resolves to Plotly; rejects when its file cannot be had now. */
@@ -14,7 +16,7 @@ export function plotly() {
 function loaded() {
   return new Promise((resolve, reject) => {
     const script = document.createElement("script");
-    script.src = new URL("../plotly.min.js", import.meta.url).href;
+    script.src = LIBRARIES["plotly.min.js"];
     script.onload = () => resolve(globalThis.Plotly);
     script.onerror = () => {
       script.remove();

@@ -14,7 +14,7 @@ const PAGE = "100";
 export function auditPage(main) {
   const chain = mark();
   const sentence = element("p", { class: "sentence", role: "status" });
-  const table = listing("Audit trail, the newest first", AUDIT_HEADS, "No entry fits.", ({ number }) => String(number), auditRow);
+  const table = listing("Audit trail, the newest first", AUDIT_HEADS, "No entry fits.", ({ chain, number }) => `${chain} ${number}`, auditRow);
   const older = element("button", { type: "button", hidden: "" }, "Older entries");
   const filter = auditFilter(() => look());
   const head = element("div", { class: "page-head" }, element("h1", {}, "Audit trail"), chain.node);
@@ -28,7 +28,7 @@ export function auditPage(main) {
     const mine = (question = new AbortController());
     setText(sentence, "Asking the service.");
     try {
-      const query = [...filter.query(), ["limit", PAGE], ...(before === null ? [] : [["before", String(before)]])];
+      const query = [...filter.query(), ["limit", PAGE], ...(before === null ? [] : [["before", before]])];
       show(await ask(["audit"], query, mine.signal), before);
     } catch (failure) {
       if (mine.signal.aborted) return;

@@ -21,6 +21,6 @@ export function auditRow(entry) {
   ];
   const cells = contents.map((content, n) => listingCell(AUDIT_HEADS[n + 1], content));
   const name = listingName(String(entry.number));
-  name.title = `Hash ${entry.hash}`;
-  return { nodes: [element("tr", { role: "row", "data-entry": String(entry.number) }, name, ...cells)], draw() {} };
+  name.title = `Chain ${entry.chain}, hash ${entry.hash}`;
+  return { nodes: [element("tr", { role: "row", "data-entry": `${entry.chain} ${entry.number}` }, name, ...cells)], draw() {} };
 }

@@ -27,11 +27,11 @@ export function bearingPage(main, unitId, bearingId) {
   return {
     draw(view) {
       const unit = view.units.find((one) => one.id === unitId);
-      const latest = unit?.bearings.find((one) => one.bearing === bearingId);
+      const latest = unit?.bearings.find((one) => one.bearing === bearingId && one.isWhole);
       content.hidden = !latest;
       missing.hidden = Boolean(latest);
       if (latest) for (const part of parts) part.draw(latest, unit, view);
-      else missing.replaceChildren(missingSentence(view, unitId, bearingId), " ", overviewLink());
+      else missing.replaceChildren(missingSentence(view, unit, unitId, bearingId), " ", overviewLink());
     },
     close() {
       for (const part of parts) part.close?.();
@@ -39,8 +39,9 @@ export function bearingPage(main, unitId, bearingId) {
   };
 }
 
-function missingSentence(view, unitId, bearingId) {
+function missingSentence(view, unit, unitId, bearingId) {
   if (view.silenceS === null) return "No numbers yet: the service has not answered.";
+  if (unit?.bearings.some(({ bearing }) => bearing === bearingId)) return "Asking the service.";
   return `This plant has no bearing ${bearingId} on a unit ${unitId}.`;
 }
 

@@ -164,7 +164,8 @@ function absenceWords(view, unitId, bearingId) {
   if (view.silenceS === null) return "Asking the service.";
   const unit = view.units.find(({ id }) => id === unitId);
   if (!unit?.bearings.some(({ bearing }) => bearing === bearingId)) return `This plant has no bearing ${bearingId} on a unit ${unitId}.`;
-  return unit.source.data_age_s === null ? "No sample of this unit has arrived since the service started." : null;
+  if (unit.source.received === undefined) return "Asking the service.";
+  return unit.source.received === null ? "No sample of this unit has arrived since the service started." : null;
 }
 
 /** Note that no new samples arrive, so that the last motion is not taken for the present one; null if they arrive. */

@@ -8,7 +8,7 @@ import { unitCard } from "./unit_card.js";
 import { tileLegend, unitTile } from "./unit_tile.js";
 
 /** With more units than these, each is a tile: numbers that matter, all on one screen. */
-const N_CARDS = 4;
+export const N_CARDS = 4;
 
 /** Returns `{ draw(view), close() }`. */
 export function overviewPage(main) {

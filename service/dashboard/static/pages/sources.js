@@ -3,7 +3,7 @@
 import { NotReachable, ask } from "../api.js";
 import { element, setText } from "../dom.js";
 import { formatAge } from "../format.js";
-import { CURRENT_LIMIT_S, moment, secondsBetween } from "../live.js";
+import { CURRENT_LIMIT_S, ageAt, moment, secondsBetween } from "../live.js";
 import { listing } from "../parts/listing.js";
 import { losses } from "../parts/losses.js";
 import { mark } from "../parts/mark.js";
@@ -33,9 +33,8 @@ export function sourcesPage(main) {
   const questions = poll(async (signal) => {
     try {
       const [sources, { alarms }] = await Promise.all([ask(["sources"], [], signal), ask(["alarms"], [], signal)]);
-      const dated = sources === known?.sources ? known.dated : moment(); // the very same answer ages on
       const settings = known?.settings ?? (await settingsOf(signal));
-      known = { sources, alarms, settings, dated, receivedAt: moment(), lost: sources.map(lost.of) };
+      known = { sources, alarms, settings, receivedAt: moment(), lost: sources.map(lost.of) };
       failure = null;
     } catch (error) {
       if (signal.aborted) return;
@@ -75,10 +74,9 @@ async function settingsOf(signal) {
 }
 
 /** Every source with what is worst about it now, the worst first. */
-function judgedSources({ sources, alarms, settings, dated, lost }, nowMs) {
-  const sinceS = secondsBetween(dated, moment());
+function judgedSources({ sources, alarms, settings, lost }, nowMs) {
   const judged = sources.map((told, n) => {
-    const source = { ...told, data_age_s: told.data_age_s === null ? null : told.data_age_s + sinceS };
+    const source = { ...told, data_age_s: ageAt(told.received, nowMs) };
     const mine = alarms.filter((alarm) => isAboutSamples(alarm, source.unit));
     const unit = settings?.get(source.unit);
     const trouble = troubleOf(source, mine, lost[n]);

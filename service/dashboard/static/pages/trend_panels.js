@@ -15,6 +15,9 @@ const SHORTEST_PERIOD_S = 5;
 const LONGEST_PERIOD_S = 60;
 const MAX_POINTS = 500;
 
+/** The end of the span is a whole minute, so that the same question is asked again until then. */
+const WHOLE_MS = 60_000;
+
 const SPANS = [
   [900, "15 min"],
   [3600, "1 h"],
@@ -103,7 +106,8 @@ function periodS(trends) {
   return Math.min(Math.max(trends?.bucket_s ?? 0, SHORTEST_PERIOD_S), LONGEST_PERIOD_S);
 }
 
-function askTrends(path, lines, spanS, endMs, signal) {
+function askTrends(path, lines, spanS, nowMs, signal) {
+  const endMs = Math.ceil(nowMs / WHOLE_MS) * WHOLE_MS;
   const query = [...lines.map(([name]) => name), ...CENTRE].map((name) => ["quantity", name]);
   query.push(["start", new Date(endMs - spanS * 1000).toISOString()], ["end", new Date(endMs).toISOString()]);
   query.push(["max_points", String(MAX_POINTS)]);

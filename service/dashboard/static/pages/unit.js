@@ -33,11 +33,12 @@ export function unitPage(main, unitId) {
   return {
     draw(view) {
       const unit = view.units.find((one) => one.id === unitId);
-      content.hidden = !unit;
-      missing.hidden = Boolean(unit);
-      if (!unit) missing.replaceChildren(missingSentence(view, unitId), " ", element("a", { href: "#/" }, "Overview"));
+      const isWhole = unit?.bearings.every((bearing) => bearing.isWhole) ?? false;
+      content.hidden = !isWhole;
+      missing.hidden = isWhole;
+      if (!isWhole) missing.replaceChildren(missingSentence(view, unit, unitId), " ", element("a", { href: "#/" }, "Overview"));
       else if (parts === null) build(unit);
-      if (unit) for (const part of parts) part.draw(unit, view, films);
+      if (isWhole) for (const part of parts) part.draw(unit, view, films);
     },
     close() {
       questions.stop();
@@ -56,7 +57,8 @@ async function filmOf(unit, bearing, signal) {
   }
 }
 
-function missingSentence(view, unitId) {
+function missingSentence(view, unit, unitId) {
   if (view.silenceS === null) return "No numbers yet: the service has not answered.";
+  if (unit) return "Asking the service.";
   return `This plant has no unit ${unitId}.`;
 }

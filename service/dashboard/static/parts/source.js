@@ -18,7 +18,7 @@ export function sourceView() {
       link.draw(level, sourceSentence(source, words));
       setText(age, ageWords(source.data_age_s));
       age.dataset.current = String(source.state === "connected");
-      setText(count, sampleWords(source));
+      setText(count, source.n_stored === undefined ? "" : sampleWords(source));
       setText(clock, clockWords(source.clock));
     },
   };

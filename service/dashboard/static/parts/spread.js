@@ -1,5 +1,6 @@
 /** The ± after a number: half its 95 % interval, as text or as the button that opens its budget. */
 
+import { labelOf } from "../catalogue.js";
 import { element, setAttribute, setText } from "../dom.js";
 import { formatSpread } from "../format.js";
 
@@ -19,14 +20,12 @@ export function spreadView(name, node = element("span", { class: "spread" })) {
 export function budgetSpread(name, panel) {
   const node = element("button", { type: "button", class: "spread", "aria-expanded": "false", "aria-controls": panel.id });
   const spread = spreadView(name, node);
-  let label = name;
-  node.addEventListener("click", () => panel.toggle(name, label, node));
+  node.addEventListener("click", () => panel.toggle(name, labelOf(name), node));
   return {
     node,
     draw(reading) {
       spread.draw(reading);
-      label = reading.label ?? name;
-      setAttribute(node, "title", `Uncertainty budget: ${label}`);
+      setAttribute(node, "title", `Uncertainty budget: ${labelOf(name)}`);
     },
   };
 }

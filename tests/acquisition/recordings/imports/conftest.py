@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.recordings.imports.job import (
     ChannelColumn,
     ColumnName,
@@ -17,6 +16,7 @@ from acquisition.recordings.imports.job import (
     TimeAxis,
 )
 from acquisition.recordings.reading import imported_blocks
+from core.samples.blocks import SampleBlock
 
 START_NS = 1_767_225_600_000_000_000
 PER_COUNT = 12.0 / 32768 * 250.0
@@ -70,10 +70,10 @@ def job() -> ImportJob:
 
 @dataclass(frozen=True)
 class Found:
-    """All blocks of a file, put together."""
+    """All cells of a file."""
 
     sample_type: str
-    blocks: list[RawBlock]
+    blocks: list[SampleBlock]
 
     @property
     def index(self) -> np.ndarray:
@@ -87,7 +87,7 @@ class Found:
 @pytest.fixture
 def read() -> Callable[[Path, ImportJob], Found]:
     def read_all(path: Path, job: ImportJob) -> Found:
-        blocks = [block for block, _ in imported_blocks(path, job)]
+        blocks = [cell for block, _ in imported_blocks(path, job) for cell in block.cells()]
         return Found(blocks[0].counts.dtype.name, blocks)
 
     return read_all

@@ -18,8 +18,21 @@ START_NS = 1_767_225_600_000_000_000
 
 def test_thousands_are_not_taken_for_decimals(read_text: ReadText) -> None:
     german = CsvLayout(delimiter=";", decimal=",")
-    with pytest.raises(ConfigError, match=r"line 2 .*number '1\.234' contains '\.'"):
+    with pytest.raises(ConfigError, match=r"line 2: number '1\.234' contains '\.'"):
         read_text("time;shaft x;shaft y\n0;1.234;2\n", csv=german)
+
+
+@pytest.mark.parametrize("cell", ["2086,4888", "x"])
+@pytest.mark.parametrize("column", [1, 2])
+def test_a_wrong_number_is_reported_with_its_line(
+    read_text: ReadText, cell: str, column: int
+) -> None:
+    cells = [["0", "1", "2"] for _ in range(100)]
+    cells[30][column] = cell
+    text = "\n".join(["time;shaft x;shaft y", *(";".join(row) for row in cells), ""])
+    with pytest.raises(ConfigError, match=f"line 32: '{cell}' is not a valid number") as refused:
+        read_text(text, csv=CsvLayout(delimiter=";"))
+    assert ('set csv.decimal = ","' in str(refused.value)) == ("," in cell)
 
 
 @pytest.mark.parametrize("year", ["9999", "2256", "1600", "0001"])

@@ -48,7 +48,7 @@ def csv_job(job: ImportJob) -> ImportJob:
         ),
         (
             b"time,shaft x,shaft y\n0,1_000,2\n",
-            "line 2 or a line shortly before it: number '1_000'",
+            "line 2: number '1_000'",
         ),
         (b"time,shaft x,shaft x\n0,1,2\n", "column 'shaft x' occurs 2 times"),
         (b"time,shaft x,shaft y\n\xff\xfe,1,2\n", "line 2: the line is not valid UTF-8"),

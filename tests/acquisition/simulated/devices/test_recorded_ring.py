@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rigs.blocks import cell_block
 from rigs.modbus import transport_of
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.blocks import RawBlock, cells_of
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_profile import RingLayout
 from acquisition.modbus.ring_source import RingSettings, RingSource
@@ -29,7 +29,7 @@ class PiecewiseFeed:
     def __init__(self, *stretches: tuple[int, int, int]) -> None:
         self._stretches = list(stretches)
 
-    def advance(self, n_samples: int) -> RawBlock:
+    def advance(self, n_samples: int) -> SampleBlock:
         if not self._stretches:
             raise FeedEndedError
         epoch, first, stop = self._stretches[0]
@@ -38,7 +38,7 @@ class PiecewiseFeed:
         if end == stop:
             del self._stretches[0]
         index = np.arange(first, end)
-        return RawBlock(
+        return cell_block(
             epoch=epoch,
             first_index=first,
             start_ns=START_NS + epoch * 10**12 + round(first * 1e9 / 600),
@@ -87,14 +87,14 @@ def assert_recorded(blocks: list[SampleBlock], found: dict[tuple[int, int], int]
         (epoch, first + 50 * n) for (epoch, first), n_slots in found.items() for n in range(n_slots)
     ]
     assert all((block.rejected, block.stamp_fault) == ((), None) for block in blocks)
-    cells = [cell for block in blocks for cell in cells_of(block)]
+    cells = [cell for block in blocks for cell in block.cells()]
     assert [(cell.epoch, cell.first_index) for cell in cells] == slots
     for cell in cells:
         index = np.arange(cell.first_index, cell.stop_index)
         np.testing.assert_array_equal(cell.counts[0], index % 2**15)
         passed_us = round(cell.first_index * 1e9 / 600) // 1000
         assert cell.start_ns == START_NS + cell.epoch * 10**12 + passed_us * 1000
-        assert cell.slow[0] == cell.first_index // 50
+        assert cell.side.slow[0, 0] == cell.first_index // 50
 
 
 @pytest.mark.parametrize("kind", [ModbusTcpServer, ModbusRtuServer, "patient"])
@@ -204,7 +204,7 @@ async def test_a_device_whose_recording_has_ended_stands_still(counts_calibratio
 
 
 def test_a_feed_without_a_whole_slot_is_refused():
-    with pytest.raises(ConfigError, match="fewer samples than a slot, 50"):
+    with pytest.raises(ConfigError, match="no slot of 50 samples without a gap"):
         RingDevice(PiecewiseFeed((1, 0, 49), (1, 60, 99)))
 
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rigs.blocks import cell_block
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.modbus.decoding import MapDecoder
 from acquisition.modbus.polled_source import PolledSettings, PolledSource, vector_calibration
 from acquisition.modbus.transport import TcpTransport
@@ -15,6 +15,7 @@ from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
+from core.samples.blocks import SampleBlock
 from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from core.spectra.polls import PollSettings, PollTransform, VectorPart, VectorRow
 from service.settings.sources.register_map import load_map_file
@@ -31,7 +32,7 @@ class Machine:
     def __init__(self) -> None:
         self._n = 0
 
-    def advance(self, n_samples: int) -> RawBlock:
+    def advance(self, n_samples: int) -> SampleBlock:
         first, self._n = self._n, self._n + n_samples
         turn = OMEGA * np.arange(first, self._n) / RATE_HZ
         samples = np.array(
@@ -45,7 +46,7 @@ class Machine:
         )
         scatter = np.random.default_rng(first).normal(size=samples.shape).astype(np.float32)
         samples *= 1 + 1e-3 * scatter
-        return RawBlock(0, first, 10**18, RATE_HZ, samples, (True,) * 4, (SPEED_RPM,))
+        return cell_block(0, first, 10**18, RATE_HZ, samples, (True,) * 4, (SPEED_RPM,))
 
 
 def rows_of(path: Path) -> tuple[VectorRow, ...]:

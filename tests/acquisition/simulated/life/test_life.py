@@ -301,7 +301,7 @@ def test_a_failing_cooler_leads_out_of_everything_seen_before(two_years: Life, d
         ({"size": -0.1}, "size = -0.1"),
         ({"size": float("nan")}, "size = nan"),
         ({"ramp_days": -1.0}, "ramp_days = -1"),
-        ({"directions": ("z",)}, "directions = "),
+        ({"directions": ("z",)}, "directions must be x, y or both, got z"),
     ],
 )
 def test_damage_that_makes_no_sense_is_refused_with_key_and_value(

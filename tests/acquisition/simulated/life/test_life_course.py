@@ -82,8 +82,8 @@ def test_a_unit_that_stands_still_is_sampled_too(inputs: LifeInputs) -> None:
     block = unit.advance(6000)
     gap_um = 250.0 * 20.0 / 32768.0 * block.counts[0].astype(np.float64)
 
-    assert block.slow[:2] == (0.0, 0.0)
-    assert 15.0 < block.slow[2] < 60.0
+    assert block.side.slow[:2, 0].tolist() == [0.0, 0.0]
+    assert 15.0 < block.side.slow[2, 0] < 60.0
     assert np.std(gap_um) == pytest.approx(1.2, rel=0.1)
 
 

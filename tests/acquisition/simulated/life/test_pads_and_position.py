@@ -158,5 +158,5 @@ def test_there_is_no_scenario_before_birth_nor_during_a_run_up(two_years: Life) 
     with pytest.raises(ValueError, match="begins after 5 ns"):
         scenario_at(life, 5, MACHINE)
     run_up = np.flatnonzero(~life.operation.is_at_speed)[0]
-    with pytest.raises(ValueError, match="not at speed"):
+    with pytest.raises(ValueError, match="not at rated speed"):
         scenario_at(life, int(life.operation.time_ns[run_up]), MACHINE)

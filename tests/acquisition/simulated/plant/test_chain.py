@@ -131,7 +131,7 @@ def test_a_probe_that_drifts_and_a_thermometer_that_errs_tell_what_is_not_there(
     apart_um = (shown.counts - told.counts.astype(np.float64)).mean(axis=1) / counts_per_um
     assert apart_um[:4] == pytest.approx([-7.0, 3.0, 0.0, 0.0], abs=0.05)
     # speed, power, nothing, then oil and slow gaps of the UJB
-    assert np.subtract(shown.slow, told.slow)[3:6] == pytest.approx([0.4, -7e-3, 3e-3])
+    assert np.subtract(shown.side.slow, told.side.slow)[3:6, 0] == pytest.approx([0.4, -7e-3, 3e-3])
     assert found.truth() == right.truth()
 
 
@@ -190,7 +190,7 @@ def test_the_speed_channel_follows_a_wandering_speed_exactly(
 ) -> None:
     unit = build_unit(replace(quiet, speed_wander=0.003, wander_time_s=60.0))
     blocks = [unit.advance(60) for _ in range(3000)]
-    speed_rpm = np.array([block.slow[0] for block in blocks])
+    speed_rpm = np.array([block.side.slow[0, 0] for block in blocks])
     shaft = np.concatenate([block.counts for block in blocks], axis=1)[0].astype(np.float64)
 
     # what the waveform itself says: the angle of 1× advances by the integral of the speed
@@ -202,7 +202,7 @@ def test_the_speed_channel_follows_a_wandering_speed_exactly(
 
     assert 0.004 * 92.3 < np.ptp(speed_rpm) <= 0.006 * 92.3
     assert np.ptp(np.unwrap(np.angle(carried))) < 0.01
-    assert unit.truth().speed_rpm == unit.advance(1).slow[0]
+    assert unit.truth().speed_rpm == unit.advance(1).side.slow[0, 0]
 
 
 def test_noise_of_an_accelerometer_passes_its_own_corner(machine: Unit, quiet: Scenario) -> None:
@@ -245,7 +245,7 @@ def test_everything_at_once_does_not_depend_on_the_pieces_it_is_asked_for_in(
     cut = np.concatenate([unit.advance(n).counts for n in pieces], axis=1)
 
     assert np.array_equal(cut, whole.counts)
-    next_slow = [u.advance(n).slow for u, n in ((unit, 1), (one_piece, 100))]
+    next_slow = [u.advance(n).side.slow for u, n in ((unit, 1), (one_piece, 100))]
     assert next_slow[0] == pytest.approx(next_slow[1], nan_ok=True, rel=0)
     assert not np.array_equal(build_unit(scenario, 2).advance(5000).counts, cut[:, :5000])
 
@@ -310,7 +310,7 @@ def test_faults_of_channels_that_are_not_there_are_refused(
 ) -> None:
     with pytest.raises(ConfigError, match="has no channel UJB_uz"):
         build_unit(replace(full_load, channels={"UJB_uz": ChannelScenario()}))
-    with pytest.raises(ConfigError, match=r"has no channels .'UJB_ux', 'UJB_uz'. to exchange"):
+    with pytest.raises(ConfigError, match=r"channels UJB_ux and UJB_uz must both be in unit"):
         build_unit(replace(full_load, exchanged=(("UJB_ux", "UJB_uz"),)))
     with pytest.raises(ConfigError, match=r"cannot be exchanged: .* 20.0 V and 10.0 V"):
         build_unit(replace(full_load, exchanged=(("UJB_ux", "UJB_vx"),)))

@@ -66,7 +66,7 @@ def test_a_standing_gap_leaves_no_transient() -> None:
 
 
 def test_a_response_that_samples_cannot_show_is_refused() -> None:
-    with pytest.raises(ConfigError, match=r" Hz, allowed are 0\.001"):
+    with pytest.raises(ConfigError, match=r" Hz, at most 0\.001 is allowed"):
         ResponseFilter(Resonance(100.0, 0.3), 200.0)
     with pytest.raises(ConfigError, match="requires a model of its response, got a table"):
         ResponseFilter(ResponseTable((0.1, 10.0), (1.0, 1.0), (0.0, 0.0)), RATE_HZ)

@@ -125,7 +125,7 @@ def test_a_channel_that_no_bearing_has_is_refused(
 
 def test_a_bearing_the_rotor_does_not_have_is_refused(machine: Unit, quiet: Scenario) -> None:
     strange: Bearing = replace(machine.bearings[0], id="GEN-DE")
-    with pytest.raises(ConfigError, match="UJB, LJB, TJB, got 'GEN-DE'"):
+    with pytest.raises(ConfigError, match="unknown bearing 'GEN-DE'; the simulated rotor has UJB"):
         SimulatedPlant(
             replace(machine, bearings=(strange, *machine.bearings[1:])),
             replace(quiet, bearings={**quiet.bearings, "GEN-DE": quiet.bearings["UJB"]}),

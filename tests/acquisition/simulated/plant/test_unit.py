@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from acquisition.delivery.blocks import sample_block
 from acquisition.errors import ConfigError
 from acquisition.simulated.feed import SimulatedSource
 from acquisition.simulated.plant.films import Film
@@ -50,20 +49,20 @@ def test_blocks_follow_on_each_other_in_index_and_time(
 
 
 def test_a_healthy_unit_is_read_without_a_flag(
-    build_unit: BuildUnit, calibration: UnitCalibration, full_load: Scenario, part_load: Scenario
+    build_unit: BuildUnit, full_load: Scenario, part_load: Scenario
 ) -> None:
     for scenario in (full_load, part_load):
-        block = sample_block([build_unit(scenario).advance(60 * 600)], calibration)
+        block = build_unit(scenario).advance(60 * 600)
 
         assert all(quality.level is Level.GOOD for quality in block.channel_quality)
 
 
 def test_slow_channels_agree_with_the_waveforms_and_the_truth(
-    build_unit: BuildUnit, calibration: UnitCalibration, full_load: Scenario
+    build_unit: BuildUnit, full_load: Scenario
 ) -> None:
     unit = build_unit(full_load)
     truth = unit.truth()
-    block = sample_block([unit.advance(390)], calibration)
+    block = unit.advance(390)
     slow = {name: reading.value for name, reading in block.slow.items()}
 
     assert slow["speed"] == 92.3
@@ -119,7 +118,7 @@ def test_a_monitor_of_two_bearings_needs_no_third(
     whole = SimulatedUnit(machine, calibration, quiet, seed=1, start_ns=0).advance(600)
 
     assert np.array_equal(part.counts, whole.counts[:8])
-    assert all(math.isnan(value) for value in part.slow[-3:])
+    assert all(math.isnan(value) for value in part.side.slow[-3:, 0])
 
 
 def test_settings_that_do_not_fit_together_are_refused(
@@ -129,7 +128,7 @@ def test_settings_that_do_not_fit_together_are_refused(
     wrong = [
         (replace(calibration, channels=calibration.channels[1:]), quiet, "12 channels.* 11"),
         (replace(calibration, rate_hz=500.0), quiet, "600.0 Hz.* 500.0 Hz"),
-        (calibration, replace(quiet, bearings=without_turbine), "lacks TJB"),
+        (calibration, replace(quiet, bearings=without_turbine), "add TJB to the scenario"),
     ]
     for fitted, scenario, message in wrong:
         with pytest.raises(ConfigError, match=message):
@@ -164,7 +163,7 @@ async def test_an_unpaced_source_goes_on_where_it_was_left(
 
     assert [block.first_index for block in blocks] == [0, 500, 1000, 1500, 2000]
     assert stepped_clock.monotonic_s() == 3600.0
-    expected = sample_block([build_unit(full_load).advance(2500)], calibration)
+    expected = build_unit(full_load).advance(2500)
     assert np.array_equal(np.concatenate([b.samples for b in blocks], axis=1), expected.samples)
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from core.change.backtest import decide_all, last_decision, last_operation, oper
 from core.change.decision import JUDGED, Verdict
 from core.change.film_judge import FilmFinding, alarm_condition
 from core.change.film_reading import film_reading
-from core.change.settings import FilmRules
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel
 from core.quality import Reading, Reason, missing, uncertain
@@ -24,9 +22,7 @@ def loss(size: float, day: float) -> Callable[[np.ndarray], np.ndarray]:
     return lambda hours: np.where(hours > day * 24.0, np.log(1.0 - size), 0.0)
 
 
-def test_results_one_by_one_are_judged_as_their_whole_history_is(
-    films: Any, rules: FilmRules
-) -> None:
+def test_results_one_by_one_are_judged_as_their_whole_history_is(films, rules):
     history = films.later(change=loss(0.2, 106.0))
     news = films.watched(history)
 
@@ -48,7 +44,7 @@ def test_results_one_by_one_are_judged_as_their_whole_history_is(
         assert findings[-1].baseline_version == 4
 
 
-def test_a_restart_in_the_middle_changes_no_verdict(films: Any, rules: FilmRules) -> None:
+def test_a_restart_in_the_middle_changes_no_verdict(films, rules):
     history = films.later(change=loss(0.1, 106.0))
     through = films.watched(history)
     n = len(history) // 2
@@ -63,9 +59,7 @@ def test_a_restart_in_the_middle_changes_no_verdict(films: Any, rules: FilmRules
     assert [n.findings[0] for n in first + second] == [n.findings[0] for n in through]
 
 
-def test_decisions_caught_up_with_are_those_that_would_have_been_made(
-    films: Any, rules: FilmRules
-) -> None:
+def test_decisions_caught_up_with_are_those_that_would_have_been_made(films, rules):
     history = films.later()
     made = films.watched(history)
     settled = np.array([n.reading.condition.is_settled for n in made])
@@ -80,13 +74,13 @@ def test_decisions_caught_up_with_are_those_that_would_have_been_made(
         assert caught.finding.change == pytest.approx(through.finding.change, rel=1e-9)
 
 
-def test_without_a_baseline_nothing_is_called_normal(films: Any) -> None:
+def test_without_a_baseline_nothing_is_called_normal(films):
     news = films.watched(films.life(3, days=2), films.watch(has_baseline=False))
     verdicts = {finding.verdict for told in news for finding in told.findings}
     assert verdicts == {Verdict.NO_BASELINE, Verdict.TRANSIENT}
 
 
-def test_readings_are_as_far_apart_as_they_should_be_however_often_results_come(films: Any) -> None:
+def test_readings_are_as_far_apart_as_they_should_be_however_often_results_come(films):
     watch = films.watch(has_baseline=False)
     times = [1_000_000 * S + i * 12 * S for i in range(500)]
     found = [watch.take([films.assessment(time_ns)])[1] for time_ns in times]
@@ -96,9 +90,7 @@ def test_readings_are_as_far_apart_as_they_should_be_however_often_results_come(
 
 
 @pytest.mark.parametrize("back_s", [300, 3 * 3600, 400 * 86_400])
-def test_a_clock_that_is_put_back_stops_neither_operation_nor_readings(
-    films: Any, back_s: int
-) -> None:
+def test_a_clock_that_is_put_back_stops_neither_operation_nor_readings(films, back_s):
     history, watch = films.later(), films.watch()
     films.watched(history.rows(0, 60), watch)
     again = replace(history, time_ns=history.time_ns - back_s * S).rows(60, 400)
@@ -110,7 +102,7 @@ def test_a_clock_that_is_put_back_stops_neither_operation_nor_readings(
     assert any(told.findings[0].verdict in JUDGED for told in news)
 
 
-def test_doubtful_numbers_are_no_numbers(films: Any, rules: FilmRules) -> None:
+def test_doubtful_numbers_are_no_numbers(films, rules):
     good = {
         "eccentricity_ratio": Reading(0.4),
         "oil_temperature_c": Reading(45.0),
@@ -137,7 +129,7 @@ def test_doubtful_numbers_are_no_numbers(films: Any, rules: FilmRules) -> None:
     assert x.outcome is ReadingOutcome.BAD_QUALITY
 
 
-def test_results_say_the_condition_that_they_were_found_under(films: Any) -> None:
+def test_results_say_the_condition_that_they_were_found_under(films):
     known = {
         "speed_rpm": Reading(92.3),
         "power_mw": Reading(200.0),
@@ -160,16 +152,14 @@ def test_results_say_the_condition_that_they_were_found_under(films: Any) -> Non
 
 
 @pytest.mark.parametrize("verdict", [v for v in Verdict if v not in JUDGED])
-def test_what_is_not_judged_is_neither_an_alarm_nor_a_return(
-    rules: FilmRules, verdict: Verdict
-) -> None:
+def test_what_is_not_judged_is_neither_an_alarm_nor_a_return(rules, verdict):
     held = FilmFinding(verdict, AlarmLevel.ALERT, -0.1, 0.01, 4.0)
     condition = alarm_condition(held, rules.change)
     assert not condition.is_known
     assert condition.reason == verdict.name.lower()
 
 
-def test_an_alarm_says_by_how_much_and_which_limit(rules: FilmRules) -> None:
+def test_an_alarm_says_by_how_much_and_which_limit(rules):
     alert = alarm_condition(FilmFinding(Verdict.ALERT, AlarmLevel.ALERT, -0.1), rules.change)
     danger = alarm_condition(FilmFinding(Verdict.DANGER, AlarmLevel.DANGER, 0.3), rules.change)
     assert (alert.level, alert.value, alert.limit) == (1, -0.1, rules.change.alert_change)
@@ -177,7 +167,7 @@ def test_an_alarm_says_by_how_much_and_which_limit(rules: FilmRules) -> None:
     assert alarm_condition(FilmFinding(Verdict.NORMAL), rules.change).level is None
 
 
-def test_time_that_passes_faster_asks_for_fewer_hours(films: Any, rules: FilmRules) -> None:
+def test_time_that_passes_faster_asks_for_fewer_hours(films, rules):
     history = films.later(change=loss(0.2, 106.0))
     start_ns = int(history.time_ns[0])
     fast_ns = start_ns + (history.time_ns - start_ns) // 50

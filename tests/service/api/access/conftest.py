@@ -3,8 +3,6 @@
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
-from types import SimpleNamespace
 from typing import Any
 
 import httpx2
@@ -14,11 +12,6 @@ from rigs.described import described_app
 
 from service.api.auth.authenticator import Authenticator
 from service.api.auth.passwords import Hashing
-from service.api.auth.people import create_key
-from service.app.metrics import scrape
-from service.measuring.acquirer import Bus
-from service.measuring.timings import Timings
-from service.notifications.sender import Deliveries
 from service.store.access.identities import Role
 
 PASSWORD = "the river is high in may"  # noqa: S105
@@ -42,7 +35,7 @@ class Access:
     async def account(self, name: str, role: Role) -> None:
         """Add an account whose password its owner has set."""
         now_ns = self.service.clock.now_ns()
-        await asyncio.to_thread(self.desk.people.add, name, role, PASSWORD, now_ns)
+        await asyncio.to_thread(self.desk.service.add, name, role, PASSWORD, now_ns)
 
     async def session(self, name: str) -> str:
         """Log in; the token of the session."""
@@ -53,7 +46,7 @@ class Access:
 
     def key(self, role: Role, *units: str, days: int = 1) -> str:
         now_ns = self.service.clock.now_ns()
-        _, shown = create_key(self.service.store.access, f"key-{role}", role, units, days, now_ns)
+        _, shown = self.desk.service.create_key(f"key-{role}", role, units, days, now_ns)
         return shown
 
 
@@ -68,31 +61,17 @@ def token_of(answer: httpx2.Response) -> str:
     return token
 
 
+async def no_metrics() -> bytes:
+    return b""
+
+
 @pytest.fixture
 def access(service: Any) -> Access:
     """A second application over the same store, which asks everybody."""
     context = service.context
-    ground = SimpleNamespace(
-        plant=SimpleNamespace(unit=list(context.units.values())),
-        live=context.live,
-        timings=Timings(context.units, service.clock),
-        clock=service.clock,
-        store=service.store,
-    )
-    analysis = SimpleNamespace(
-        process=ground,
-        recorder=service.recorder,
-        alarms=context.alarms,
-        films=context.films,
-        captures=context.captures,
-        evidence=service.evidence,
-        deliveries=Deliveries([], service.store.outbox, service.clock),
-        **dict.fromkeys(("space", "load", "tape", "recordings", "soundness")),
-    )
-    metrics = partial(scrape, analysis, Bus(1, service.clock), {})
     hashing = Hashing(PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
-    desk = Authenticator(service.store.access, service.clock, local_role=None, hashing=hashing)
-    app = described_app(replace(context, access=desk, metrics=metrics), service.desk)
+    desk = Authenticator(service.access, service.clock, local_role=None, hashing=hashing)
+    app = described_app(replace(context, access=desk, metrics=no_metrics), service.desk)
     return Access(desk, app, service)
 
 

@@ -1,11 +1,14 @@
-"""Accounts and keys as admins change them, and what the audit trail says of it."""
+"""Accounts and keys as admins change them, the audit trail of it, and bounds of what it costs."""
 
-from collections.abc import AsyncIterator, Callable
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Iterator
 from typing import Any
 
 import httpx2
 import pytest
 
+from service.api.auth.passwords import MAX_AT_ONCE, MAX_WAITING, AccessThreads, TooManyLoginsError
 from service.store.access.identities import Role
 
 ACCOUNTS, KEYS = "/api/v1/accounts", "/api/v1/keys"
@@ -25,9 +28,7 @@ async def admin(access: Any) -> AsyncIterator[httpx2.AsyncClient]:
         yield client
 
 
-async def test_an_account_is_added_changed_and_removed(
-    access: Any, admin: httpx2.AsyncClient
-) -> None:
+async def test_an_account_is_added_changed_and_removed(access, admin):
     added = await admin.post(ACCOUNTS, json=BERT)
     raised = await admin.put(f"{ACCOUNTS}/bert/role", json={"role": "operator"})
     listed = (await admin.get(ACCOUNTS)).json()
@@ -51,8 +52,8 @@ async def test_an_account_is_added_changed_and_removed(
 
 
 async def test_a_password_that_somebody_else_has_set_opens_nothing_but_its_change(
-    access: Any, admin: httpx2.AsyncClient, as_token: Callable[[httpx2.Response], str]
-) -> None:
+    access, admin, as_token
+):
     await admin.post(ACCOUNTS, json=BERT)
     for password in (PASSWORD, OTHER):
         async with access.client(Origin="http://padwatch") as client:
@@ -70,7 +71,7 @@ async def test_a_password_that_somebody_else_has_set_opens_nothing_but_its_chang
         await admin.put(f"{ACCOUNTS}/bert/password", json={"password": OTHER})
 
 
-async def test_what_does_not_fit_is_refused_and_said(admin: httpx2.AsyncClient) -> None:
+async def test_what_does_not_fit_is_refused_and_said(admin):
     await admin.post(ACCOUNTS, json=BERT)
     refused = [
         (await admin.post(ACCOUNTS, json=BERT), 409, None),
@@ -97,9 +98,7 @@ async def test_what_does_not_fit_is_refused_and_said(admin: httpx2.AsyncClient) 
         assert errors == ([] if parameter is None else [parameter])
 
 
-async def test_a_key_is_shown_once_and_opens_until_it_is_revoked(
-    access: Any, admin: httpx2.AsyncClient
-) -> None:
+async def test_a_key_is_shown_once_and_opens_until_it_is_revoked(access, admin):
     made = await admin.post(KEYS, json={"name": "historian", "role": "viewer", "units": ["U1"]})
     key = made.json()["key"]
     async with access.client(Authorization=f"Bearer {key}") as client:
@@ -115,9 +114,7 @@ async def test_a_key_is_shown_once_and_opens_until_it_is_revoked(
     assert key not in str(listed)
 
 
-async def test_beside_an_action_stands_who_has_logged_in_whatever_the_body_says(
-    access: Any, admin: httpx2.AsyncClient
-) -> None:
+async def test_beside_an_action_stands_who_has_logged_in_whatever_the_body_says(access, admin):
     service = access.service
     local = await service.client.post(KEYS, json={"name": "k", "role": "viewer"})
     first = (await service.json("/api/v1/audit"))["entries"][0]
@@ -138,3 +135,42 @@ async def test_beside_an_action_stands_who_has_logged_in_whatever_the_body_says(
         ("anna", "second"),
         ("key:key-operator", "first"),
     ]
+
+
+@pytest.fixture
+def held() -> Iterator[threading.Event]:
+    """Keeps threads that wait for it."""
+    event = threading.Event()
+    yield event
+    event.set()
+
+
+async def test_only_so_many_passwords_wait_and_nobody_else_for_them(held):
+    work = AccessThreads()
+    logins = [
+        asyncio.create_task(work.run_hashing(held.wait, is_known=False)) for _ in range(MAX_WAITING)
+    ]
+    await asyncio.sleep(0)
+
+    with pytest.raises(TooManyLoginsError):
+        await work.run_hashing(held.wait, is_known=False)
+    assert await work.run(lambda: "found") == "found"
+    held.set()
+    assert await asyncio.gather(*logins) == [True] * MAX_WAITING
+    assert await work.run_hashing(lambda: "in") == "in"
+    work.close()
+
+
+async def test_at_the_end_nothing_more_is_begun(held):
+    work = AccessThreads()
+    logins = [
+        asyncio.create_task(work.run_hashing(held.wait, is_known=False)) for _ in range(MAX_WAITING)
+    ]
+    await asyncio.sleep(0)
+    work.close()
+    held.set()
+    ended = await asyncio.gather(*logins, return_exceptions=True)
+
+    begun = [each for each in ended if each is True]
+    assert len(begun) <= MAX_AT_ONCE
+    assert all(isinstance(e, asyncio.CancelledError) for e in ended if e is not True)

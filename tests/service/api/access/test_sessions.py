@@ -1,5 +1,7 @@
 """Logging in and out, and what a request may show of who sends it."""
 
+import asyncio
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -29,9 +31,7 @@ def cookie(token: str) -> dict[str, str]:
     return {"Cookie": f"{COOKIE}={token}"}
 
 
-async def test_on_this_computer_one_sees_the_plant_and_is_told_that_an_account_is_missing(
-    access: Any,
-) -> None:
+async def test_on_this_computer_one_sees_the_plant_and_is_told_that_an_account_is_missing(access):
     access.desk.local_role = Role.VIEWER
     async with access.client(peer="127.0.0.1") as client:
         before = (await client.get(SESSION)).json()
@@ -43,9 +43,7 @@ async def test_on_this_computer_one_sees_the_plant_and_is_told_that_an_account_i
     assert after == {**before, "set_up_needed": False}
 
 
-async def test_the_cookie_is_for_secure_connections_alone_where_there_is_one(
-    access: Any, anna: str
-) -> None:
+async def test_the_cookie_is_for_secure_connections_alone_where_there_is_one(access, anna):
     assert anna
     for origin, name in (
         ("http://padwatch", "padwatch"),
@@ -61,8 +59,8 @@ async def test_the_cookie_is_for_secure_connections_alone_where_there_is_one(
 
 
 async def test_in_the_demonstration_nobody_here_has_to_log_in_but_who_comes_through_a_proxy(
-    read_only: Any,
-) -> None:
+    read_only,
+):
     said = await read_only.json(SESSION)
 
     assert said["login_required"] is False
@@ -82,9 +80,7 @@ async def test_in_the_demonstration_nobody_here_has_to_log_in_but_who_comes_thro
         assert not any(key in answer.text for key in wrong[2:])
 
 
-async def test_a_login_of_the_proxy_hides_neither_a_session_nor_a_key(
-    access: Any, anna: str
-) -> None:
+async def test_a_login_of_the_proxy_hides_neither_a_session_nor_a_key(access, anna):
     basic = ("Authorization", "Basic cHJveHk6c2VjcmV0")
     key = ("Authorization", f"Bearer {access.key(Role.ADMIN)}")
     async with access.client() as client:
@@ -95,9 +91,7 @@ async def test_a_login_of_the_proxy_hides_neither_a_session_nor_a_key(
             assert (await client.get(SESSION, headers=shown)).json()["name"] == name
 
 
-async def test_a_known_person_gets_in_while_strangers_take_all_places(
-    access: Any, anna: str
-) -> None:
+async def test_a_known_person_gets_in_while_strangers_take_all_places(access, anna):
     assert anna  # from the same place before
     while access.desk.work._places.acquire(blocking=False):
         pass
@@ -108,25 +102,21 @@ async def test_a_known_person_gets_in_while_strangers_take_all_places(
     assert statuses == [201, 503]
 
 
-async def test_a_login_that_cannot_be_written_down_opens_nothing(
-    access: Any, anna: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(_: object) -> None:
+async def test_a_login_that_cannot_be_written_down_opens_nothing(access, anna, monkeypatch):
+    def refuse(*_: object) -> None:
         raise StoreError("disk full")
 
     assert anna
     with monkeypatch.context() as full:
-        full.setattr(access.service.store.audit, "record", refuse)
+        full.setattr(access.service.access.audit._audit, "add", refuse)
         async with access.client() as client:
             answer = await client.post(SESSION, json=ANNA)
     assert answer.status_code == 503
-    with access.service.store._reader() as reader:
+    with access.service.access.sessions._reading() as reader:
         assert reader.execute("SELECT count(*) FROM session").fetchone()[0] == 1
 
 
-async def test_a_login_never_takes_a_token_that_was_there_before(
-    access: Any, anna: str, as_token: Token
-) -> None:
+async def test_a_login_never_takes_a_token_that_was_there_before(access, anna, as_token):
     made_up = "A" * 43
     tokens = {anna, made_up}
     for before in (anna, made_up):
@@ -140,8 +130,8 @@ async def test_a_login_never_takes_a_token_that_was_there_before(
 
 
 async def test_wrong_logins_do_not_say_what_was_wrong_and_after_many_one_has_to_wait(
-    access: Any, anna: str, as_problem: Callable[[httpx2.Response], dict[str, Any]]
-) -> None:
+    access, anna, as_problem
+):
     assert anna
     async with access.client(peer="192.0.2.9") as client:
         wrong = [
@@ -160,9 +150,7 @@ async def test_wrong_logins_do_not_say_what_was_wrong_and_after_many_one_has_to_
     assert int(answer.headers["retry-after"]) >= 1
 
 
-async def test_one_cookie_opens_what_its_role_may_and_two_are_neither(
-    access: Any, anna: str
-) -> None:
+async def test_one_cookie_opens_what_its_role_may_and_two_are_neither(access, anna):
     async with access.client(**cookie(anna)) as client:
         found = (await client.get(SESSION)).json()
         assert (await client.get(UNITS)).status_code == 200
@@ -179,9 +167,7 @@ async def test_one_cookie_opens_what_its_role_may_and_two_are_neither(
         assert answer.status_code == 401, values
 
 
-async def test_a_key_acts_wherever_it_is_sent_from_has_no_password_and_two_are_neither(
-    access: Any,
-) -> None:
+async def test_a_key_acts_wherever_it_is_sent_from_has_no_password_and_two_are_neither(access):
     key = ("Authorization", f"Bearer {access.key(Role.ADMIN)}")
     body = {"password": PASSWORD, "new_password": "the river is low in august"}
     async with access.client(Origin="https://elsewhere.example") as client:
@@ -208,9 +194,7 @@ PAGES = (
 """What a browser says of the page that asks, and what comes of it."""
 
 
-async def test_with_a_cookie_only_the_dashboard_itself_acts_and_logs_in(
-    access: Any, anna: str
-) -> None:
+async def test_with_a_cookie_only_the_dashboard_itself_acts_and_logs_in(access, anna):
     for headers, status in PAGES:
         async with access.client(**cookie(anna), **headers) as client:
             answer = await client.post("/api/v1/alarms/U1:none:x/unshelve", json={})
@@ -220,8 +204,8 @@ async def test_with_a_cookie_only_the_dashboard_itself_acts_and_logs_in(
 
 
 async def test_a_new_password_ends_all_other_logins_and_logging_out_this_one(
-    access: Any, anna: str, as_token: Token
-) -> None:
+    access, anna, as_token
+):
     new = "the river is low in august"
     body = {"password": PASSWORD, "new_password": new}
     async with access.client(**cookie(anna), Origin="http://padwatch") as client:
@@ -242,7 +226,7 @@ async def test_a_new_password_ends_all_other_logins_and_logging_out_this_one(
     assert "Max-Age=0" in out.headers["set-cookie"]
 
 
-async def test_the_first_account_is_made_with_the_printed_token_and_once(access: Any) -> None:
+async def test_the_first_account_is_made_with_the_printed_token_and_once(access):
     token = await access.desk.offer_set_up()
     body = {"token": token, **ANNA}
     async with access.client() as client:
@@ -270,7 +254,7 @@ async def test_the_first_account_is_made_with_the_printed_token_and_once(access:
     assert await access.desk.offer_set_up() is None
 
 
-async def test_logins_are_told_and_nothing_secret_of_them(access: Any, anna: str) -> None:
+async def test_logins_are_told_and_nothing_secret_of_them(access, anna):
     async with access.client(**cookie(anna), Origin="http://padwatch") as client:
         await client.post(SESSION, json={**ANNA, "password": "quite another password"})
         await client.delete(SESSION)
@@ -285,3 +269,78 @@ async def test_logins_are_told_and_nothing_secret_of_them(access: Any, anna: str
     assert PASSWORD not in str(told)
     assert anna not in str(told)
     assert "quite another password" not in str(told)
+
+
+@pytest.fixture
+def n_reads(access: Any, monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
+    """Digest of each session that is read from the database."""
+    read: list[bytes] = []
+    sessions = access.service.access.sessions
+    get = sessions.get
+
+    def counted(digest: bytes) -> object:
+        read.append(digest)
+        return get(digest)
+
+    monkeypatch.setattr(sessions, "get", counted)
+    return read
+
+
+async def test_many_polls_in_a_second_read_a_session_once_and_the_next_second_again(
+    access, anna, n_reads
+):
+    async with access.client(**cookie(anna)) as client:
+        for n_expected in (1, 2):
+            for _ in range(20):
+                assert (await client.get(UNITS)).status_code == 200
+            assert len(n_reads) == n_expected
+            access.service.clock.s += 1.0
+
+
+async def test_what_another_process_revokes_is_refused_a_second_later(access, anna):
+    key = access.key(Role.VIEWER)
+    now_ns, store = access.service.clock.now_ns(), access.service.access
+    ways = (cookie(anna), {"Authorization": f"Bearer {key}"})
+    for headers in ways:
+        async with access.client(**headers) as client:
+            assert (await client.get(UNITS)).status_code == 200
+    store.sessions.end_all()
+    store.keys.revoke(key.split("_")[1], now_ns)
+    access.service.clock.s += 1.0
+    for headers in ways:
+        async with access.client(**headers) as client:
+            assert (await client.get(UNITS)).status_code == 401
+
+
+async def test_logging_out_counts_at_once_also_for_a_session_that_is_just_being_read(
+    access, anna, monkeypatch
+):
+    sessions, read, go_on = access.service.access.sessions, threading.Event(), threading.Event()
+    get = sessions.get
+
+    def slowly(digest: bytes) -> object:
+        found = get(digest)
+        read.set()
+        go_on.wait(30.0)
+        return found
+
+    async with access.client(**cookie(anna)) as client:
+        with monkeypatch.context() as slow:
+            slow.setattr(sessions, "get", slowly)
+            polled = asyncio.create_task(client.get(UNITS))
+            await asyncio.to_thread(read.wait, 30.0)
+            await access.desk.log_out(anna)
+            go_on.set()
+            assert (await polled).status_code == 200  # it was asked before
+        assert (await client.get(UNITS)).status_code == 401
+
+
+async def test_a_role_that_is_changed_here_counts_from_the_next_request(access, anna):
+    await access.account("boss", Role.ADMIN)
+    boss = cookie(await access.session("boss")) | {"Origin": "http://padwatch"}
+    async with access.client(**cookie(anna)) as hers, access.client(**boss) as his:
+        assert (await hers.get("/api/v1/audit")).status_code == 200
+        for change, status in (({"role": "viewer"}, 403), ({"role": "engineer"}, 200)):
+            done = await his.put("/api/v1/accounts/anna/role", json=change)
+            assert done.status_code == 200
+            assert (await hers.get("/api/v1/audit")).status_code == status

@@ -8,12 +8,9 @@ import pytest
 from argon2 import PasswordHasher
 from harness.places import Place, SqlitePlace
 
-from service.api.auth.authenticator import CredentialChecker
-from service.api.auth.backoff import Backoff
 from service.api.auth.passwords import Hashing
-from service.api.auth.people import AccountService
+from service.api.auth.service import AccessService
 from service.store.access.tables import AccessStore
-from service.store.store import Store
 
 
 class CountingHasher(PasswordHasher):
@@ -35,14 +32,9 @@ def path(sqlite_place: SqlitePlace) -> Path:
 
 
 @pytest.fixture
-def store(store_place: Place) -> Iterator[Store]:
-    with closing(store_place.open()) as opened:
+def access(store_place: Place) -> Iterator[AccessStore]:
+    with closing(store_place.open_access()) as opened:
         yield opened
-
-
-@pytest.fixture
-def access(store: Store) -> AccessStore:
-    return store.access
 
 
 @pytest.fixture
@@ -62,10 +54,10 @@ def hashing(hasher: CountingHasher) -> Hashing:
 
 
 @pytest.fixture
-def people(access: AccessStore, hashing: Hashing) -> AccountService:
-    return AccountService(access, hashing)
+def people(access: AccessStore, hashing: Hashing) -> AccessService:
+    return AccessService(access, hashing)
 
 
 @pytest.fixture
-def doors(access: AccessStore, hashing: Hashing) -> CredentialChecker:
-    return CredentialChecker(access, hashing, Backoff())
+def doors(people: AccessService) -> AccessService:
+    return people

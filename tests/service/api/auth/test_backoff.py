@@ -20,7 +20,7 @@ def fail_until_waiting(backoff: Backoff, name: str, peer: str, now_ns: int = 0) 
     return next(n for n in range(1000) if backoff.attempt(name, peer, now_ns))
 
 
-def test_each_failure_doubles_the_wait_of_an_account_up_to_its_limit() -> None:
+def test_each_failure_doubles_the_wait_of_an_account_up_to_its_limit():
     backoff, now_ns, waits = Backoff(), 0, []
     for number in range(200):
         wait_s = backoff.attempt("admin", f"192.0.2.{number}", now_ns)
@@ -32,7 +32,7 @@ def test_each_failure_doubles_the_wait_of_an_account_up_to_its_limit() -> None:
     assert max(waits) == ACCOUNT_RULE.longest_s
 
 
-def test_no_place_waits_longer_than_its_limit() -> None:
+def test_no_place_waits_longer_than_its_limit():
     backoff, now_ns, waits = Backoff(), 0, []
     for number in range(40):
         wait_s = backoff.attempt(f"user{number}", HERE, now_ns)
@@ -42,13 +42,13 @@ def test_no_place_waits_longer_than_its_limit() -> None:
     assert max(waits) == PEER_RULE.longest_s
 
 
-def test_peers_without_an_address_do_not_wait_for_each_other() -> None:
+def test_peers_without_an_address_do_not_wait_for_each_other():
     backoff = Backoff()
     for number in range(100):
         assert backoff.attempt(f"user{number}", "", 0) == 0.0
 
 
-def test_asking_too_soon_makes_no_wait_longer_and_an_hour_forgets_all() -> None:
+def test_asking_too_soon_makes_no_wait_longer_and_an_hour_forgets_all():
     backoff = Backoff()
     assert fail_until_waiting(backoff, "anna", HERE) == ACCOUNT_RULE.n_free
     waits = [backoff.attempt("anna", HERE, tenth * S // 10) for tenth in range(10)]
@@ -58,14 +58,14 @@ def test_asking_too_soon_makes_no_wait_longer_and_an_hour_forgets_all() -> None:
     assert fail_until_waiting(backoff, "anna", HERE, later_ns) == ACCOUNT_RULE.n_free
 
 
-def test_one_who_tries_many_accounts_waits_though_none_of_them_does() -> None:
+def test_one_who_tries_many_accounts_waits_though_none_of_them_does():
     backoff = Backoff()
     n_tried = next(n for n in range(1000) if backoff.attempt(f"user{n}", HERE, 0))
     assert n_tried == PEER_RULE.n_free
     assert backoff.attempt("user0", THERE, 0) == 0.0
 
 
-def test_strangers_do_not_keep_an_admin_from_where_he_has_been() -> None:
+def test_strangers_do_not_keep_an_admin_from_where_he_has_been():
     backoff = Backoff()
     backoff.attempt("admin", HERE, 0)
     backoff.succeeded("admin", HERE)
@@ -76,7 +76,7 @@ def test_strangers_do_not_keep_an_admin_from_where_he_has_been() -> None:
     assert n_tried == PEER_RULE.n_free
 
 
-def test_a_login_of_ones_own_does_not_pay_for_failures_at_others() -> None:
+def test_a_login_of_ones_own_does_not_pay_for_failures_at_others():
     backoff, n_tried = Backoff(), 0
     while backoff.attempt(f"victim{n_tried}", HERE, 0) == 0.0:
         n_tried += 1
@@ -85,14 +85,14 @@ def test_a_login_of_ones_own_does_not_pay_for_failures_at_others() -> None:
     assert n_tried <= PEER_RULE.n_free
 
 
-def test_right_passwords_never_wait_however_many() -> None:
+def test_right_passwords_never_wait_however_many():
     backoff = Backoff()
     for _ in range(100):
         assert backoff.attempt("anna", HERE, 0) == 0.0
         backoff.succeeded("anna", HERE)
 
 
-def test_a_million_names_take_no_more_memory_than_the_first_thousands() -> None:
+def test_a_million_names_take_no_more_memory_than_the_first_thousands():
     book = FailureCounts(WaitRule(1, 60.0), max_remembered=100)
     for number in range(10_000):
         book.add(number, number)
@@ -113,5 +113,5 @@ def test_a_million_names_take_no_more_memory_than_the_first_thousands() -> None:
         ("", ""),
     ],
 )
-def test_one_host_with_many_addresses_is_one_place(peer: str, place: str) -> None:
+def test_one_host_with_many_addresses_is_one_place(peer, place):
     assert client_of(peer) == place

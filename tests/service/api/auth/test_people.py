@@ -6,12 +6,10 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from argon2 import extract_parameters
 from argon2.low_level import Type
-from harness.places import Place
 
 from core.units import DAY_NS
-from service.api.auth.authenticator import CredentialChecker, LoggedIn
-from service.api.auth.passwords import Hashing, PasswordRefusedError, new_password, plant_hasher
-from service.api.auth.people import SET_UP_S, AccountService, create_key
+from service.api.auth.passwords import PasswordRefusedError, new_password, plant_hasher
+from service.api.auth.service import SET_UP_S, AccessService, LoggedIn
 from service.store.access.audit_entries import Acting, Source, acting_as
 from service.store.access.identities import (
     Identity,
@@ -23,16 +21,15 @@ from service.store.access.identities import (
     key_id,
     new_key,
 )
-from service.store.access.tables import AccessRefusedError, AccessStore
+from service.store.access.tables import AccessRefusedError
 from service.store.audit import AuditQuery
-from service.store.store import Store
 
 T0 = 1_767_225_600_000_000_000
 S = 1_000_000_000
 PASSWORD = "rotor rope gauge"  # noqa: S105
 
 
-def test_an_account_is_kept_as_it_was_made(people: AccountService, access: AccessStore) -> None:
+def test_an_account_is_kept_as_it_was_made(people, access):
     people.add("Berta", Role.VIEWER, PASSWORD, T0)
     people.add("anna", Role.ADMIN, PASSWORD, T0 + S)
 
@@ -46,9 +43,7 @@ def test_an_account_is_kept_as_it_was_made(people: AccountService, access: Acces
     assert found[0].password_hash not in repr(found[0])
 
 
-def test_an_account_of_a_name_in_use_or_not_accepted_changes_nothing(
-    people: AccountService, access: AccessStore
-) -> None:
+def test_an_account_of_a_name_in_use_or_not_accepted_changes_nothing(people, access):
     people.add("anna", Role.VIEWER, PASSWORD, T0)
     before = access.accounts.get("anna")
     with pytest.raises(AccessRefusedError, match="account anna already exists"):
@@ -60,12 +55,10 @@ def test_an_account_of_a_name_in_use_or_not_accepted_changes_nothing(
     assert access.accounts.all() == [before]
 
 
-def test_neither_the_only_admin_nor_one_who_is_not_there_is_changed(
-    people: AccountService, access: AccessStore, store: Store
-) -> None:
+def test_neither_the_only_admin_nor_one_who_is_not_there_is_changed(people, access):
     people.add("anna", Role.ADMIN, PASSWORD, T0)
     people.add("berta", Role.ENGINEER, PASSWORD, T0)
-    told = store.audit.entries(AuditQuery())
+    told = access.audit.entries(AuditQuery())
     for change in (
         lambda: access.accounts.remove("anna", T0),
         lambda: access.accounts.set_role("anna", Role.ENGINEER, T0),
@@ -79,16 +72,14 @@ def test_neither_the_only_admin_nor_one_who_is_not_there_is_changed(
     ):
         with pytest.raises(AccessRefusedError, match="account nobody does not exist"):
             change()
-    assert store.audit.entries(AuditQuery()) == told
+    assert access.audit.entries(AuditQuery()) == told
     access.accounts.set_role("berta", Role.ADMIN, T0)
     access.accounts.remove("anna", T0)
     access.accounts.remove("berta", T0)  # the last of all may go
     assert access.accounts.all() == []
 
 
-def test_of_two_admins_who_leave_at_once_one_stays(
-    people: AccountService, access: AccessStore
-) -> None:
+def test_of_two_admins_who_leave_at_once_one_stays(people, access):
     people.add("viewer", Role.VIEWER, PASSWORD, T0)
 
     def leave(name: str) -> bool:
@@ -106,9 +97,7 @@ def test_of_two_admins_who_leave_at_once_one_stays(
             assert sorted(threads.map(leave, ("anna", "berta"))) == [False, True]
 
 
-def test_the_set_up_token_makes_the_first_admin_and_nothing_more(
-    people: AccountService, access: AccessStore, doors: CredentialChecker
-) -> None:
+def test_the_set_up_token_makes_the_first_admin_and_nothing_more(people, access, doors):
     token = people.offer_set_up(T0)
     assert token is not None
     with pytest.raises(PasswordRefusedError):  # that does not use the token up
@@ -128,7 +117,7 @@ def test_the_set_up_token_makes_the_first_admin_and_nothing_more(
     assert people.offer_set_up(T0) is None
 
 
-def test_a_set_up_token_is_void_when_it_is_old_or_another_was_drawn(people: AccountService) -> None:
+def test_a_set_up_token_is_void_when_it_is_old_or_another_was_drawn(people):
     first, second = people.offer_set_up(T0), people.offer_set_up(T0)
     assert first is not None
     assert second is not None
@@ -139,9 +128,7 @@ def test_a_set_up_token_is_void_when_it_is_old_or_another_was_drawn(people: Acco
     assert people.set_up(second, "anna", PASSWORD, late_ns - 1)
 
 
-def test_of_many_who_set_up_at_once_one_is_admin(
-    people: AccountService, access: AccessStore
-) -> None:
+def test_of_many_who_set_up_at_once_one_is_admin(people, access):
     token = people.offer_set_up(T0)
     assert token is not None
     with ThreadPoolExecutor(8) as threads:
@@ -149,10 +136,10 @@ def test_of_many_who_set_up_at_once_one_is_admin(
     assert (sum(done), len(access.accounts.all())) == (1, 1)
 
 
-def test_a_key_opens_as_what_it_was_made_for_until_its_day(
-    access: AccessStore, doors: CredentialChecker
-) -> None:
-    key, shown = create_key(access, "Historian", Role.VIEWER, ("U1", "U2", "U1"), 30, T0)
+def test_a_key_opens_as_what_it_was_made_for_until_its_day(access, doors):
+    key, shown = AccessService(access).create_key(
+        "Historian", Role.VIEWER, ("U1", "U2", "U1"), 30, T0
+    )
 
     assert doors.machine(shown, T0 + S) == Identity(
         "historian", Role.VIEWER, Means.KEY, ("U1", "U2")
@@ -164,10 +151,8 @@ def test_a_key_opens_as_what_it_was_made_for_until_its_day(
     assert shown not in repr(access.keys.all())
 
 
-def test_a_key_with_a_wrong_end_opens_nothing_and_counts_as_unknown(
-    access: AccessStore, doors: CredentialChecker
-) -> None:
-    key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
+def test_a_key_with_a_wrong_end_opens_nothing_and_counts_as_unknown(access, doors):
+    key, shown = AccessService(access).create_key("historian", Role.VIEWER, (), 30, T0)
     other_id, other = new_key()
     forged = other.replace(other_id, key.id, 1)
     assert key_id(forged) == key_id(shown) == key.id
@@ -179,10 +164,8 @@ def test_a_key_with_a_wrong_end_opens_nothing_and_counts_as_unknown(
     assert stored.used_ns is None
 
 
-def test_the_last_use_of_a_key_is_written_once_a_minute(
-    access: AccessStore, doors: CredentialChecker
-) -> None:
-    key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
+def test_the_last_use_of_a_key_is_written_once_a_minute(access, doors):
+    key, shown = AccessService(access).create_key("historian", Role.VIEWER, (), 30, T0)
     seen = set()
     for second in range(150):
         doors.machine(shown, T0 + second * S)
@@ -192,18 +175,18 @@ def test_the_last_use_of_a_key_is_written_once_a_minute(
     assert seen == {T0, T0 + 60 * S, T0 + 120 * S}
 
 
-def test_no_key_is_made_for_ever_or_for_an_admin_of_one_unit(access: AccessStore) -> None:
+def test_no_key_is_made_for_ever_or_for_an_admin_of_one_unit(access):
     for days in (0, 3651):
         with pytest.raises(AccessRefusedError, match="1 to 3650 days"):
-            create_key(access, "historian", Role.VIEWER, (), days, T0)
+            AccessService(access).create_key("historian", Role.VIEWER, (), days, T0)
     with pytest.raises(AccessRefusedError, match="role admin"):
-        create_key(access, "historian", Role.ADMIN, ("U1",), 30, T0)
+        AccessService(access).create_key("historian", Role.ADMIN, ("U1",), 30, T0)
 
 
 def test_a_revoked_key_opens_nothing_and_the_database_refuses_to_bring_it_back(
-    access: AccessStore, doors: CredentialChecker, store_place: Place
-) -> None:
-    key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
+    access, doors, store_place
+):
+    key, shown = AccessService(access).create_key("historian", Role.VIEWER, (), 30, T0)
     assert access.keys.revoke(key.id, T0 + S)
     assert not access.keys.revoke(key.id, T0 + 2 * S)
     assert doors.machine(shown, T0 + S) is None
@@ -220,10 +203,8 @@ def test_a_revoked_key_opens_nothing_and_the_database_refuses_to_bring_it_back(
             store_place.execute(statement)
 
 
-def test_every_change_is_in_the_audit_trail_with_what_was_before_and_nothing_secret(
-    store: Store, people: AccountService
-) -> None:
-    accounts = store.access.accounts
+def test_every_change_is_in_the_audit_trail_with_what_was_before_and_nothing_secret(access, people):
+    accounts = access.accounts
     token = people.offer_set_up(T0)
     assert token is not None
     with acting_as(Acting(Source.COMMAND_LINE, "anna on host", "anna")):
@@ -232,13 +213,13 @@ def test_every_change_is_in_the_audit_trail_with_what_was_before_and_nothing_sec
         accounts.set_role("berta", Role.ENGINEER, T0 + 2)
         people.set_password("berta", "another rope gauge", T0 + 3)
         accounts.remove("berta", T0 + 4)
-        key, shown = create_key(store.access, "historian", Role.VIEWER, ("U1",), 1, T0 + 5)
-        store.access.keys.revoke(key.id, T0 + 6)
-        store.access.keys.revoke(key.id, T0 + 7)  # changes nothing
+        key, shown = AccessService(access).create_key("historian", Role.VIEWER, ("U1",), 1, T0 + 5)
+        access.keys.revoke(key.id, T0 + 6)
+        access.keys.revoke(key.id, T0 + 7)  # changes nothing
 
     entries = [
         entry
-        for entry in reversed(store.audit.entries(AuditQuery()))
+        for entry in reversed(access.audit.entries(AuditQuery()))
         if entry.action.startswith(("account.", "key."))
     ]
     assert [(one.action, one.object, one.time_ns - T0) for one in entries] == [
@@ -259,7 +240,7 @@ def test_every_change_is_in_the_audit_trail_with_what_was_before_and_nothing_sec
         assert secret not in str(entries)
 
 
-def test_what_is_in_force_is_the_second_recommendation_of_rfc_9106() -> None:
+def test_what_is_in_force_is_the_second_recommendation_of_rfc_9106():
     found = extract_parameters(plant_hasher().hash(PASSWORD))
     assert (found.type, found.version) == (Type.ID, 19)
     assert (found.time_cost, found.memory_cost, found.parallelism) == (3, 65_536, 4)
@@ -277,15 +258,13 @@ def test_what_is_in_force_is_the_second_recommendation_of_rfc_9106() -> None:
         ("", "got 0"),
     ],
 )
-def test_a_poor_password_is_refused_and_not_repeated(password: str, said: str) -> None:
+def test_a_poor_password_is_refused_and_not_repeated(password, said):
     with pytest.raises(PasswordRefusedError, match=said) as refused:
         new_password(password, "operator")
     assert not password or password not in str(refused.value)
 
 
-def test_a_password_is_hashed_with_its_own_salt_however_its_letters_are_written(
-    hashing: Hashing,
-) -> None:
+def test_a_password_is_hashed_with_its_own_salt_however_its_letters_are_written(hashing):
     one, other = hashing.hash(PASSWORD), hashing.hash(PASSWORD)
     assert one != other
     assert one.startswith("$argon2id$")
@@ -298,9 +277,7 @@ def test_a_password_is_hashed_with_its_own_salt_however_its_letters_are_written(
     assert hashing.verify(hashing.hash(new_password(long, "anna")), long)
 
 
-def test_nothing_opens_an_account_that_is_not_there_or_whose_hash_is_damaged(
-    hashing: Hashing,
-) -> None:
+def test_nothing_opens_an_account_that_is_not_there_or_whose_hash_is_damaged(hashing):
     for password in ("", "\ud800", "x" * 1_000_000, "\0", "no account has this password"):
         assert not hashing.verify(None, password)
     for stored in ("", "!", "$argon2id$", "$argon2id$v=19$m=8,t=1,p=1$AAAA$AAAA"):
@@ -308,13 +285,13 @@ def test_nothing_opens_an_account_that_is_not_there_or_whose_hash_is_damaged(
 
 
 @pytest.mark.parametrize("name", ["anna", "a", "anna.b-c_d@plant", "7", "a" * 64])
-def test_a_usual_name_is_accepted(name: str) -> None:
+def test_a_usual_name_is_accepted(name):
     assert account_name(f" {name.upper()} ") == name
 
 
 @pytest.mark.parametrize(
     "name", ["", " ", ".a", "a.", "a b", "a\nb", "a\0b", "ä", "=cmd()", "<b>", "a" * 65, "key:x"]
 )
-def test_a_name_that_could_mean_something_else_is_refused(name: str) -> None:
+def test_a_name_that_could_mean_something_else_is_refused(name):
     with pytest.raises(NameRefusedError, match="1 to 64"):
         account_name(name)

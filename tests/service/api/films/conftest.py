@@ -15,7 +15,7 @@ from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Quality, Reading
 from service.live.commands import FilmPlace
-from service.live.live_view import LinkState
+from service.live.status import LinkState
 from service.measuring.baseline_learning import Learner
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile

@@ -1,12 +1,9 @@
 """Baselines over HTTP: what was learned, and what engineers do to it."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from rigs.probes import post
 
-from core.baseline.history import StiffnessHistory
 from service.runtime.times import rfc3339
 from service.store.documents import baseline_from_json
 
@@ -15,9 +12,7 @@ FILM = "/api/v1/units/U1/bearings/UJB/film"
 ANNA = {"actor": "A. Name", "reason": "checked against the overhaul report"}
 
 
-async def test_versions_say_where_they_come_from_and_which_is_in_force(
-    learned: Any, lived: StiffnessHistory
-) -> None:
+async def test_versions_say_where_they_come_from_and_which_is_in_force(learned, lived):
     found = await learned.json(BASELINES)
 
     [version] = found["versions"]
@@ -33,9 +28,7 @@ async def test_versions_say_where_they_come_from_and_which_is_in_force(
     assert found["learning"]["since"] == rfc3339(int(lived.time_ns[0]))
 
 
-async def test_a_bearing_without_a_baseline_says_how_far_learning_is(
-    service: Any, machine: Any
-) -> None:
+async def test_a_bearing_without_a_baseline_says_how_far_learning_is(service, machine):
     path = "/api/v1/units/U1/bearings/LJB/baselines"
     machine.run(3)
     machine.run(2, power_mw=200.0)  # not settled: it does not count
@@ -55,7 +48,7 @@ async def test_a_bearing_without_a_baseline_says_how_far_learning_is(
     }
 
 
-async def test_cells_and_export_are_what_was_learned(learned: Any) -> None:
+async def test_cells_and_export_are_what_was_learned(learned):
     found = await learned.json(f"{BASELINES}/1")
 
     baseline = learned.store.films.baseline("U1", "UJB", 1).of("x")
@@ -79,8 +72,8 @@ async def test_cells_and_export_are_what_was_learned(learned: Any) -> None:
 
 
 async def test_a_rejected_baseline_is_in_force_no_longer_and_may_be_accepted_again(
-    service: Any, machine: Any
-) -> None:
+    service, machine
+):
     machine.run(2)
     rejected = await post(service, f"{BASELINES}/1/reject", ANNA)
     then = await service.json(FILM)
@@ -108,8 +101,8 @@ async def test_a_rejected_baseline_is_in_force_no_longer_and_may_be_accepted_aga
 
 
 async def test_after_an_overhaul_nothing_is_in_force_until_it_has_been_learned(
-    service: Any, machine: Any, lived: StiffnessHistory
-) -> None:
+    service, machine, lived
+):
     machine.run(1)
     event = rfc3339(int(lived.time_ns[-1]))
 
@@ -122,7 +115,7 @@ async def test_after_an_overhaul_nothing_is_in_force_until_it_has_been_learned(
     assert (found["learning"]["since"], found["learning"]["n_days"]) == (event, 1)
 
 
-async def test_what_does_not_fit_is_refused_and_changes_nothing(learned: Any) -> None:
+async def test_what_does_not_fit_is_refused_and_changes_nothing(learned):
     before = await learned.json(BASELINES)
 
     await learned.refused(f"{BASELINES}/freeze", 403, ANNA, origin="https://elsewhere.example")
@@ -139,7 +132,7 @@ async def test_what_does_not_fit_is_refused_and_changes_nothing(learned: Any) ->
         assert await learned.json(BASELINES) == before
 
 
-async def test_a_wrong_request_is_refused_by_name(learned: Any) -> None:
+async def test_a_wrong_request_is_refused_by_name(learned):
     for path, body, parameter in (
         ("freeze", {"actor": "A. Name"}, "reason"),
         ("freeze", {"actor": "A. Name", "reason": " "}, "reason"),

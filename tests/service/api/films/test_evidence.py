@@ -15,7 +15,7 @@ from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
 from core.alarms.operation import Acknowledge, operate
 from core.change.film_judge import alarm_condition
-from service.api.auth.people import create_key
+from service.api.auth.service import AccessService
 from service.store.access.identities import Role
 
 ALARM = "U1:UJB:stiffness_x"
@@ -54,7 +54,7 @@ class Tags(HTMLParser):
         self.words += data
 
 
-async def test_the_evidence_of_a_changed_film(service: Any, machine: Any) -> None:
+async def test_the_evidence_of_a_changed_film(service, machine):
     """Its document, its page and its bundle; one service, because the film takes long to change."""
     news = raised(service, machine)
     async with at_work(service.evidence.run()):
@@ -148,7 +148,7 @@ async def require_a_bundle_of_everything(service: Any) -> None:
 
 async def require_that_a_key_of_one_unit_gets_nothing_of_the_others(service: Any) -> None:
     now_ns = service.clock.now_ns()
-    _, key = create_key(service.store.access, "historian", Role.VIEWER, ["U1"], 1, now_ns)
+    _, key = AccessService(service.access).create_key("historian", Role.VIEWER, ["U1"], 1, now_ns)
     headers = {"Authorization": f"Bearer {key}"}
     answer = await service.client.get(f"{PATH}/1/bundle.zip", headers=headers)
 
@@ -159,7 +159,7 @@ async def require_that_a_key_of_one_unit_gets_nothing_of_the_others(service: Any
     assert made_by == f"padwatch {version('padwatch')}"  # not who runs it, and where
 
 
-async def test_what_is_not_there_is_a_problem(learned: Any) -> None:
+async def test_what_is_not_there_is_a_problem(learned):
     for path, status in (
         (f"{PATH}/1", 404),
         ("/api/v1/alarms/U1:UJB:nonsense/evidence", 404),
@@ -171,9 +171,7 @@ async def test_what_is_not_there_is_a_problem(learned: Any) -> None:
     await learned.problem(PATH, 422, limit=0)
 
 
-async def test_evidence_that_waits_for_the_disk_is_not_called_lost(
-    service: Any, machine: Any
-) -> None:
+async def test_evidence_that_waits_for_the_disk_is_not_called_lost(service, machine):
     raised(service, machine)
 
     [listed] = (await service.json(PATH))["occurrences"]

@@ -1,16 +1,21 @@
-"""A real server on a free port of loopback, with a clock that tests set, and raw clients."""
+"""A real server on a free port of loopback, and raw clients."""
 
 import asyncio
 import socket
+import ssl
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 
 import pytest
-from starlette.types import Receive, Scope, Send
+from fastapi import Depends, Request, Response
+from pydantic import BaseModel
 
-from service.api.http.protocol import GuardedConfig, GuardedProtocol
-from service.api.http.server import GuardedServer
+from service.api.answers import Answers
+from service.api.app import GuardedApi
+from service.api.auth.declared import OPEN
+from service.api.http.server import HttpServer, http_server
+from service.api.problems import install_problem_handlers, refuse_unknown_parameters
 from service.runtime.asker import ASKER, Asker
 from service.settings.processes import HttpLimitSettings
 
@@ -21,28 +26,49 @@ LARGE = b"x" * 64 * 1024 * 1024
 """More than the buffers of a connection hold."""
 
 
+class Posted(BaseModel, extra="forbid"):
+    """Body of a request."""
+
+    text: str
+
+
 @dataclass
 class Application:
-    """Answers with the length of the body; some paths are slow or large."""
+    """Routes that take a body or none; some are slow or large."""
 
     n_asked: int = 0
     method: str = ""
     asker: Asker | None = None
     goes_on: asyncio.Event = field(default_factory=asyncio.Event)
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    def app(self) -> GuardedApi:
+        app = GuardedApi(Answers(), openapi_url=None)
+        install_problem_handlers(app)
+        checks = [OPEN, Depends(refuse_unknown_parameters)]
+        app.add_api_route("/", self.hello, dependencies=checks)
+        app.add_api_route("/", self.post, methods=["POST"], dependencies=checks)
+        app.add_api_route("/slow", self.slow, dependencies=checks)
+        app.add_api_route("/large", self.large, dependencies=checks)
+        app.require_declarations()
+        return app
+
+    async def hello(self, request: Request) -> Response:
+        self.n_asked, self.method = self.n_asked + 1, request.method
+        return Response("here")
+
+    async def post(self, posted: Posted) -> Response:
         self.n_asked += 1
-        self.method = scope["method"]
+        return Response(f"{len(posted.text)} characters")
+
+    async def slow(self) -> Response:
+        self.n_asked += 1
         self.asker = await asyncio.to_thread(ASKER.get)
-        message = await receive()
-        text = b"%d bytes" % len(message["body"])
-        if scope["path"] == "/slow":
-            await self.goes_on.wait()
-        if scope["path"] == "/large":
-            text = LARGE
-        headers = [(b"content-length", b"%d" % len(text))]
-        await send({"type": "http.response.start", "status": 200, "headers": headers})
-        await send({"type": "http.response.body", "body": text})
+        await self.goes_on.wait()
+        return Response("late")
+
+    async def large(self) -> Response:
+        self.n_asked += 1
+        return Response(LARGE)
 
 
 @dataclass
@@ -80,18 +106,14 @@ class Running:
     """A server under test."""
 
     app: Application
-    server: GuardedServer
+    server: HttpServer
     port: int
     clients: AsyncExitStack
-    now_s: float = 0.0
     serving: asyncio.Future[None] = field(default_factory=asyncio.Future)
 
     async def client(self) -> Client:
-        n_before = self.server.open.n_accepted
         reader, writer = await asyncio.open_connection("127.0.0.1", self.port)
         self.clients.callback(writer.close)
-        while self.server.open.n_accepted == n_before:
-            await asyncio.sleep(0)
         return Client(reader, writer)
 
     async def ask(self, target: str = "/", method: str = "GET", head: str = "") -> Client:
@@ -101,43 +123,27 @@ class Running:
 
     async def until(self, is_so: Callable[[], bool]) -> None:
         while not is_so():
-            await asyncio.sleep(0)
-
-    def connection(self) -> GuardedProtocol:
-        """The only connection there is."""
-        (only,) = self.server.open.all()
-        assert isinstance(only, GuardedProtocol)
-        return only
-
-    def pass_time(self, seconds: float) -> None:
-        """Let time pass for the server; it looks at its connections by itself too."""
-        self.server.open.sweep()
-        until_s = self.now_s + seconds
-        while self.now_s < until_s:
-            self.now_s = min(self.now_s + 0.5, until_s)
-            self.server.open.sweep()
+            await asyncio.sleep(0.001)
 
 
 Start = Callable[..., Awaitable[Running]]
 
 
 @asynccontextmanager
-async def running(limits: HttpLimitSettings, hosts: list[str]) -> AsyncIterator[Running]:
+async def running(limits: HttpLimitSettings, tls: ssl.SSLContext | None) -> AsyncIterator[Running]:
     app = Application()
     async with AsyncExitStack() as clients:
         listener = socket.create_server(("127.0.0.1", 0))
-        state = Running(app, None, listener.getsockname()[1], clients)  # type: ignore[arg-type]
-        config = GuardedConfig(app, limits, hosts, lambda: state.now_s)
-        state.server = GuardedServer(config)
-        state.serving = asyncio.create_task(state.server.serve([listener]))
-        while not state.server.started:
-            await asyncio.sleep(0)
+        server = http_server(app.app(), limits, [], tls=tls)
+        state = Running(app, server, listener.getsockname()[1], clients)
+        state.serving = asyncio.create_task(server.run_on(listener))
+        await state.until(lambda: server.started)
         try:
             async with asyncio.timeout(PATIENCE_S):
                 yield state
         finally:
             app.goes_on.set()
-            state.server.should_exit = True
+            server.should_exit = True
             await state.serving
 
 
@@ -146,9 +152,9 @@ async def start() -> AsyncIterator[Start]:
     """Starts a server with its own limits."""
     async with AsyncExitStack() as stack:
 
-        async def begin(hosts: list[str] | None = None, **limits: object) -> Running:
+        async def begin(tls: ssl.SSLContext | None = None, **limits: object) -> Running:
             settings = HttpLimitSettings.model_validate(limits)
-            return await stack.enter_async_context(running(settings, hosts or []))
+            return await stack.enter_async_context(running(settings, tls))
 
         yield begin
 

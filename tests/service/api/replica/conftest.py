@@ -9,9 +9,10 @@ import pytest
 from rigs.described import described_app
 
 from core.alarms.alarm import PLANT
-from service.app.serving_process import Replica
-from service.cluster.reported_commands import CommandWorker
-from service.cluster.reported_state import Reporter
+from service.app.replica_process import Replica
+from service.cluster.measuring_side import CommandWorker, Reporter
+from service.measuring.commands import CommandExecutor
+from service.measuring.snapshots import SnapshotBuilder
 from service.runtime.heartbeats import Heartbeats
 from service.settings.plant import PlantFile
 
@@ -46,9 +47,11 @@ def process_of(service: Any, plant: PlantFile, name: str) -> tuple[Reporter, Com
     held = [*(unit.id for unit in plant.unit), PLANT]
     parts = (service.alarms, service.films)
     store, clock = service.store, service.clock
+    builder = SnapshotBuilder(plant.unit, service.live, *parts, clock)
+    executor = CommandExecutor(*parts, service.live, service.recorder, store, clock)
     return (
-        Reporter(name, plant.unit, lambda: held, service.live, *parts, store.unit_states, clock),
-        CommandWorker(name, lambda: held, *parts, service.recorder, store, clock),
+        Reporter(name, lambda: held, builder, store.unit_states, clock),
+        CommandWorker(name, lambda: held, executor, store, clock),
     )
 
 
@@ -58,7 +61,7 @@ async def pair(running: Any, plant: PlantFile) -> AsyncIterator[Pair]:
     reporter, carrying_out = process_of(running, plant, "one")
     replica = Replica(plant, running.store, running.clock)
     await replica.start()
-    app = described_app(replica.context(running.context.access, None, Heartbeats(running.clock)))
+    app = described_app(replica.context(running.context.access, Heartbeats(running.clock)))
     transport = httpx2.ASGITransport(app)
     async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
         both = Pair(running, replica, client, reporter, carrying_out)

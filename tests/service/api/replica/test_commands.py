@@ -9,7 +9,7 @@ import pytest
 from harness.waiting import at_work
 
 from core.alarms.operation import Comment
-from service.cluster.reported_commands import WAIT_S, CommandClient
+from service.cluster.serving_side import WAIT_S, DatabaseOperators
 from service.live.commands import AlarmCommand, decoded, encoded
 from service.store.port import AlarmQuery
 from service.store.sharing import Answer, Command, CommandState
@@ -21,8 +21,8 @@ ANNA = {"actor": "A. Name"}
 @pytest.fixture
 async def answered(pair: Any, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Any]:
     """The process that analyses looks for commands; there is time enough by the set clock."""
-    monkeypatch.setattr("service.cluster.reported_commands.WAIT_S", 1e12)
-    monkeypatch.setattr("service.cluster.reported_commands.EXPIRES_S", 1e9)
+    monkeypatch.setattr("service.cluster.serving_side.WAIT_S", 1e12)
+    monkeypatch.setattr("service.cluster.serving_side.EXPIRES_S", 1e9)
     async with at_work(pair.carrying_out.run()):
         yield pair
 
@@ -44,7 +44,7 @@ async def post(pair: Any, action: str, **body: object) -> httpx2.Response:
 
 def ask_for_a_comment(pair: Any) -> Command:
     """Ask as a replica does, without waiting for an answer."""
-    asking = CommandClient(pair.service.store, pair.replica.alarms, pair.service.clock)
+    asking = DatabaseOperators(pair.service.store, pair.replica.live.alarms, pair.service.clock)
     command = asking._command("U1", AlarmCommand(LINK, Comment("anna", "seen")), "anna")
     pair.service.store.commands.ask(command)
     return command
@@ -65,9 +65,7 @@ def changes(pair: Any) -> list[str]:
     return [stored.event.change.value for stored in reversed(events)]
 
 
-async def test_what_is_asked_rightly_reaches_the_engine_and_the_disk_and_is_shown(
-    answered: Any,
-) -> None:
+async def test_what_is_asked_rightly_reaches_the_engine_and_the_disk_and_is_shown(answered):
     await raise_alarm(answered)
     wrong = await post(answered, "acknowledge", occurrence=7)
     path = "/api/v1/alarms/U1:nothing:link_lost/acknowledge"
@@ -83,12 +81,12 @@ async def test_what_is_asked_rightly_reaches_the_engine_and_the_disk_and_is_show
     (event,) = answered.service.store.alarm_events(AlarmQuery(alarm=LINK, limit=1))
     assert (event.event.change.value, event.event.actor) == ("acknowledged", "A. Name")
 
-    await post(answered, "shelve", duration_s=60.0, reason="maintenance")
+    await post(answered, "shelve", duration_s=7200.0, reason="maintenance")
     await answered.replica.feed.look()  # before the next report
     assert (await answered.json(f"/api/v1/alarms/{LINK}"))["state"] == "shelved"
 
 
-async def test_what_nobody_carries_out_is_said_and_not_carried_out_later(pair: Any) -> None:
+async def test_what_nobody_carries_out_is_said_and_not_carried_out_later(pair):
     await raise_alarm(pair)
     answer = await post(pair, "acknowledge", occurrence=1)
 
@@ -98,11 +96,9 @@ async def test_what_nobody_carries_out_is_said_and_not_carried_out_later(pair: A
     assert not pair.service.alarms.alarm(LINK).is_acknowledged
 
 
-async def test_a_command_whose_asker_was_killed_is_not_carried_out_late(
-    pair: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_a_command_whose_asker_was_killed_is_not_carried_out_late(pair, monkeypatch):
     await raise_alarm(pair)
-    monkeypatch.setattr(CommandClient, "_answer", _killed_in)
+    monkeypatch.setattr(DatabaseOperators, "_answer", _killed_in)
     with pytest.raises(KeyboardInterrupt):
         await post(pair, "acknowledge", occurrence=1)
     pair.pass_time(60.0)
@@ -112,9 +108,7 @@ async def test_a_command_whose_asker_was_killed_is_not_carried_out_late(
     assert pair.service.store.commands.open(["U1"]) == []
 
 
-async def test_a_process_killed_before_its_commit_leaves_the_command_to_the_next(
-    pair: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_a_process_killed_before_its_commit_leaves_the_command_to_the_next(pair, monkeypatch):
     await raise_alarm(pair)
     command = ask_for_a_comment(pair)
     with monkeypatch.context() as killed:
@@ -133,8 +127,8 @@ def _killed_in(*_: object) -> None:
 
 
 async def test_a_process_killed_after_its_commit_is_not_followed_by_a_second_time(
-    pair: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    pair, monkeypatch
+):
     await raise_alarm(pair)
     command = ask_for_a_comment(pair)
     await kill_after_commit(pair, monkeypatch)
@@ -145,9 +139,7 @@ async def test_a_process_killed_after_its_commit_is_not_followed_by_a_second_tim
 
 @pytest.mark.long
 @pytest.mark.planted("command answered apart from what it did")
-async def test_an_answer_apart_from_the_event_would_be_noticed(
-    pair: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_an_answer_apart_from_the_event_would_be_noticed(pair, monkeypatch):
     """The same with a planted bug: a command that is answered on its own comes twice."""
     await raise_alarm(pair)
     ask_for_a_comment(pair)
@@ -157,14 +149,12 @@ async def test_an_answer_apart_from_the_event_would_be_noticed(
     assert changes(pair).count("commented") == 2
 
 
-async def test_a_store_that_comes_back_late_is_told_of(
-    pair: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_a_store_that_comes_back_late_is_told_of(pair, monkeypatch):
     await raise_alarm(pair)
     monkeypatch.setattr(pair.service.alarms, "_put", lambda _: None)
     monkeypatch.setattr(pair.service.recorder, "stored", _never)
-    monkeypatch.setattr(CommandClient, "_give_up", _after(pair))
-    monkeypatch.setattr("service.cluster.reported_commands.EXPIRES_S", 1e6)  # time only steps here
+    monkeypatch.setattr(DatabaseOperators, "_give_up", _after(pair))
+    monkeypatch.setattr("service.cluster.serving_side.EXPIRES_S", 1e6)  # time only steps here
     async with at_work(pair.carrying_out.run()):
         answer = await post(pair, "acknowledge", occurrence=1)
 
@@ -174,9 +164,9 @@ async def test_a_store_that_comes_back_late_is_told_of(
 
 def _after(pair: Any) -> Any:
     """Give up, but not before the command was taken."""
-    give_up = CommandClient._give_up
+    give_up = DatabaseOperators._give_up
 
-    def late(self: CommandClient, command: Command, found: Answer) -> Answer:
+    def late(self: DatabaseOperators, command: Command, found: Answer) -> Answer:
         while not pair.service.store.commands.open(["U1"])[0].taken_by:
             pass
         return give_up(self, command, found)
@@ -188,7 +178,7 @@ async def _never() -> None:
     await asyncio.Event().wait()
 
 
-def test_every_command_is_read_as_it_was_written() -> None:
+def test_every_command_is_read_as_it_was_written():
     task = AlarmCommand(LINK, Comment("anna", "é\n\"'"))
 
     assert decoded(*encoded(task)) == task

@@ -14,18 +14,21 @@ from prometheus_client.parser import text_string_to_metric_families
 from rigs.blocks import with_quality
 
 from acquisition.clock import Clock, SystemClock
-from acquisition.delivery.blocks import sample_block
 from acquisition.errors import LinkError
 from acquisition.source import SampleSource
-from core.quality import Reason, bad
+from core.machine.unit import Estimator
+from core.monitor.assessment import Assessment
+from core.quality import Level, Quality, Reading, Reason, bad, missing
 from core.samples.blocks import DeviceClock, Rejection, SampleBlock
 from core.samples.gaps import SampleAccount
-from service.api.http.listening import listen
 from service.app.service import ServiceRun, run_service
+from service.live.status import LinkState
+from service.measuring.analyser import ASSESSMENTS
+from service.measuring.live_view import LiveView
 from service.measuring.simulated_sources import simulated_feed
 from service.measuring.sources import WatchedUnit, monitor_of
+from service.runtime.listening import listen
 from service.runtime.polls import TimedSource
-from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 
@@ -83,8 +86,8 @@ def plant_in(folder: Path) -> PlantFile:
 def scripted_blocks() -> list[SampleBlock]:
     """What unit U1 delivers: one block missing, one refused in part, one not good."""
     unit = load_plant_file(DEMO).unit[0]
-    feed, calibration = simulated_feed(unit, SystemClock()), calibration_of(unit)
-    found = [sample_block([feed.advance(BLOCK)], calibration) for _ in range(N_BLOCKS)]
+    feed = simulated_feed(unit, SystemClock())
+    found = [feed.advance(BLOCK) for _ in range(N_BLOCKS)]
     found[5] = replace(found[5], rejected=(Rejection("checksum", 100), Rejection("ÄÖÜ {}", 7)))
     flagged = (bad(Reason.SENSOR_FAILURE), *found[7].channel_quality[1:])
     found[7] = with_quality(found[7], flagged)
@@ -215,6 +218,7 @@ async def asked(client: httpx2.AsyncClient, folder: Path) -> Told:
 @pytest.fixture(scope="session")
 def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
     """What one service said, which has ended by now."""
+    ASSESSMENTS.clear()  # of services before
     return asyncio.run(told_by_a_service(tmp_path_factory.mktemp("metrics")))
 
 
@@ -227,3 +231,24 @@ def account() -> SampleAccount:
         n_gap=BLOCK - 107,
         rejected={"checksum": 100, "other": 7},
     )
+
+
+@pytest.fixture
+def live(assessment: Callable[..., Assessment], stepped_clock: Any) -> LiveView:
+    """A result of U1 with a stiffness in x, an uncertain one in y and a bad 1× amplitude."""
+    live = LiveView(["U1", "U2"], stepped_clock, 30.0)
+    live.set_link("U1", LinkState.CONNECTED)
+    found = assessment()
+    uncertain = Quality(Level.UNCERTAIN, Reason.POOR_FIT)
+    readings = {
+        **found.readings,
+        "stiffness_xx_n_per_m": Reading(1.5e9),
+        "stiffness_yy_n_per_m": Reading(1.25e9, uncertain),
+        "order1_shaft_x_um_pk": Reading(80.0),
+        "order1_shaft_y_um_pk": missing(Reason.SENSOR_FAILURE),
+        "eccentricity_ratio": Reading(0.3),
+        "oil_temperature_c": Reading(45.5),
+    }
+    estimators = {"xx": Estimator.DYNAMIC, "yy": Estimator.TRANSFER_ORDER1}
+    live.set_assessment(replace(found, readings=readings, estimators=estimators))
+    return live

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,9 +12,13 @@ import pytest
 import yaml
 from prometheus_client.metrics_core import Metric
 
-from service.cluster.consumer import consumer_metrics
-from service.cluster.replica_metrics import unit_metrics as replica_unit_metrics
-from service.live.live_view import LinkState
+from core.change.decision import Verdict
+from core.change.film_judge import FilmFinding, FilmNews
+from service.cluster.consumer import add_consumer
+from service.cluster.replica_metrics import REPORTS
+from service.live.metrics import add_films, add_units
+from service.measuring.live_view import LiveView
+from service.runtime.metrics import Families
 
 DEPLOY = Path(__file__).parents[4] / "deploy"
 DASHBOARD = json.loads((DEPLOY / "grafana" / "padwatch.json").read_text("utf-8"))
@@ -87,20 +91,25 @@ def check(expr: str, exposed: Exposed) -> tuple[set[str], set[str]]:
     return {name for name, _, _ in uses}, kept or known
 
 
-def of_several_processes() -> Iterator[Metric]:
-    """What `padwatch serve` and `padwatch analyse` tell besides, by their own functions."""
-    status = SimpleNamespace(state=LinkState.CONNECTED)
-    live = Mock(read_error=None, **{"status.return_value": status, "silence_s.return_value": 0.5})
-    yield from replica_unit_metrics(live, ["U1"])
+def of_several_processes(live: LiveView) -> Iterable[Metric]:
+    """What `padwatch serve` and `padwatch analyse` tell besides, and films that are judged."""
+    families = Families()
+    finding = FilmFinding(Verdict.NORMAL, change=0.01)
+    news = FilmNews(Mock(), (finding, finding), ())
+    add_units(families, live, {"U1": ["UJB"]})
+    add_films(families, live, lambda *_: news, {"U1": ["UJB"]})
+    families.declare(REPORTS)
+    families.add("unit_analysed", 1, unit="U1")
     unit = SimpleNamespace(behind_s=0.5, refused={}, n_repeated=0)
-    yield from consumer_metrics(Mock(trouble=None, n_pending={"U1": 3}, units={"U1": unit}))
+    add_consumer(families, Mock(trouble=None, n_pending={"U1": 3}, units={"U1": unit}))
+    return families.collect()
 
 
-@pytest.fixture(scope="module")
-def exposed(told: Any) -> Exposed:
+@pytest.fixture
+def exposed(told: Any, live: LiveView) -> Exposed:
     """All that a running service tells, once its results are on the disk, and what others do."""
     found: Exposed = {"up": ("gauge", {frozenset()})}  # by Prometheus itself
-    for family in (*told.plain.families.values(), *of_several_processes()):
+    for family in (*told.plain.families.values(), *of_several_processes(live)):
         for sample in family.samples:
             is_gauge = family.type == "gauge"
             _, sets = found.setdefault(sample.name, ("gauge" if is_gauge else "counter", set()))
@@ -108,7 +117,7 @@ def exposed(told: Any) -> Exposed:
     return found
 
 
-def test_the_dashboard_asks_only_for_what_is_told(exposed: Exposed) -> None:
+def test_the_dashboard_asks_only_for_what_is_told(exposed):
     asked = set()
     for panel in DASHBOARD["panels"]:
         for target in panel.get("targets", ()):
@@ -120,7 +129,7 @@ def test_the_dashboard_asks_only_for_what_is_told(exposed: Exposed) -> None:
     assert len(own) > 30
 
 
-def test_choices_of_the_dashboard_are_labels_that_are_told(exposed: Exposed) -> None:
+def test_choices_of_the_dashboard_are_labels_that_are_told(exposed):
     choices = {choice["name"]: choice for choice in DASHBOARD["templating"]["list"]}
     for name, choice in choices.items():
         if choice["type"] == "query":
@@ -132,7 +141,7 @@ def test_choices_of_the_dashboard_are_labels_that_are_told(exposed: Exposed) -> 
     assert used - {"__rate_interval"} == set(choices)
 
 
-def test_the_dashboard_fits_together() -> None:
+def test_the_dashboard_fits_together():
     panels = DASHBOARD["panels"]
 
     assert len({panel["id"] for panel in panels}) == len(panels)
@@ -147,7 +156,7 @@ def test_the_dashboard_fits_together() -> None:
         assert panel["type"] == "row" or panel["description"].endswith(".")
 
 
-def test_alert_rules_ask_only_for_what_is_told(exposed: Exposed) -> None:
+def test_alert_rules_ask_only_for_what_is_told(exposed):
     assert set(GROUPS) == {"groups"}
     assert len({rule["alert"] for rule in RULES}) == len(RULES)
     for rule in RULES:
@@ -161,7 +170,7 @@ def test_alert_rules_ask_only_for_what_is_told(exposed: Exposed) -> None:
         assert set(re.findall(r"\$labels\.(\w+)", words)) <= labels, rule["alert"]
 
 
-def test_a_link_without_results_is_an_alert(exposed: Exposed) -> None:
+def test_a_link_without_results_is_an_alert(exposed):
     [silent] = [rule for rule in RULES if rule["alert"] == "PadwatchSilentHealthy"]
 
     names, _ = check(silent["expr"], exposed)
@@ -187,7 +196,7 @@ WRONG = (
 )
 
 
-def test_a_wrong_expression_is_noticed(exposed: Exposed) -> None:
+def test_a_wrong_expression_is_noticed(exposed):
     for expr in WRONG:
         with pytest.raises(AssertionError):
             check(expr, exposed)

@@ -1,64 +1,61 @@
-"""Durations are counted where they belong."""
+"""Durations are counted where they belong, and alarms and films as they were judged."""
 
 import asyncio
-from collections.abc import AsyncIterator
+import math
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from typing import Any
 from unittest.mock import Mock
 
 import pytest
+from prometheus_client.registry import Collector
 
 from acquisition.clock import Clock
+from core.alarms.operation import Shelve
+from core.alarms.rules import UnitRules
+from core.alarms.unit_alarms import UnitAlarms
+from core.change.decision import Verdict
+from core.change.film_judge import FilmFinding, FilmNews
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Estimator, Unit
 from core.samples.blocks import SampleBlock
+from service.live.metrics import add_alarms, add_films, add_units
+from service.live.receivers import ReceiverStatus
+from service.live.status import LinkState
+from service.measuring.alarm_engine import AlarmEngine
+from service.measuring.analyser import ASSESSMENTS, timed
+from service.measuring.live_view import LiveView
 from service.measuring.metrics import MAX_REASONS, bounded
-from service.measuring.timings import Timings
+from service.notifications.metrics import add_deliveries
+from service.notifications.sender import ReceiverView, SenderStatus
 from service.runtime.heartbeats import Pulse
-from service.runtime.metrics import Durations
+from service.runtime.metrics import Families
 from service.runtime.polls import PollClock, TimedSource
+from service.store.outbox import Backlog
 
 
-def test_a_bound_belongs_to_its_bucket_and_nothing_is_left_out(stepped_clock: Any) -> None:
-    durations = Durations((0.1, 0.2), stepped_clock)
-    for duration_s in (0.0, 0.1, 0.15, 0.2, 7.0):
-        durations.observe(duration_s)
-
-    seen = durations.state()
-
-    assert seen.n_up_to == (2, 4, 5)
-    assert seen.sum_s == pytest.approx(7.45)
+def counted(histogram: Collector) -> dict[str, float]:
+    """Number and sum of what a histogram without labels, or with one set of them, has counted."""
+    [family] = histogram.collect()
+    return {sample.name.rpartition("_")[2]: sample.value for sample in family.samples}
 
 
-def test_what_fails_is_not_timed(stepped_clock: Any) -> None:
-    durations = Durations((0.1,), stepped_clock)
-    with pytest.raises(OSError, match="full"), durations.timed():
-        raise OSError("full")
-    with durations.timed():
-        stepped_clock.step(3.0)
+def test_the_time_between_two_results_belongs_to_neither(stepped_clock):
+    def results() -> Iterator[Any]:
+        for _ in range(3):
+            stepped_clock.step(0.1)
+            yield None
 
-    assert durations.state().n_up_to == (0, 1)
-    assert durations.state().sum_s == 3.0
-
-
-@pytest.mark.parametrize("bounds", [(), (0.2, 0.1), (0.1, 0.1)])
-def test_bounds_that_do_not_rise_are_refused(bounds: tuple[float, ...], stepped_clock: Any) -> None:
-    with pytest.raises(ValueError, match="must increase"):
-        Durations(bounds, stepped_clock)
-
-
-def test_the_time_between_two_results_belongs_to_neither(stepped_clock: Any) -> None:
-    timings = Timings(["U1"], stepped_clock)
-    for _ in range(3):
-        began_s = timings.begin()
-        stepped_clock.step(0.1)
-        timings.assessed("U1", began_s)
+    ASSESSMENTS.clear()
+    for _ in timed(results(), "U1", stepped_clock.monotonic_s):
         stepped_clock.step(5.0)
 
-    seen = timings.assessments["U1"].state()
-    assert seen.n_up_to[-1] == 3
-    assert seen.sum_s == pytest.approx(0.3)
+    seen = counted(ASSESSMENTS)
+    assert seen["count"] == 3.0
+    assert seen["sum"] == pytest.approx(0.3)
 
 
-async def test_a_poll_is_what_lies_between_two_waits_of_one_task(stepped_clock: Any) -> None:
+async def test_a_poll_is_what_lies_between_two_waits_of_one_task(stepped_clock):
     polls = PollClock(stepped_clock)
 
     async def poll(n_times: int, duration_s: float) -> None:
@@ -70,12 +67,15 @@ async def test_a_poll_is_what_lies_between_two_waits_of_one_task(stepped_clock: 
     await asyncio.create_task(poll(4, 0.25))
     await asyncio.create_task(poll(2, 0.5))
 
-    seen = polls.polls.state()
-    assert seen.n_up_to[-1] == 6
-    assert seen.sum_s == pytest.approx(4 * 0.25 + 2 * 0.5)
+    seen = counted(polls.polls)
+    assert seen["count"] == 6.0
+    assert seen["sum"] == pytest.approx(4 * 0.25 + 2 * 0.5)
+    assert polls.statistics is not None
+    assert (polls.statistics.n, polls.statistics.newest_s) == (6, 0.5)
+    assert polls.statistics.mean_s == pytest.approx(2.0 / 6)
 
 
-def test_however_many_reasons_there_are_labels_stay_few() -> None:
+def test_however_many_reasons_there_are_labels_stay_few():
     rejected = {f"reason_{number}": 1 for number in range(1000)} | {"a text, not a word": 5}
 
     counts = bounded(rejected)
@@ -84,7 +84,7 @@ def test_however_many_reasons_there_are_labels_stay_few() -> None:
     assert sum(counts.values()) == 1005
 
 
-async def test_a_source_that_is_connected_again_begins_anew(stepped_clock: Any) -> None:
+async def test_a_source_that_is_connected_again_begins_anew(stepped_clock):
     class Device:
         def __init__(self, own: Clock) -> None:
             self._own = own
@@ -106,11 +106,12 @@ async def test_a_source_that_is_connected_again_begins_anew(stepped_clock: Any) 
             assert [block async for block in blocks] == []
         stepped_clock.step(3600.0)  # without a link, which is no poll
 
-    assert source.polls.state().n_up_to[-1] == 4
-    assert source.polls.state().sum_s == pytest.approx(4 * 0.25)
+    seen = counted(source.polls)
+    assert seen["count"] == 4.0
+    assert seen["sum"] == pytest.approx(4 * 0.25)
 
 
-async def test_a_driver_may_look_at_the_clock_in_a_thread_of_its_own(stepped_clock: Any) -> None:
+async def test_a_driver_may_look_at_the_clock_in_a_thread_of_its_own(stepped_clock):
     """As that of a CAN bus does; it says nothing of the task that reads the source."""
     pulse = Mock(spec=Pulse)
     polls = PollClock(stepped_clock)
@@ -119,3 +120,147 @@ async def test_a_driver_may_look_at_the_clock_in_a_thread_of_its_own(stepped_clo
     pulse.beat.assert_not_called()
     polls.monotonic_s()
     pulse.beat.assert_called_once_with(0.0)
+
+
+HOUR_NS = 3_600_000_000_000
+NOW_NS = 1_000 * HOUR_NS
+
+
+def of(add: Callable[..., None], name: str, *parts: Any) -> dict[tuple[str, ...], float]:
+    """What is not zero in the families that a function adds, by values of labels."""
+    metrics = Families()
+    add(metrics, *parts)
+    return {
+        tuple(sample.labels.values()): sample.value
+        for family in metrics.collect()
+        for sample in family.samples
+        if sample.name == f"padwatch_{name}" and sample.value
+    }
+
+
+def unit_named(name: str) -> Unit:
+    channels = tuple(Channel(id_, Measurand.DISPLACEMENT_UM) for id_ in ("sx", "sy", "bx", "by"))
+    bearing = Bearing("UJB", 1.18e9, "sx", "sy", "bx", "by", 200.0, (2000.0, 2000.0))
+    return Unit(name, 60.0, 100.0, channels, (bearing,))
+
+
+def test_an_alarm_counts_while_it_is_active_and_not_hidden(stepped_clock):
+    boards = {name: UnitAlarms(unit_named(name), UnitRules()) for name in ("U1", "U2", "U9")}
+    engine = AlarmEngine(boards, lambda _: None, stepped_clock)
+    units = ("U1", "U2")  # U9 is in the plant file no longer
+
+    assert of(add_alarms, "alarms_active", engine, units) == {}
+
+    for name in ("U1", "U9"):
+        engine.link(name, is_connected=False, reason="nobody answers")
+    stepped_clock.step(60.0)
+    engine.tick()
+    found = of(add_alarms, "alarms_active", engine, units)
+    assert found == {("U1", "alert"): 1.0, ("plant", "alert"): 1.0}
+    assert of(add_alarms, "alarms_unacknowledged", engine, units) == {(): 2.0}
+
+    engine.operate(
+        "U1:link:link_lost", Shelve("Ada", "new switch", stepped_clock.now_ns() + HOUR_NS)
+    )
+    found = of(add_alarms, "alarms_active", engine, units)
+    assert found == {("plant", "alert"): 1.0}
+    assert of(add_alarms, "alarms_hidden", engine, units) == {(): 1.0}
+
+
+def said(*findings: FilmFinding) -> FilmNews:
+    x, y = findings
+    reading: Any = None
+    decisions: Any = ()
+    return FilmNews(reading, (x, y), decisions)
+
+
+BEARINGS = {"U1": ["UJB", "LJB"], "U2": ["UJB"]}
+
+
+def test_films_count_under_the_word_that_was_said_last(stepped_clock):
+    newest = {
+        ("U1", "UJB"): said(FilmFinding(Verdict.NORMAL), FilmFinding(Verdict.DANGER)),
+        ("U1", "LJB"): said(FilmFinding(Verdict.NORMAL), FilmFinding(Verdict.NO_BASELINE)),
+    }
+    live = LiveView(BEARINGS, stepped_clock, 30.0)
+    films = Families()
+    add_films(films, live, lambda unit, bearing: newest.get((unit, bearing)), BEARINGS)
+
+    found = {
+        (sample.labels["unit"], sample.labels["verdict"]): sample.value
+        for family in films.collect()
+        for sample in family.samples
+    }
+    assert {labels: n for labels, n in found.items() if n} == {
+        ("U1", "normal"): 2.0,
+        ("U1", "danger"): 1.0,
+        ("U1", "no_baseline"): 1.0,
+    }
+    assert len(found) == len(BEARINGS) * len(Verdict)  # every word, from the start on
+
+
+def test_values_of_a_film_are_told_with_their_quality_and_bad_ones_left_out(live):
+    parts = (live, BEARINGS)
+    stiffness = of(add_units, "film_stiffness_newtons_per_meter", *parts)
+    amplitudes = of(add_units, "order1_pk_meters", *parts)
+
+    assert stiffness == {
+        ("good", "U1", "UJB", "x", "dynamic"): 1.5e9,
+        ("uncertain", "U1", "UJB", "y", Estimator.TRANSFER_ORDER1.value): 1.25e9,
+    }
+    assert amplitudes["good", "U1", "UJB", "shaft_x"] == pytest.approx(80e-6)
+    assert ("U1", "UJB", "shaft_y") not in {labels[1:] for labels in amplitudes}
+    assert of(add_units, "eccentricity_ratio", *parts) == {("good", "U1", "UJB"): 0.3}
+    assert of(add_units, "oil_temperature_celsius", *parts) == {("good", "U1", "UJB"): 45.5}
+
+
+def test_a_change_is_told_of_judged_films_as_a_ratio(live):
+    judged = FilmFinding(Verdict.ALERT, change=math.log(0.8))
+    silent = FilmFinding(Verdict.TRANSIENT, change=math.log(0.5))
+
+    found = of(add_films, "film_stiffness_ratio", live, lambda *_: said(judged, silent), BEARINGS)
+
+    assert found == {("U1", "UJB", "x"): pytest.approx(0.8)}
+
+
+@pytest.mark.parametrize("outdate", ["stale", "lost"])
+def test_nothing_of_a_film_is_told_once_its_result_is_out_of_date(live, stepped_clock, outdate):
+    if outdate == "stale":
+        stepped_clock.step(31.0)
+    else:
+        live.set_link("U1", LinkState.NOT_CONNECTED, "nobody answers")
+    news = said(*[FilmFinding(Verdict.NORMAL, change=0.01)] * 2)
+
+    for name in ("film_stiffness_newtons_per_meter", "order1_pk_meters", "eccentricity_ratio"):
+        assert of(add_units, name, live, BEARINGS) == {}
+    assert of(add_films, "film_stiffness_ratio", live, lambda *_: news, BEARINGS) == {}
+
+
+def test_recipients_of_one_mail_are_added_up_and_never_named():
+    """Two recipients of one mail, and a webhook that is in the plant file no longer."""
+
+    def view(name: str, n_waiting: int, hours: int | None, n_dead: int) -> ReceiverView:
+        oldest_ns = None if hours is None else NOW_NS - hours * HOUR_NS
+        return ReceiverView(
+            name,
+            ReceiverStatus(name, "mail", "", SenderStatus(n_failures=n_waiting)),
+            Backlog(name, n_waiting, oldest_ns, n_dead, None, None),
+        )
+
+    gone = ReceiverView("old-hook", None, Backlog("old-hook", 9, 0, 9, None, None))
+    views = [
+        view("shift:a@plant.example", 2, 3, 1),
+        view("shift:b@plant.example", 0, None, 4),
+        gone,
+    ]
+
+    def found(name: str) -> dict[tuple[str, ...], float]:
+        return of(add_deliveries, name, views, NOW_NS)
+
+    assert found("delivery_waiting_messages") == {("shift",): 2.0}
+    assert found("delivery_dead_messages") == {("shift",): 5.0}
+    assert found("delivery_failed_attempts") == {("shift",): 2.0}
+    assert found("delivery_wait_seconds") == {("shift",): 3 * 3600.0}
+    families = Families()
+    add_deliveries(families, views, NOW_NS)
+    assert b"@" not in families.text

@@ -11,8 +11,9 @@ import pytest
 from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock
 from service.app.process import Supervision
-from service.live.live_view import LinkState, LiveView
+from service.live.status import LinkState
 from service.measuring.acquirer import Acquirer
+from service.measuring.live_view import LiveView
 from service.measuring.sources import WatchedUnit
 from service.runtime.heartbeats import PATIENCE_S, Heartbeats
 from service.runtime.polls import TimedSource
@@ -78,9 +79,7 @@ async def plant(manager_socket: Any, stepped_clock: Any) -> AsyncIterator[Plant]
     await asyncio.wait([plant.running])
 
 
-async def test_devices_that_are_read_or_away_keep_the_watchdog_fed(
-    plant: Plant, manager_socket: Any
-) -> None:
+async def test_devices_that_are_read_or_away_keep_the_watchdog_fed(plant, manager_socket):
     for is_away in (False, True, False):
         plant.devices["U2"].is_away = is_away
         await plant.gates.pass_s(2 * PATIENCE_S)
@@ -91,9 +90,7 @@ async def test_devices_that_are_read_or_away_keep_the_watchdog_fed(
     assert [message.get("WATCHDOG") for message in manager_socket.received] == ["1"] * 3
 
 
-async def test_a_reader_that_hangs_is_named_and_starves_the_watchdog(
-    plant: Plant, manager_socket: Any
-) -> None:
+async def test_a_reader_that_hangs_is_named_and_starves_the_watchdog(plant, manager_socket):
     await plant.gates.pass_s(3.0)
     plant.devices["U2"].hangs = True
     await plant.gates.pass_s(PATIENCE_S + 3.0)
@@ -105,9 +102,7 @@ async def test_a_reader_that_hangs_is_named_and_starves_the_watchdog(
     assert told["STATUS"].startswith("acquire U2 stuck")
 
 
-async def test_a_reader_that_ends_without_an_error_is_dead_not_forgotten(
-    plant: Plant, manager_socket: Any
-) -> None:
+async def test_a_reader_that_ends_without_an_error_is_dead_not_forgotten(plant, manager_socket):
     await plant.gates.pass_s(3.0)
     plant.devices["U1"].is_broken = True
     await plant.gates.pass_s(3.0)

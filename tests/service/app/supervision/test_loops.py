@@ -1,17 +1,19 @@
-"""Each loop is heard of: one that is dead or stuck is named and starves the watchdog."""
+"""Each loop is heard of, and what reaches a service manager's socket."""
 
 import asyncio
+import os
 import socket
-from pathlib import Path
 from typing import Any
 
 import httpx2
 import pytest
+import structlog
 
 from acquisition.clock import SystemClock
 from service.app.process import Supervision
 from service.app.service import ServiceRun, run_service
-from service.live.live_view import LinkState, LiveView
+from service.live.status import LinkState
+from service.measuring.live_view import LiveView
 from service.measuring.sources import live_units
 from service.runtime.heartbeats import PATIENCE_S, Heartbeats, Pulse
 from service.runtime.service_manager import ServiceManager
@@ -66,9 +68,7 @@ async def program(manager_socket: Any, stepped_clock: Any) -> Any:
     await asyncio.wait(program.tasks)
 
 
-async def test_a_manager_hears_how_the_service_begins_and_ends(
-    program: Any, manager_socket: Any
-) -> None:
+async def test_a_manager_hears_how_the_service_begins_and_ends(program, manager_socket):
     program.supervision.ready()
     program.supervision.stopping()
 
@@ -78,9 +78,7 @@ async def test_a_manager_hears_how_the_service_begins_and_ends(
     ]
 
 
-async def test_the_watchdog_is_fed_while_every_loop_is_alive(
-    program: Any, manager_socket: Any
-) -> None:
+async def test_the_watchdog_is_fed_while_every_loop_is_alive(program, manager_socket):
     for _ in range(5):
         program.clock.step(0.9 * PATIENCE_S)
         for loop in program.loops.values():
@@ -92,8 +90,8 @@ async def test_the_watchdog_is_fed_while_every_loop_is_alive(
 
 
 async def test_a_stuck_loop_is_named_and_starves_the_watchdog_until_it_goes_on(
-    program: Any, manager_socket: Any
-) -> None:
+    program, manager_socket
+):
     program.clock.step(PATIENCE_S + 1.0)
     await program.loops["alarms"].go_on()
     program.supervision.look()
@@ -109,8 +107,8 @@ async def test_a_stuck_loop_is_named_and_starves_the_watchdog_until_it_goes_on(
 
 
 async def test_a_loop_that_has_ended_is_dead_however_lately_it_beat_unless_its_work_is_done(
-    program: Any, manager_socket: Any
-) -> None:
+    program, manager_socket
+):
     program.loops["record"].ends = True
     await program.loops["record"].go_on()
     program.supervision.look()
@@ -122,7 +120,7 @@ async def test_a_loop_that_has_ended_is_dead_however_lately_it_beat_unless_its_w
     assert program.beats.look() == {"alarms": None}
 
 
-async def test_a_loop_may_be_silent_for_as_long_as_it_has_said(stepped_clock: Any) -> None:
+async def test_a_loop_may_be_silent_for_as_long_as_it_has_said(stepped_clock):
     beats = Heartbeats(stepped_clock)
 
     async def learn(pulse: Pulse) -> None:
@@ -148,7 +146,7 @@ async def test_a_loop_may_be_silent_for_as_long_as_it_has_said(stepped_clock: An
     await asyncio.wait(tasks)
 
 
-async def test_a_blocked_event_loop_feeds_nothing(program: Any, manager_socket: Any) -> None:
+async def test_a_blocked_event_loop_feeds_nothing(program, manager_socket):
     gates, manager = Gates(program.clock), ServiceManager(manager_socket.environment)
     supervision = Supervision(manager, program.beats, program.live, ["U1", "U2"], gates)
     running = asyncio.create_task(supervision.run())
@@ -168,6 +166,7 @@ async def test_a_blocked_event_loop_feeds_nothing(program: Any, manager_socket: 
 
 
 NOT_LOOPS = {
+    "report",  # of the connection to the serving process, which "serve" holds
     "run",  # only holds those that are: its end is theirs
     "announce",  # ends by itself once the server answers
     "supervise",  # whoever listens to all others; the watchdog listens to it
@@ -188,9 +187,7 @@ async def _lasting(tasks: set[asyncio.Task[Any]]) -> set[str]:
     return {task.get_name() for task in named} | {str(task.get_coro()) for task in left}
 
 
-async def test_every_task_of_the_program_has_a_pulse(
-    tmp_path: Path, plant_text: str, monkeypatch: Any
-) -> None:
+async def test_every_task_of_the_program_has_a_pulse(tmp_path, plant_text, monkeypatch):
     plant = tmp_path / "plant.toml"
     text = plant_text.replace("var/demo", str(tmp_path / "data")).replace("port = 0", "port = 1")
     plant.write_text(text, encoding="utf-8")
@@ -211,6 +208,7 @@ async def test_every_task_of_the_program_has_a_pulse(
     names = await _lasting(asyncio.all_tasks() - before)
     stopped.set()
     await asyncio.wait_for(service, 60)
+    listener.close()
 
     heard = {
         name.removeprefix("loop ") for name in answer.json()["checks"] if name.startswith("loop ")
@@ -218,6 +216,75 @@ async def test_every_task_of_the_program_has_a_pulse(
     assert answer.status_code == 200, answer.text
     assert names - NOT_LOOPS <= heard
     assert heard <= names
-    assert {"acquire U1", "acquire U2", "analyse", "record", "alarms", "load", "serve"} <= heard
+    assert {"acquire U1", "acquire U2", "analyse", "record", "alarms", "serve"} <= heard
     assert "references" in heard
-    assert (nested.status_code, foreign.status_code) == (400, 421)  # its guards are in their places
+    assert (nested.status_code, foreign.status_code) == (413, 421)  # its guards are in their places
+
+
+@pytest.mark.parametrize("manager_socket", ["", "\0"], ids=["path", "abstract"], indirect=True)
+def test_a_manager_hears_what_it_is_told_without_line_breaks(manager_socket):
+    manager = ServiceManager(manager_socket.environment)
+
+    manager.notify(READY="1", STATUS="all well\nWATCHDOG=trigger")
+
+    assert manager.listens
+    assert manager.watchdog_s == 10.0
+    assert manager_socket.received == [{"READY": "1", "STATUS": "all well WATCHDOG=trigger"}]
+
+
+def test_without_a_socket_nobody_is_told(monkeypatch):
+    def refuse(*_: object) -> None:
+        raise AssertionError("a socket was opened")
+
+    monkeypatch.setattr(socket, "socket", refuse)
+    manager = ServiceManager({"WATCHDOG_USEC": "10000000"})
+    manager.notify(READY="1")
+
+    assert not manager.listens
+    assert manager.watchdog_s is None
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"WATCHDOG_USEC": "soon"},
+        {"WATCHDOG_USEC": "0"},
+        {"WATCHDOG_USEC": "-5"},
+        {"WATCHDOG_USEC": "10000000", "WATCHDOG_PID": str(os.getpid() + 1)},
+    ],
+)
+def test_a_watchdog_that_is_not_for_this_process_is_not_fed(given):
+    assert ServiceManager({"NOTIFY_SOCKET": "@x", **given}).watchdog_s is None
+
+
+@pytest.mark.parametrize("address", ["relative/path", "vsock:2:1234"])
+def test_an_address_of_another_kind_is_not_used(address):
+    with structlog.testing.capture_logs() as said:
+        manager = ServiceManager({"NOTIFY_SOCKET": address})
+        manager.notify(READY="1")
+
+    assert not manager.listens
+    assert [entry["value"] for entry in said] == [address]
+
+
+def test_a_manager_that_is_gone_is_logged_once_and_stops_nothing(tmp_path):
+    manager = ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "gone")})
+
+    with structlog.testing.capture_logs() as said:
+        manager.notify(WATCHDOG="1")
+        manager.notify(WATCHDOG="1")
+
+    assert [entry["event"] for entry in said] == ["the service manager cannot be reached"]
+
+
+def test_a_manager_that_does_not_read_never_makes_the_service_wait(manager_socket):
+    manager = ServiceManager(manager_socket.environment)
+
+    with structlog.testing.capture_logs() as said:
+        for _ in range(100_000):
+            manager.notify(WATCHDOG="1")
+            if said:
+                break
+
+    assert [entry["event"] for entry in said] == ["the service manager cannot be reached"]
+    assert manager_socket.received

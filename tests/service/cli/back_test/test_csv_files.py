@@ -1,6 +1,5 @@
 """CSV files of readings: what is taken, and what is refused with the line."""
 
-from collections.abc import Callable
 from io import BytesIO
 from typing import Any
 
@@ -9,9 +8,6 @@ import pytest
 from service.cli.offline import backtest_tables as csv_lines
 from service.cli.offline.backtest_cells import ReadingsError
 from service.cli.offline.backtest_tables import csv_batches
-
-Text = Callable[..., str]
-Line = Callable[..., str]
 
 
 def read(content: str | bytes) -> list[dict[str, Any]]:
@@ -25,9 +21,7 @@ def refusal(content: str | bytes) -> str:
     return str(refused.value)
 
 
-def test_times_with_any_offset_or_in_whole_nanoseconds_are_the_same_moment(
-    text: Text, line: Line
-) -> None:
+def test_times_with_any_offset_or_in_whole_nanoseconds_are_the_same_moment(text, line):
     rows = read(
         text(
             line(0, time="2025-03-01T08:00:00Z"),
@@ -48,21 +42,17 @@ def test_times_with_any_offset_or_in_whole_nanoseconds_are_the_same_moment(
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 @pytest.mark.parametrize("begin", ["", "\ufeff"])
-def test_a_spreadsheet_s_line_ends_mark_and_quotes_do_not_matter(
-    text: Text, end: str, begin: str
-) -> None:
+def test_a_spreadsheet_s_line_ends_mark_and_quotes_do_not_matter(text, end, begin):
     assert read(begin + text().replace("\n", end).replace("U1", '"U1"')) == read(text())
 
 
-def test_empty_lines_are_no_rows_and_empty_cells_no_numbers(text: Text, line: Line) -> None:
+def test_empty_lines_are_no_rows_and_empty_cells_no_numbers(text, line):
     rows = read("\n" + text("", "", line(200, k_n_per_m="", quality="bad")))
     assert [row["line"] for row in rows] == [*range(3, 13), 15]
     assert rows[-1]["k_n_per_m"] != rows[-1]["k_n_per_m"]
 
 
-def test_pieces_of_a_file_number_their_lines_on(
-    text: Text, line: Line, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pieces_of_a_file_number_their_lines_on(text, line, monkeypatch):
     monkeypatch.setattr(csv_lines, "CHUNK_BYTES", 200)
     lines = [line(100 + n) for n in range(30)]
     assert [row["line"] for row in read(text(*lines))] == list(range(2, 42))
@@ -87,15 +77,11 @@ def test_pieces_of_a_file_number_their_lines_on(
         ({"unit": "U" * 20_000}, "line 12: the line is longer than 16384 bytes"),
     ],
 )
-def test_a_wrong_cell_is_named_with_its_line(
-    text: Text, line: Line, changes: dict[str, str], says: str
-) -> None:
+def test_a_wrong_cell_is_named_with_its_line(text, line, changes, says):
     assert refusal(text(line(100, **changes), line(110))).startswith(says)
 
 
-def test_ten_lines_are_named_the_others_counted_and_other_encodings_refused(
-    text: Text, line: Line
-) -> None:
+def test_ten_lines_are_named_the_others_counted_and_other_encodings_refused(text, line):
     assert refusal(text()[:-20]) == "line 11: expected 10 columns, got 8"  # cut off
     said = refusal(text(*(line(n, u_random="x") for n in range(100, 120))))
     assert "line 21: u_random is not a number: 'x'; and 10 more" in said
@@ -117,11 +103,11 @@ def test_ten_lines_are_named_the_others_counted_and_other_encodings_refused(
         ("time", '"time', "line 1: a quote is not closed"),
     ],
 )
-def test_wrong_headings_are_named(text: Text, old: str, new: str, says: str) -> None:
+def test_wrong_headings_are_named(text, old, new, says):
     assert says in refusal(text().replace(old, new, -1 if old == "," else 1))
 
 
-def test_a_file_without_rows_a_huge_heading_and_a_line_without_end_are_refused() -> None:
+def test_a_file_without_rows_a_huge_heading_and_a_line_without_end_are_refused():
     assert refusal(b"") == refusal(b"\n\r\n") == "the file is empty; expected a heading"
     assert refusal(",".join(f"c{n}" for n in range(1_000_000))) == (
         "line 1: the line is longer than 16384 bytes"

@@ -124,15 +124,13 @@ def plant(tmp_path: Path, server: NatsServer) -> PlantFile:
     return load_plant_file(written_plant(tmp_path, server))
 
 
-async def test_a_block_is_acknowledged_after_its_results_are_stored(
-    plant: PlantFile, server: NatsServer
-) -> None:
+async def test_a_block_is_acknowledged_after_its_results_are_stored(plant, server):
     await check_acknowledging(plant, server)
 
 
 async def test_of_what_is_delivered_again_what_is_stored_is_acknowledged_again(
-    plant: PlantFile, server: NatsServer, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    plant, server, monkeypatch
+):
     ack, lost = Msg.ack, []
 
     async def lossy(message: Msg) -> None:
@@ -149,9 +147,7 @@ async def test_of_what_is_delivered_again_what_is_stored_is_acknowledged_again(
     assert len(lost) == 5
 
 
-async def test_a_message_that_cannot_be_used_is_an_alarm_of_its_unit_that_says_why(
-    plant: PlantFile, server: NatsServer
-) -> None:
+async def test_a_message_that_cannot_be_used_is_an_alarm_of_its_unit_that_says_why(plant, server):
     await publish(plant)
     client = await nats.connect(server.url)
     await client.jetstream().publish(subject(plant, UNIT), b"no block of ours")
@@ -170,9 +166,7 @@ async def test_a_message_that_cannot_be_used_is_an_alarm_of_its_unit_that_says_w
     assert reason
 
 
-async def test_a_unit_is_known_to_have_blocks_that_wait_while_nothing_can_be_stored(
-    plant: PlantFile, server: NatsServer
-) -> None:
+async def test_a_unit_is_known_to_have_blocks_that_wait_while_nothing_can_be_stored(plant, server):
     async with looking(plant, server) as look, analysing(plant) as (process, _):
         await until(lambda: _is(process._consumer is not None))
         consumer = process._consumer
@@ -186,9 +180,7 @@ async def test_a_unit_is_known_to_have_blocks_that_wait_while_nothing_can_be_sto
 
 @pytest.mark.long
 @pytest.mark.planted("acknowledged before the commit")
-async def test_who_acknowledges_before_the_commit_is_caught(
-    plant: PlantFile, server: NatsServer, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_who_acknowledges_before_the_commit_is_caught(plant, server, monkeypatch):
     async def at_once(*_: object) -> None:
         """Wait for nothing."""
 
@@ -232,12 +224,8 @@ BUG = (pytest.mark.long, pytest.mark.planted("position stored apart from its res
     [pytest.param(False, id="as it is"), pytest.param(True, marks=BUG, id="planted bug")],
 )
 async def test_a_position_that_is_not_stored_with_its_results_is_caught(
-    plant: PlantFile,
-    server: NatsServer,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    position_apart: bool,
-) -> None:
+    plant, server, tmp_path, monkeypatch, position_apart
+):
     await publish(plant)
     database = tmp_path / "plant" / "padwatch.sqlite3"
     with monkeypatch.context() as patched:
@@ -264,8 +252,8 @@ async def publish_stretch(plant: PlantFile, first: int, last: int) -> None:
 
 @pytest.mark.timeout(300)
 async def test_results_are_those_of_a_single_process_through_kills_of_the_analysis_and_of_nats(
-    tmp_path: Path, server: NatsServer
-) -> None:
+    tmp_path, server
+):
     plant_file = written_plant(tmp_path, server)
     plant = load_plant_file(plant_file)
     database = tmp_path / "plant" / "padwatch.sqlite3"

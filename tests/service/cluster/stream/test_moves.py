@@ -24,7 +24,7 @@ from core.samples.blocks import Rejection, SampleBlock
 from core.samples.calibration import UNLIMITED
 from core.units import NS_PER_S
 from service.cluster.frames import encoded_block, encoded_link
-from service.live.live_view import LinkState
+from service.live.status import LinkState
 from service.measuring.acquirer import LinkNews
 from service.settings.units import UnitSettings
 
@@ -128,9 +128,7 @@ def messages(unit: MovingUnit, seed: int) -> Iterator[Message]:
 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("seed", fast_and_long(1, 2))
-async def test_results_are_the_same_wherever_and_however_often_it_is_cut_off(
-    moving_unit: MakeUnit, seed: int
-) -> None:
+async def test_results_are_the_same_wherever_and_however_often_it_is_cut_off(moving_unit, seed):
     rng = np.random.default_rng(seed)
     whole, moved = moving_unit("whole"), moving_unit("moved")
     sent = list(messages(whole, seed))
@@ -189,7 +187,7 @@ def steady(moving_unit: MakeUnit) -> Steady:
     return unit, SteadyDevice(unit.plant.unit[0], 1)
 
 
-async def test_what_was_missed_while_all_blocks_went_by_age_is_a_gap(steady: Steady) -> None:
+async def test_what_was_missed_while_all_blocks_went_by_age_is_a_gap(steady):
     unit, device = steady
     word = await lived_until_its_blocks_have_gone(unit, device)
     device.skip(5 * SPAN)
@@ -205,9 +203,7 @@ async def test_what_was_missed_while_all_blocks_went_by_age_is_a_gap(steady: Ste
     assert len(after) > 10
 
 
-async def test_a_device_that_counts_anew_after_all_blocks_went_is_analysed_at_once(
-    steady: Steady,
-) -> None:
+async def test_a_device_that_counts_anew_after_all_blocks_went_is_analysed_at_once(steady):
     unit, device = steady
     word = await lived_until_its_blocks_have_gone(unit, device)
     device.restart()
@@ -220,7 +216,7 @@ async def test_a_device_that_counts_anew_after_all_blocks_went_is_analysed_at_on
     assert found["gap"]
 
 
-async def test_a_stream_that_lost_its_end_is_not_analysed_a_second_time(steady: Steady) -> None:
+async def test_a_stream_that_lost_its_end_is_not_analysed_a_second_time(steady):
     unit, device = steady
     sent = sent_by(device, unit, 60, 101)
     await unit.live(sent, None, np.random.default_rng(1))
@@ -248,9 +244,7 @@ def numbered(unit: MovingUnit, sent: Iterable[SampleBlock]) -> list[Message]:
     return [(n + 1, encoded_block(block, unit.identity, T0)) for n, block in enumerate(sent)]
 
 
-async def test_blocks_that_come_again_late_with_their_old_time_are_dropped(
-    moving_unit: MakeUnit, rng: np.random.Generator
-) -> None:
+async def test_blocks_that_come_again_late_with_their_old_time_are_dropped(moving_unit, rng):
     clean, late = moving_unit("clean"), moving_unit("late")
     once = blocks(clean)
     await clean.live(numbered(clean, once), None, rng)
@@ -261,8 +255,8 @@ async def test_blocks_that_come_again_late_with_their_old_time_are_dropped(
 
 
 async def test_blocks_that_no_device_can_have_given_are_refused_and_nothing_dies_of_them(
-    moving_unit: MakeUnit, rng: np.random.Generator
-) -> None:
+    moving_unit, rng
+):
     clean, spoilt = moving_unit("clean"), moving_unit("spoilt")
     once = blocks(clean)
     await clean.live(numbered(clean, once), None, rng)
@@ -282,9 +276,7 @@ async def test_blocks_that_no_device_can_have_given_are_refused_and_nothing_dies
     assert found_in(spoilt.database)["assessment"] == found_in(clean.database)["assessment"]
 
 
-async def test_a_block_that_says_nothing_of_a_slow_channel_is_analysed_without_it(
-    moving_unit: MakeUnit, rng: np.random.Generator
-) -> None:
+async def test_a_block_that_says_nothing_of_a_slow_channel_is_analysed_without_it(moving_unit, rng):
     unit = moving_unit("unit")
     sent = blocks(unit)
     sent = [*sent[:15], *(replace(block, elsewhere={}) for block in sent[15:])]

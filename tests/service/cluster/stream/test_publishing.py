@@ -1,7 +1,6 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from pathlib import Path
 
 import nats
 import numpy as np
@@ -25,7 +24,7 @@ from service.cluster.session import (
     stream_name,
     subject,
 )
-from service.live.live_view import LinkState
+from service.live.status import LinkState
 from service.measuring.acquirer import LinkNews
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
@@ -90,9 +89,7 @@ def numbers(found: list[SampleBlock | LinkNews]) -> list[int]:
     return [its.first_index // 60 for its in found if isinstance(its, SampleBlock)]
 
 
-async def test_blocks_and_news_of_a_link_arrive_in_the_order_in_which_they_came(
-    plant: PlantFile, server: NatsServer
-) -> None:
+async def test_blocks_and_news_of_a_link_arrive_in_the_order_in_which_they_came(plant, server):
     unit = plant.unit[0].id
     async with running(publisher(plant, server.url)) as out:
         out.publish_link(LinkNews(unit, LinkState.CONNECTED))
@@ -107,18 +104,14 @@ async def test_blocks_and_news_of_a_link_arrive_in_the_order_in_which_they_came(
     assert found[6:] == [LinkNews(unit, LinkState.NOT_CONNECTED, "away")]
 
 
-async def test_a_block_that_counts_the_same_samples_at_another_time_is_another_block(
-    plant: PlantFile, server: NatsServer
-) -> None:
+async def test_a_block_that_counts_the_same_samples_at_another_time_is_another_block(plant, server):
     anew = [starting_at(block(plant, n), 10**9 + n) for n in (0, 1)]
     async with running(publisher(plant, server.url)) as out:
         await published(out, block(plant, 0), block(plant, 1), *anew)
     assert numbers(await kept(plant, server)) == [0, 1, 0, 1]
 
 
-async def test_a_block_that_is_published_twice_is_kept_once(
-    plant: PlantFile, server: NatsServer
-) -> None:
+async def test_a_block_that_is_published_twice_is_kept_once(plant, server):
     async with running(publisher(plant, server.url)) as out:
         await published(out, *(block(plant, number) for number in (0, 1, 0, 1, 2)))
         assert out.n_doubles == 2
@@ -127,7 +120,7 @@ async def test_a_block_that_is_published_twice_is_kept_once(
     assert numbers(await kept(plant, server)) == [0, 1, 2]
 
 
-async def test_a_server_that_is_killed_costs_no_block(plant: PlantFile, server: NatsServer) -> None:
+async def test_a_server_that_is_killed_costs_no_block(plant, server):
     async with running(publisher(plant, server.url)) as out:
         for number in range(30):
             await out.publish(block(plant, number))
@@ -141,9 +134,7 @@ async def test_a_server_that_is_killed_costs_no_block(plant: PlantFile, server: 
     assert numbers(await kept(plant, server)) == list(range(40))
 
 
-async def test_a_full_memory_makes_the_device_wait_and_loses_nothing(
-    plant: PlantFile, server: NatsServer
-) -> None:
+async def test_a_full_memory_makes_the_device_wait_and_loses_nothing(plant, server):
     out = publisher(plant, server.url, buffer_mb=1.0)
     put = asyncio.create_task(_publish_all(out, plant, 12))
     while not put.done() and out.waiting.n_waiting < 4:
@@ -162,9 +153,7 @@ async def _publish_all(out: Publisher, plant: PlantFile, n_blocks: int) -> None:
         await out.publish(block(plant, number, 60_000 // len(plant.unit[0].channel)))
 
 
-async def test_a_full_stream_refuses_aloud_and_drops_nothing(
-    plant: PlantFile, server: NatsServer
-) -> None:
+async def test_a_full_stream_refuses_aloud_and_drops_nothing(plant, server):
     out = publisher(plant, server.url)
     async with running(out):
         await published(out, block(plant, 0))
@@ -175,7 +164,7 @@ async def test_a_full_stream_refuses_aloud_and_drops_nothing(
     assert numbers(await kept(plant, server))[0] == 0
 
 
-def test_news_of_a_link_do_not_pile_up_while_the_servers_are_away(plant: PlantFile) -> None:
+def test_news_of_a_link_do_not_pile_up_while_the_servers_are_away(plant):
     out, unit = publisher(plant, "nats://127.0.0.1:9"), plant.unit[0].id
     for second in range(1000):
         out.publish_link(LinkNews(unit, LinkState.NOT_CONNECTED, f"silent for {second} s"))
@@ -186,7 +175,7 @@ def test_news_of_a_link_do_not_pile_up_while_the_servers_are_away(plant: PlantFi
     assert b"999 s" in queue[-1].payload
 
 
-async def test_without_a_server_it_waits_and_says_so(plant: PlantFile, server: NatsServer) -> None:
+async def test_without_a_server_it_waits_and_says_so(plant, server):
     server.kill()
     async with running(publisher(plant, server.url)) as out:
         await out.publish(block(plant, 0))
@@ -195,9 +184,7 @@ async def test_without_a_server_it_waits_and_says_so(plant: PlantFile, server: N
         await drained(out)
 
 
-async def test_a_server_without_jetstream_is_named_with_what_to_do(
-    plant: PlantFile, tmp_path: Path
-) -> None:
+async def test_a_server_without_jetstream_is_named_with_what_to_do(plant, tmp_path):
     bare = NatsServer(tmp_path / "bare", has_jetstream=False)
     bare.start()
     try:
@@ -207,9 +194,7 @@ async def test_a_server_without_jetstream_is_named_with_what_to_do(
         bare.stop()
 
 
-async def test_a_stream_of_another_plant_is_left_alone(
-    plant: PlantFile, server: NatsServer
-) -> None:
+async def test_a_stream_of_another_plant_is_left_alone(plant, server):
     shared = plant.model_copy(update={"stream": StreamSettings(name="shared")})
     other = shared.model_copy(
         update={"plant": plant.plant.model_copy(update={"name": "Another plant"})}
@@ -223,8 +208,8 @@ async def test_a_stream_of_another_plant_is_left_alone(
 
 
 async def test_a_server_that_lets_nobody_in_without_a_token_is_named_with_what_to_do(
-    plant: PlantFile, tmp_path: Path
-) -> None:
+    plant, tmp_path
+):
     token = tmp_path / "token"
     token.write_text("s3cret\n")
     with nats_server(tmp_path / "closed", 'authorization { token: "s3cret" }') as closed:
@@ -248,7 +233,7 @@ async def use(server: NatsServer, *errors: Exception) -> None:
         await asyncio.Event().wait()
 
 
-async def test_a_connection_that_several_lose_at_once_is_one_trouble(server: NatsServer) -> None:
+async def test_a_connection_that_several_lose_at_once_is_one_trouble(server):
     with pytest.raises(StreamError, match="NATS at"):
         await use(server)
     server.start()
@@ -256,9 +241,7 @@ async def test_a_connection_that_several_lose_at_once_is_one_trouble(server: Nat
         await use(server, ConnectionClosedError(), StreamMisfitError("the worse one"))
 
 
-async def test_a_stream_that_is_deleted_meanwhile_is_made_again(
-    plant: PlantFile, server: NatsServer
-) -> None:
+async def test_a_stream_that_is_deleted_meanwhile_is_made_again(plant, server):
     async with running(publisher(plant, server.url)) as publishing:
         await published(publishing, block(plant, 0))
         async with looking(server) as stream:

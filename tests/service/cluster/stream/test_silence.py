@@ -15,7 +15,7 @@ from harness.stream_rig import analysing, blocks
 
 from service.cluster.frames import encoded_block
 from service.cluster.silent_units import SilenceWatch, silences_s
-from service.live.live_view import LinkState
+from service.live.status import LinkState
 from service.settings.loading import load_plant_file
 from service.store.port import AlarmQuery
 
@@ -124,9 +124,7 @@ def place(tmp_path: Path, stepped_clock: Any) -> Place:
 
 
 @pytest.mark.parametrize("back", Back)
-async def test_a_lost_unit_stays_lost_through_restarts_until_blocks_come(
-    place: Place, back: Back
-) -> None:
+async def test_a_lost_unit_stays_lost_through_restarts_until_blocks_come(place, back):
     async with place.process() as first:
         await first.take(place.messages[:N_BLOCKS])
         assert (first.changes, first.n_judged > 0) == ([], True)
@@ -145,8 +143,8 @@ async def test_a_lost_unit_stays_lost_through_restarts_until_blocks_come(
 
 @pytest.mark.parametrize("back", Back)
 async def test_a_unit_that_falls_silent_while_nobody_analyses_it_is_lost_after_the_start(
-    place: Place, back: Back
-) -> None:
+    place, back
+):
     async with place.process() as first:
         await first.take(place.messages[:N_BLOCKS])
     async with place.process(back) as again:
@@ -160,7 +158,7 @@ async def test_a_unit_that_falls_silent_while_nobody_analyses_it_is_lost_after_t
 
 
 @pytest.mark.parametrize("back", [Back.NO_STREAM, Back.NO_WINDOW])
-async def test_a_unit_of_which_nothing_was_ever_known_is_lost(place: Place, back: Back) -> None:
+async def test_a_unit_of_which_nothing_was_ever_known_is_lost(place, back):
     async with place.process(back) as first:
         await first.wait(SURELY_S)
         assert (first.changes, first.n_judged) == ([("raised", 1)], 0)
@@ -169,9 +167,7 @@ async def test_a_unit_of_which_nothing_was_ever_known_is_lost(place: Place, back
         assert first.changes == [("raised", 1), ("returned", 1)]
 
 
-async def test_a_unit_whose_messages_are_all_of_no_use_is_lost_and_the_reason_is_said(
-    place: Place,
-) -> None:
+async def test_a_unit_whose_messages_are_all_of_no_use_is_lost_and_the_reason_is_said(place):
     async with place.process() as first:
         await first.take([(n, b"no block of ours") for n in range(1, 60)])
         status = first.life.analysis.process.live.status(UNIT)
@@ -181,8 +177,8 @@ async def test_a_unit_whose_messages_are_all_of_no_use_is_lost_and_the_reason_is
 
 @pytest.mark.parametrize("is_kept_as_lost", [False, True])
 async def test_a_process_that_was_killed_after_blocks_came_back_raises_nothing_again(
-    place: Place, is_kept_as_lost: bool
-) -> None:
+    place, is_kept_as_lost
+):
     async with place.process() as first:
         await first.take(place.messages[:N_BLOCKS])
         await first.wait(SURELY_S)
@@ -197,9 +193,7 @@ async def test_a_process_that_was_killed_after_blocks_came_back_raises_nothing_a
         assert again.changes == [("raised", 1), ("returned", 1)]
 
 
-async def test_samples_that_were_lost_before_are_no_new_loss_to_a_process_that_takes_over(
-    place: Place,
-) -> None:
+async def test_samples_that_were_lost_before_are_no_new_loss_to_a_process_that_takes_over(place):
     place.first = [*place.messages[:2], *place.messages[5:N_BLOCKS]]
     raised = [("raised", 1)]
     async with place.process() as first:
@@ -217,7 +211,7 @@ async def test_samples_that_were_lost_before_are_no_new_loss_to_a_process_that_t
         assert again.changes_of(LOST) == [*raised, ("returned", 1)]
 
 
-def test_a_unit_whose_blocks_come_seldom_may_be_silent_for_three_of_them(tmp_path: Path) -> None:
+def test_a_unit_whose_blocks_come_seldom_may_be_silent_for_three_of_them(tmp_path):
     stream = '[stream]\nservers = ["nats://127.0.0.1:9"]\n'
     ports = dict.fromkeys(LEDGER.units, 9)
     plant = load_plant_file(LEDGER.write(tmp_path / "plant.toml", tmp_path / "data", ports, stream))
@@ -228,7 +222,7 @@ def test_a_unit_whose_blocks_come_seldom_may_be_silent_for_three_of_them(tmp_pat
     assert after_s == {UNIT: 5.0, "U9": pytest.approx(180.0, rel=1e-3)}
 
 
-async def test_a_unit_whose_blocks_wait_for_the_store_is_not_silent(place: Place) -> None:
+async def test_a_unit_whose_blocks_wait_for_the_store_is_not_silent(place):
     async with place.process() as first:
         await first.take(place.messages[:N_BLOCKS])
         first.waiting = [UNIT]
@@ -241,9 +235,7 @@ async def test_a_unit_whose_blocks_wait_for_the_store_is_not_silent(place: Place
         assert first.changes == [("raised", 1)]
 
 
-async def test_a_process_that_never_reaches_the_stream_says_that_its_units_are_lost(
-    tmp_path: Path,
-) -> None:
+async def test_a_process_that_never_reaches_the_stream_says_that_its_units_are_lost(tmp_path):
     stream = '[stream]\nservers = ["nats://127.0.0.1:9"]\nsilent_after_s = 2.0\n'
     ports = dict.fromkeys(LEDGER.units, 9)
     plant = LEDGER.write(tmp_path / "plant.toml", tmp_path / "data", ports, stream)

@@ -74,12 +74,12 @@ def publisher(plant: PlantFile, identity: UnitIdentity) -> Publisher:
     return Publisher(plant, SETTINGS, {"U1": identity}, SystemClock())
 
 
-async def test_a_consumer_that_waits_for_messages(consumer: Consumer, stream: Any) -> None:
+async def test_a_consumer_that_waits_for_messages(consumer, stream):
     consumer._fetched["U1"] = 0
     await require_it_stops(asyncio.create_task(consumer._fetch_unit(stream, "U1")), stream)
 
 
-async def test_a_publisher_that_waits_for_the_servers(publisher: Publisher, stream: Any) -> None:
+async def test_a_publisher_that_waits_for_the_servers(publisher, stream):
     publisher.waiting.add("U1", Outgoing("1", b"a block"))
     publisher.waiting.add("U1", Outgoing("2", b"another"))
     pulse = SimpleNamespace(beat=lambda *_: None, rest=lambda: None)
@@ -89,12 +89,8 @@ async def test_a_publisher_that_waits_for_the_servers(publisher: Publisher, stre
 
 @pytest.mark.parametrize("refusal", [None, ConnectionRefusedError()])
 async def test_both_while_they_wait_for_a_connection(
-    consumer: Consumer,
-    publisher: Publisher,
-    stream: Any,
-    monkeypatch: pytest.MonkeyPatch,
-    refusal: OSError | None,
-) -> None:
+    consumer, publisher, stream, monkeypatch, refusal
+):
     async def connect(*_: object, **__: object) -> None:
         await stream.wait()
         if refusal is not None:

@@ -36,8 +36,8 @@ from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import AlarmLevel, Judgement, unknown
 from core.quality import GOOD, Reason, bad
-from service.live.live_view import LiveView
 from service.measuring.alarm_engine import AlarmEngine
+from service.measuring.live_view import LiveView
 from service.measuring.recorder import FILE, Findings, ParkedRows, Recorder
 from service.store.port import AlarmQuery
 from service.store.sqlite import SqliteStore
@@ -252,9 +252,7 @@ LATCHES = (AlarmChange.LATCHED, AlarmChange.RESET)
 @pytest.mark.timeout(max(300, N_LIVES))
 @pytest.mark.usefixtures("_quiet")
 @pytest.mark.parametrize("n_lives", fast_and_long(min(N_LIVES, 30), N_LIVES))
-async def test_no_alarm_is_lost_and_none_is_doubled(
-    database: Callable[[], Path], host: Any, tools: Any, n_lives: int
-) -> None:
+async def test_no_alarm_is_lost_and_none_is_doubled(database, host, tools, n_lives):
     for seed in range(n_lives):
         life = Life(database(), seed, host, tools)
         try:

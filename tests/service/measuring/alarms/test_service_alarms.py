@@ -1,7 +1,7 @@
-"""Alarms about links, the store and the service, from their causes to what is stored of them."""
+"""Alarms about links, the store, the service and silent units, from their causes to the store."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,14 @@ from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import AlarmLevel
 from core.samples.gaps import SampleAccount
-from service.live.live_view import LiveView
+from service.cluster.silent_units import SILENT_AFTER_S, SilentUnits
 from service.measuring.alarm_engine import AlarmEngine
+from service.measuring.live_view import LiveView
 from service.measuring.recorder import FILE, Findings, ParkedRows, Recorder
+from service.measuring.reported_alarms import identity_of
 from service.measuring.service_alarms import ServiceAlarms, ServiceHealth, ServiceRules
 from service.store.port import AlarmQuery
+from service.store.sharing import UnitRow
 from service.store.sqlite import SqliteStore
 
 SECOND = 1_000_000_000
@@ -53,13 +56,13 @@ def watched(host: Any) -> Watched:
     return Watched(host)
 
 
-def test_a_service_in_good_health_says_nothing(watched: Watched) -> None:
+def test_a_service_in_good_health_says_nothing(watched):
     assert [watched.after(0.5, **account(10, 0)) for _ in range(100)] == [[]] * 100
     assert {alarm.identity.unit for alarm in watched.alarms.alarms} == {PLANT}
     assert all(alarm.condition.is_known for alarm in watched.alarms.alarms)
 
 
-def test_a_store_that_takes_nothing_is_an_alarm_that_says_why(watched: Watched) -> None:
+def test_a_store_that_takes_nothing_is_an_alarm_that_says_why(watched):
     assert watched.after(0.5, store_behind_s=9.0, store_error="disk full") == []
     assert watched.after(0.5, store_behind_s=11.0, store_error="disk full") == [
         f"{NOT_STORED} raised"
@@ -70,7 +73,7 @@ def test_a_store_that_takes_nothing_is_an_alarm_that_says_why(watched: Watched) 
     assert "does not respond" in watched.alarms.alarm(NOT_STORED).condition.reason
 
 
-def test_results_that_are_given_up_are_a_danger_for_ten_minutes(watched: Watched) -> None:
+def test_results_that_are_given_up_are_a_danger_for_ten_minutes(watched):
     assert watched.after(0.5, n_unstored=3) == [f"{LOST} raised"]
     alarm = watched.alarms.alarm(LOST)
     assert (alarm.level, alarm.condition.value) == (DANGER, 3.0)
@@ -81,14 +84,14 @@ def test_results_that_are_given_up_are_a_danger_for_ten_minutes(watched: Watched
     assert watched.alarms.alarm(LOST).condition.reason == parked
 
 
-def test_a_queue_that_fills_is_an_alert_and_then_a_danger(watched: Watched) -> None:
+def test_a_queue_that_fills_is_an_alert_and_then_a_danger(watched):
     watched.after(0.0, waiting_share=0.6)
     assert watched.after(6.0, waiting_share=0.6) == [f"{WAITING} raised"]
     watched.after(0.0, waiting_share=0.95)
     assert watched.after(6.0, waiting_share=0.95) == [f"{WAITING} escalated"]
 
 
-def test_a_late_analysis_and_captures_that_cannot_be_written_are_alarms(watched: Watched) -> None:
+def test_a_late_analysis_and_captures_that_cannot_be_written_are_alarms(watched):
     watched.after(0.0, analysis_delay_s=6.0)
     assert watched.after(6.0, analysis_delay_s=6.0) == [f"{LATE} raised"]
     assert watched.after(0.5, analysis_delay_s=6.0, captures_error="no space left") == [
@@ -96,7 +99,7 @@ def test_a_late_analysis_and_captures_that_cannot_be_written_are_alarms(watched:
     ]
 
 
-def test_lost_samples_count_over_ten_minutes(watched: Watched) -> None:
+def test_lost_samples_count_over_ten_minutes(watched):
     watched.after(0.5, **account(60_000, 30_000))  # lost before anybody looked
     assert watched.after(100.0, **account(120_000, 32_000)) == []
     assert watched.after(100.0, **account(180_000, 40_000)) == ["plant:U1:samples_lost raised"]
@@ -105,8 +108,8 @@ def test_lost_samples_count_over_ten_minutes(watched: Watched) -> None:
 
 
 def test_an_alarm_about_lost_samples_goes_on_after_a_restart_until_ten_minutes_without(
-    watched: Watched, host: Any
-) -> None:
+    watched, host
+):
     watched.after(0.5, **account(60_000, 0))
     watched.after(10.0, **account(61_000, 5_000))
     again = Watched(host)
@@ -117,9 +120,7 @@ def test_an_alarm_about_lost_samples_goes_on_after_a_restart_until_ten_minutes_w
     assert news[10][-1] == "plant:U1:samples_lost returned"
 
 
-def test_a_process_that_does_not_lead_tells_of_lost_samples_of_its_units_and_of_nothing_else(
-    host: Any,
-) -> None:
+def test_a_process_that_does_not_lead_tells_of_lost_samples_of_its_units_and_of_nothing_else(host):
     watched = Watched(host, leads=False)
     assert watched.after(0.5, **account(10, 0), store_behind_s=99.0, n_unstored=7) == []
     assert watched.after(0.5, **account(10, 10), analysis_delay_s=99.0) == [
@@ -127,7 +128,7 @@ def test_a_process_that_does_not_lead_tells_of_lost_samples_of_its_units_and_of_
     ]
 
 
-def test_a_device_whose_samples_all_pass_for_repeated_ones_loses_them(watched: Watched) -> None:
+def test_a_device_whose_samples_all_pass_for_repeated_ones_loses_them(watched):
     watched.after(0.5, **account(60_000, 0, 90_000))  # repeated before anybody looked
     assert watched.after(100.0, **account(120_000, 0, 95_000)) == []
     quiet = [watched.after(100.0, **account(180_000, 0, 95_000 + n * 60_000)) for n in range(2)]
@@ -142,9 +143,7 @@ LINK = "U1:link:link_lost"
 
 
 @pytest.mark.parametrize("set_by_s", [0.0, 7200.0, -3600.0, 0.3])
-def test_a_lost_link_is_told_after_its_delay_whatever_the_clock_is_set_to(
-    host: Any, tools: Any, set_by_s: float
-) -> None:
+def test_a_lost_link_is_told_after_its_delay_whatever_the_clock_is_set_to(host, tools, set_by_s):
     rules = UnitRules(channel=rule_of(2.0, 4.0), link=rule_of(DELAY_S, 0.0))
     engine = AlarmEngine({"U1": UnitAlarms(tools.unit, rules)}, lambda _: None, host)
     engine.link("U1", True)
@@ -186,8 +185,8 @@ def stored(
 
 
 async def test_an_alarm_about_the_store_stands_while_it_fails_and_is_stored_as_soon_as_it_works(
-    stored: Callable[[], tuple[Any, Any, Any]], host: Any
-) -> None:
+    stored, host
+):
     engine, recorder, (store, uncertain) = stored()
     uncertain.fate = "refuses"
     other = Alarm(AlarmIdentity("U9", "sx", "channel_not_ok"))
@@ -220,9 +219,7 @@ def _findings(alarm: Alarm) -> Any:
     return Findings(alarms=[AlarmNews(replace(alarm, n_events=1), [event])])
 
 
-async def test_news_that_comes_during_a_write_is_stored_without_any_news_after_it(
-    stored: Callable[[], tuple[Any, Any, Any]],
-) -> None:
+async def test_news_that_comes_during_a_write_is_stored_without_any_news_after_it(stored):
     _, recorder, (store, uncertain) = stored()
     uncertain.fate = "waits"
     recording = asyncio.create_task(recorder.run())
@@ -242,9 +239,7 @@ async def test_news_that_comes_during_a_write_is_stored_without_any_news_after_i
     store.close()
 
 
-async def test_alarms_of_a_unit_that_is_gone_stay_until_somebody_has_seen_them(
-    stored: Callable[[], tuple[Any, Any, Any]],
-) -> None:
+async def test_alarms_of_a_unit_that_is_gone_stay_until_somebody_has_seen_them(stored):
     engine, recorder, (store, _) = stored()
     gone = AlarmIdentity("U9", "sx", "channel_not_ok")
     lost = Alarm(gone, level=ALERT, occurrence=1, is_acknowledged=False, raised_ns=0, n_events=1)
@@ -263,3 +258,78 @@ async def test_alarms_of_a_unit_that_is_gone_stay_until_somebody_has_seen_them(
     with pytest.raises(LookupError):
         engine.alarm(gone.id)
     store.close()
+
+
+REPORT = UnitRow("U1", 1, 0, "connected", None, None, "signs", 1, b"state")
+GONE = identity_of("U2").id
+NOWHERE = ParkedRows(Path("nowhere"))
+
+
+class Process:
+    """One that leads, over a database that others report to."""
+
+    def __init__(self, store: SqliteStore, host: Any) -> None:
+        self.store, self.host = store, host
+        self.recorder = Recorder(store, LiveView([], host, 30.0), host, NOWHERE)
+        self.alarms = AlarmEngine({}, self.recorder.put, host)
+        self.silent = SilentUnits(["U1", "U2"], self.alarms, store, host)
+
+    async def after(self, seconds: float, *reporting: str) -> list[str]:
+        """Let seconds pass in which some units are reported on; returns the alarms that stand."""
+        for _ in range(round(seconds)):
+            self.host.step(SECOND)
+            reports = [replace(REPORT, unit=unit, n_beats=self.host.ns) for unit in reporting]
+            self.store.unit_states.report("other", reports)
+            await self.silent.look()
+            self.alarms.tick()
+            await self.recorder.flush()
+        return [alarm.identity.id for alarm in self.store.alarms() if alarm.level is not None]
+
+    def stored(self, id_: str) -> Alarm:
+        return next(alarm for alarm in self.store.alarms() if alarm.identity.id == id_)
+
+
+@pytest.fixture
+def store(database: Callable[[], Path]) -> Iterator[SqliteStore]:
+    opened = SqliteStore(database())
+    yield opened
+    opened.close()
+
+
+async def test_a_unit_of_which_reports_cease_is_one_until_they_come_again(store, host):
+    leader = Process(store, host)
+    await leader.after(5, "U1", "U2")
+    assert await leader.after(SILENT_AFTER_S - 1, "U1") == []
+    assert await leader.after(3, "U1") == [GONE]
+    assert "padwatch analyse" in str(leader.stored(GONE).condition.reason)
+    assert await leader.after(2, "U1", "U2") == []
+
+
+async def test_a_unit_that_nobody_ever_analysed_is_one(store, host):
+    assert await Process(store, host).after(SILENT_AFTER_S + 3, "U1") == [GONE]
+
+
+async def test_the_next_leader_goes_on_with_the_alarm_and_neither_clears_nor_doubles_it(
+    store, host
+):
+    first = Process(store, host)
+    await first.after(SILENT_AFTER_S + 3, "U1")
+    first.alarms.operate(GONE, Acknowledge("A. Name", 1))
+    await first.recorder.flush()
+    first.silent.leave()
+    assert GONE not in [alarm.identity.id for alarm in first.alarms.alarms]
+
+    second = Process(store, host)
+    assert await second.after(5, "U1") == [GONE]
+    alarm = second.stored(GONE)
+    assert (alarm.occurrence, alarm.is_acknowledged) == (1, True)
+    assert await second.after(SILENT_AFTER_S, "U1") == [GONE]
+    assert second.stored(GONE).occurrence == 1
+    assert await second.after(3, "U1", "U2") == []
+
+
+async def test_a_clock_of_another_host_decides_nothing(store, host):
+    leader = Process(store, host)
+    found = [await leader.after(1, "U1", "U2") for _ in range(100)]
+    assert all(beat.beat_ns == 0 for beat in store.unit_states.beats())
+    assert found == [[]] * 100

@@ -23,10 +23,10 @@ from core.monitor.monitor import UnitMonitor
 from core.quality import GOOD
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import Reach
-from service.live.live_view import LiveView
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.analyser import Runner
 from service.measuring.films import FilmMonitor
+from service.measuring.live_view import LiveView
 from service.measuring.recorder import FILE, ParkedRows, Recorder
 from service.measuring.sources import WatchedUnit
 from service.recordings.around_alarms import Captures, CaptureSettings

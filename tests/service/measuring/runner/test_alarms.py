@@ -1,8 +1,9 @@
-"""Alarms of a running service: raised by samples, links and clocks, kept over a restart."""
+"""Alarms of a running service: by samples, links and clocks, kept over restarts and kills."""
 
+import asyncio
 import sqlite3
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,7 +12,6 @@ from rigs.alarm_runs import (
     LINK,
     PROBE,
     T0,
-    Make,
     changes,
     events,
     lost,
@@ -20,14 +20,16 @@ from rigs.alarm_runs import (
 )
 
 from acquisition.errors import LinkError
-from core.alarms.alarm import AlarmState
+from core.alarms import board, life_cycle
+from core.alarms.alarm import Alarm, AlarmState
 from core.alarms.operation import Acknowledge, Shelve
-from core.samples.blocks import DeviceClock
+from core.limits import ON
+from core.samples.blocks import DeviceClock, SampleBlock
 
 
 async def test_a_probe_is_lost_and_works_again_after_delays_in_the_samples_time(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+    plant, scripted, block
+):
     too_short, long_enough = (5, 6), range(10, 15)
 
     await play(
@@ -45,9 +47,7 @@ async def test_a_probe_is_lost_and_works_again_after_delays_in_the_samples_time(
     assert plant.alarms.alarm(PROBE).state is AlarmState.RETURNED_UNACKNOWLEDGED
 
 
-async def test_delays_do_not_run_while_samples_are_missing(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+async def test_delays_do_not_run_while_samples_are_missing(plant, scripted, block):
     blocks = [lost(block(0)), *(lost(block(n)) for n in range(400, 402))]
 
     await play(plant, scripted, blocks)
@@ -66,8 +66,8 @@ SWELL = ((30, 1.0), (50, 1.5), (80, 2.0), (110, 1.5), (999, 1.0))
 
 
 async def test_the_same_samples_give_the_same_events_however_they_come(
-    plant: Any, tmp_path: Path, scripted: Make, block: Make
-) -> None:
+    plant, tmp_path, scripted, block
+):
     blocks = [louder(block(n), swell(n)) for n in range(150)]
     blocks[90:100] = [lost(each) for each in blocks[90:100]]
     await play(plant, scripted, blocks)
@@ -87,8 +87,8 @@ async def test_the_same_samples_give_the_same_events_however_they_come(
 
 @pytest.mark.parametrize("plant", [3], indirect=True)
 async def test_news_of_alarms_outlives_a_store_that_fails_for_longer_than_results_do(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+    plant, scripted, block
+):
     broken = (
         "CREATE TRIGGER broken BEFORE INSERT ON alarm_event BEGIN SELECT RAISE(ABORT, 'x'); END"
     )
@@ -109,8 +109,8 @@ async def test_news_of_alarms_outlives_a_store_that_fails_for_longer_than_result
 
 
 async def test_after_a_restart_alarms_are_what_they_were_and_their_conditions_unknown(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+    plant, scripted, block
+):
     await play(plant, scripted, [lost(block(n)) for n in range(6)])
     plant.alarms.operate(PROBE, Acknowledge("A. Name", 1))
     plant.alarms.operate("U1:sy:channel_not_ok", Shelve("A. Name", "known", T0 + 10**14))
@@ -131,8 +131,8 @@ async def test_after_a_restart_alarms_are_what_they_were_and_their_conditions_un
 
 
 async def test_what_was_repaired_while_the_service_was_down_returns_with_the_first_good_samples(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+    plant, scripted, block
+):
     await play(plant, scripted, [lost(block(n)) for n in range(6)])
     plant.start_alarms()
 
@@ -141,9 +141,7 @@ async def test_what_was_repaired_while_the_service_was_down_returns_with_the_fir
     assert changes(plant, PROBE) == ["raised", "condition_unknown", "condition_known", "returned"]
 
 
-async def test_a_device_that_refuses_is_an_alarm_with_what_it_said(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+async def test_a_device_that_refuses_is_an_alarm_with_what_it_said(plant, scripted, block):
     refused = [[LinkError("10.0.0.7:502: Connection refused")] for _ in range(60)]
 
     await play(plant, scripted, [block(0), LinkError("reset by peer")], *refused, [block(1)])
@@ -154,7 +152,7 @@ async def test_a_device_that_refuses_is_an_alarm_with_what_it_said(
     assert 10.0 <= (raised.time_ns - T0) / 1e9 <= 10.6  # of the clock that passes while one waits
 
 
-async def test_a_unit_that_never_answers_is_an_alarm_too(plant: Any) -> None:
+async def test_a_unit_that_never_answers_is_an_alarm_too(plant):
     for seconds in (0.0, 5.0, 11.0):
         plant.clock.s = seconds
         plant.alarms.tick()
@@ -163,9 +161,7 @@ async def test_a_unit_that_never_answers_is_an_alarm_too(plant: Any) -> None:
     assert {event.identity.id for event in events(plant)} == {LINK, "U2:link:link_lost"}
 
 
-async def test_a_device_whose_clock_is_off_is_an_alarm_by_the_hosts_clock(
-    plant: Any, block: Make
-) -> None:
+async def test_a_device_whose_clock_is_off_is_an_alarm_by_the_hosts_clock(plant, block):
     off = DeviceClock(offset_s=-5.0, drift_ppm=None, u_drift_ppm=None)
     for second in range(40):
         plant.clock.s = float(second)
@@ -175,3 +171,94 @@ async def test_a_device_whose_clock_is_off_is_an_alarm_by_the_hosts_clock(
     alarm = plant.alarms.alarm("U1:device:clock_offset")
     assert (alarm.level, alarm.condition.value, alarm.condition.limit) == (1, 5.0, 2.0)
     assert alarm.raised_ns == T0 + 30_000_000_000
+
+
+N_BLOCKS = 140
+LOUD = range(40, 80)
+"""Blocks in which the shaft moves 75 µm, of 60 that are an alert. A result needs 15 blocks, and
+averages up to 29."""
+
+TWICE = [*range(40, 70), *range(112, N_BLOCKS)]
+KILLS = (62, 102)
+
+OF_RESTARTS = ("condition_unknown", "condition_known")
+
+Block = Callable[..., SampleBlock]
+
+
+def stream(block: Block, loud: Sequence[int] = LOUD) -> list[SampleBlock]:
+    """All blocks of a machine that shakes for a while."""
+    blocks = [block(number) for number in range(N_BLOCKS)]
+    return [
+        replace(one, counts=one.counts * 1.5) if number in loud else one
+        for number, one in enumerate(blocks)
+    ]
+
+
+async def live_through(plant: Any, scripted: Any, *lives: Sequence[SampleBlock]) -> None:
+    """Run the service once for each life; whatever it remembered is gone in between."""
+    for blocks in lives:
+        plant.start_alarms()
+        runner = plant.runner(U1=scripted(blocks), reach=plant.store.reach("U1"))
+        await asyncio.wait_for(runner.run(), 60)
+        await plant.recorder.flush()
+
+
+def told(plant: Any, axis: str) -> list[str]:
+    """Changes of an amplitude's alarm, oldest first, but for what a restart itself brings."""
+    found = changes(plant, f"U1:UJB:order1_shaft_{axis}")
+    return [change for change in found if change not in OF_RESTARTS]
+
+
+@pytest.mark.parametrize("killed_at", [20, 55, 70, 100])
+async def test_a_kill_neither_loses_nor_doubles_an_alarm(plant, scripted, block, killed_at):
+    blocks = stream(block)
+    await live_through(plant, scripted, blocks[:killed_at], blocks[killed_at:])
+
+    assert [told(plant, axis) for axis in "xy"] == [["raised", "returned"]] * 2
+
+
+@pytest.mark.parametrize("n_away", [0, 3, 40])
+async def test_the_hole_is_recorded_from_the_last_stored_result_to_the_first_new_sample(
+    plant, scripted, block, n_away
+):
+    before = stream(block)[:20]
+    after = [block(number) for number in range(20 + n_away, 40 + n_away)]
+    await live_through(plant, scripted, before)
+    reach = plant.store.reach("U1")
+    await live_through(plant, scripted, after[:1], after)
+
+    [gap] = plant.store.gaps("U1", 0, 2**62)
+    assert (gap.epoch, gap.first_index) == (1, reach.stop_index)
+    assert gap.first_index + gap.n_samples == after[0].first_index
+    assert (gap.start_ns, gap.stop_ns) == (reach.stop_ns, after[0].start_ns)
+    assert not gap.is_estimated
+
+
+def _on_whatever_was(alarm: Alarm) -> Alarm:
+    """Believe that everything was active before, so that nothing begins."""
+    return replace(alarm, timers=(ON, ON))
+
+
+def _nothing_was(alarm: Alarm) -> Alarm:
+    """Believe that nothing was active before, so that what is begins once more."""
+    return life_cycle.restored(replace(alarm, level=None))
+
+
+PLANTED = pytest.mark.planted("alarm edge lost or doubled by a restart")
+
+
+@pytest.mark.parametrize(
+    "bug", [None, *(pytest.param(bug, marks=PLANTED) for bug in (_on_whatever_was, _nothing_was))]
+)
+async def test_every_edge_is_told_once_and_a_bug_of_restarts_is_found_out(
+    plant, scripted, block, bug, monkeypatch
+):
+    if bug is not None:
+        monkeypatch.setattr(board, "restored", bug)
+    blocks = stream(block, TWICE)
+    await live_through(
+        plant, scripted, blocks[: KILLS[0]], blocks[slice(*KILLS)], blocks[KILLS[1] :]
+    )
+
+    assert (told(plant, "x") == ["raised", "returned", "raised"]) == (bug is None)

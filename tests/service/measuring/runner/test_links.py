@@ -1,7 +1,6 @@
 """Links that fail are named and tried again; bugs are not."""
 
 import asyncio
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -9,10 +8,9 @@ import structlog
 
 from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
-from service.live.live_view import LinkState
+from core.quality import Reason
+from service.live.status import LinkState, why_not_current
 from service.measuring.acquirer import CONNECTS_PER_S, Bus
-
-Make = Callable[..., Any]
 
 
 async def run_until(plant: Any, exhausted: asyncio.Event, **units: Any) -> None:
@@ -27,8 +25,8 @@ async def run_until(plant: Any, exhausted: asyncio.Event, **units: Any) -> None:
 
 
 async def test_a_device_that_does_not_answer_is_tried_again_in_each_poll_period(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+    plant, scripted, block
+):
     refusals = [[LinkError("10.0.0.7:502: Connection refused")] for _ in range(12)]
     source = scripted(*refusals, [block(0)], ends=False)
 
@@ -40,9 +38,7 @@ async def test_a_device_that_does_not_answer_is_tried_again_in_each_poll_period(
     assert len(set(waits)) == 12  # devices that vanish together do not come back in step
 
 
-async def test_a_unit_without_link_says_why_and_since_when(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+async def test_a_unit_without_link_says_why_and_since_when(plant, scripted, block):
     reasons = ["10.0.0.7:502: Connection refused", "10.0.0.7:502: No route to host"]
     source = scripted(*([LinkError(reason)] for reason in reasons), [block(0)], ends=False)
     seen: list[Any] = []
@@ -62,9 +58,7 @@ async def test_a_unit_without_link_says_why_and_since_when(
     assert status.since_ns == plant.clock.now_ns()
 
 
-async def test_a_device_that_cannot_fit_is_tried_much_more_seldom(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+async def test_a_device_that_cannot_fit_is_tried_much_more_seldom(plant, scripted, block):
     wrong = [[ConfigError("block ring: n_channels is 8, expected 12")] for _ in range(3)]
     source = scripted(*wrong, [block(0)], ends=False)
 
@@ -73,9 +67,7 @@ async def test_a_device_that_cannot_fit_is_tried_much_more_seldom(
     assert plant.clock.slept_s == [15.0] * 3
 
 
-async def test_a_link_that_delivers_and_breaks_loses_no_sample_it_delivered(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+async def test_a_link_that_delivers_and_breaks_loses_no_sample_it_delivered(plant, scripted, block):
     refused = [LinkError("refused")]
     breaking = [[block(n), LinkError("reset by peer")] for n in range(6)]
     source = scripted(refused, refused, refused, *breaking, [block(6)], ends=False)
@@ -86,9 +78,7 @@ async def test_a_link_that_delivers_and_breaks_loses_no_sample_it_delivered(
     assert source.n_open == 0
 
 
-async def test_one_unit_without_link_does_not_hold_up_another(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+async def test_one_unit_without_link_does_not_hold_up_another(plant, scripted, block):
     absent = scripted(*([LinkError("no route")] for _ in range(500)), [], ends=False)
     present = scripted([block(n, "U2") for n in range(20)], ends=False)
 
@@ -98,9 +88,7 @@ async def test_one_unit_without_link_does_not_hold_up_another(
     assert plant.live.status("U2").state is LinkState.CONNECTED
 
 
-async def test_devices_of_a_plant_are_called_one_after_another(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+async def test_devices_of_a_plant_are_called_one_after_another(plant, scripted, block):
     sources = {unit: scripted([block(0, unit)]) for unit in ("U1", "U2")}
 
     await asyncio.wait_for(plant.runner(**sources).run(), 30)
@@ -108,7 +96,7 @@ async def test_devices_of_a_plant_are_called_one_after_another(
     assert plant.clock.slept_s == [1.0 / CONNECTS_PER_S]
 
 
-async def test_a_recording_that_ends_says_so(plant: Any, scripted: Make, block: Make) -> None:
+async def test_a_recording_that_ends_says_so(plant, scripted, block):
     source = scripted([block(0)])
 
     await asyncio.wait_for(plant.runner(U1=source).run(), 30)
@@ -118,9 +106,14 @@ async def test_a_recording_that_ends_says_so(plant: Any, scripted: Make, block: 
     assert status.account.n_stored == 128
 
 
-async def test_a_bug_in_a_source_ends_the_run_and_closes_all_links(
-    plant: Any, scripted: Make, block: Make
-) -> None:
+@pytest.mark.parametrize("state", LinkState)
+def test_the_last_result_of_a_recording_that_has_ended_stays(state):
+    expected = {LinkState.CONNECTED: Reason.STALE, LinkState.ENDED: None}
+    assert why_not_current(state, 1e6, 3.0) is expected.get(state, Reason.NOT_CONNECTED)
+    assert why_not_current(state, None, 3.0) is not None
+
+
+async def test_a_bug_in_a_source_ends_the_run_and_closes_all_links(plant, scripted, block):
     broken = scripted([block(0), RuntimeError("a bug")])
     healthy = scripted([block(0, "U2")], ends=False)
 
@@ -132,7 +125,7 @@ async def test_a_bug_in_a_source_ends_the_run_and_closes_all_links(
     assert broken.n_connections == 1
 
 
-async def test_a_bug_in_the_analysis_ends_the_run(plant: Any, scripted: Make, block: Make) -> None:
+async def test_a_bug_in_the_analysis_ends_the_run(plant, scripted, block):
     source = scripted([block(0, rate_hz=99.0)], ends=False)
 
     with pytest.raises(ExceptionGroup) as ended:
@@ -141,7 +134,7 @@ async def test_a_bug_in_the_analysis_ends_the_run(plant: Any, scripted: Make, bl
     assert ended.group_contains(ValueError, match="samples at 100.0 Hz, got 99.0 Hz")
 
 
-async def test_a_full_bus_makes_the_publisher_wait_and_drops_nothing(block: Make) -> None:
+async def test_a_full_bus_makes_the_publisher_wait_and_drops_nothing(block):
     bus = Bus(3, SystemClock())
     taken: list[int] = []
 

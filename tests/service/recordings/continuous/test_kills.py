@@ -80,8 +80,8 @@ def recordings_in(root: Path) -> list[Recording]:
 
 
 def test_a_kill_at_any_moment_loses_nothing_that_was_synced_and_tells_the_hole(
-    tmp_path: Path, unit: RecordedUnit, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, unit, monkeypatch
+):
     blocks = [counted_block(n) for n in range(N_BLOCKS)]
     later = [counted_block(n) for n in range(N_BLOCKS + 5, N_BLOCKS + 15)]
     with killed_at(10**9, monkeypatch) as done:
@@ -103,9 +103,7 @@ def test_a_kill_at_any_moment_loses_nothing_that_was_synced_and_tells_the_hole(
         assert len(found) + missing == told, f"killed at {deed}: not accounted for"
 
 
-def test_a_kill_during_recovery_changes_nothing(
-    tmp_path: Path, unit: RecordedUnit, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_kill_during_recovery_changes_nothing(tmp_path, unit, monkeypatch):
     blocks = [counted_block(n) for n in range(15)]
 
     def crashed(root: Path) -> None:

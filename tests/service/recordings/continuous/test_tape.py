@@ -1,8 +1,5 @@
 """All samples of a unit are kept unless the analysis needs the room; what is not is told."""
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 from rigs.capturing import counted_block, numbers, samples
 from rigs.standing_clock import StandingClock
@@ -18,8 +15,8 @@ from service.recordings.continuous_recorder import DropReason, last_end
 
 
 async def test_every_sample_is_in_recordings_that_end_at_full_multiples_of_their_length(
-    running: Any, root: Path
-) -> None:
+    running, root
+):
     async with running(root) as rig:
         rig.send(20, 120)
     first, second, third = rig.recordings()
@@ -33,9 +30,7 @@ async def test_every_sample_is_in_recordings_that_end_at_full_multiples_of_their
     assert not rig.tape.n_dropped.total()
 
 
-async def test_what_a_part_holds_is_on_the_disk_before_the_recording_is_complete(
-    running: Any, root: Path
-) -> None:
+async def test_what_a_part_holds_is_on_the_disk_before_the_recording_is_complete(running, root):
     async with running(root) as rig:
         rig.send(0, 25)
         await rig.until(lambda: rig.tape.n_written == 200)
@@ -46,9 +41,7 @@ async def test_what_a_part_holds_is_on_the_disk_before_the_recording_is_complete
         await rig.until(lambda: rig.tape.n_written == 250)  # old enough, if not long enough
 
 
-async def test_two_units_are_recorded_side_by_side_also_if_their_names_begin_alike(
-    running: Any, root: Path
-) -> None:
+async def test_two_units_are_recorded_side_by_side_also_if_their_names_begin_alike(running, root):
     async with running(root, ("pump", "pump-b")) as rig:
         rig.send(0, 20, "pump")
         rig.send(3, 200, "pump-b")  # four recordings, all of which sort behind those of "pump"
@@ -63,8 +56,8 @@ async def test_two_units_are_recorded_side_by_side_also_if_their_names_begin_ali
 
 @pytest.mark.parametrize("reason", [DropReason.ANALYSIS_BEHIND, DropReason.DISK_FULL])
 async def test_what_gives_way_to_the_analysis_is_a_hole_with_number_and_reason(
-    running: Any, root: Path, reason: DropReason
-) -> None:
+    running, root, reason
+):
     async with running(root) as rig:
         rig.send(0, 10)
         rig.reason = reason
@@ -81,9 +74,7 @@ async def test_what_gives_way_to_the_analysis_is_a_hole_with_number_and_reason(
     assert rig.tape.n_dropped == {reason: 70, DropReason.DISK_REFUSED: 0}
 
 
-async def test_a_disk_that_does_not_keep_up_costs_samples_and_never_memory(
-    running: Any, root: Path
-) -> None:
+async def test_a_disk_that_does_not_keep_up_costs_samples_and_never_memory(running, root):
     async with running(root) as rig:
         rig.send(0, 10)
         rig.clock.s = tape.MAX_WAIT_S + 1.0  # nothing of it was written meanwhile
@@ -97,8 +88,8 @@ async def test_a_disk_that_does_not_keep_up_costs_samples_and_never_memory(
 
 
 async def test_a_disk_that_refuses_is_told_and_recording_goes_on_after_it(
-    running: Any, root: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    running, root, monkeypatch
+):
     class RefusedSegment:
         def __init__(self, *_: object) -> None:
             raise OSError(28, "No space left on device")
@@ -136,8 +127,8 @@ async def test_a_disk_that_refuses_is_told_and_recording_goes_on_after_it(
     ],
 )
 async def test_a_hole_is_told_by_number_and_reason_and_nothing_is_recorded_twice(
-    running: Any, root: Path, lives: Any, expected: Any, missing: dict[str, int]
-) -> None:
+    running, root, lives, expected, missing
+):
     for sent in lives:
         async with running(root) as rig:
             for start, stop in sent:
@@ -152,9 +143,7 @@ async def test_a_hole_is_told_by_number_and_reason_and_nothing_is_recorded_twice
     assert {**summary.rejected, **gaps} == missing
 
 
-async def test_a_device_that_counts_anew_is_recorded_with_both_epochs(
-    running: Any, root: Path
-) -> None:
+async def test_a_device_that_counts_anew_is_recorded_with_both_epochs(running, root):
     async with running(root) as rig:
         rig.send(10, 20)
         rig.send(20, 30, epoch=2)
@@ -164,9 +153,7 @@ async def test_a_device_that_counts_anew_is_recorded_with_both_epochs(
     assert samples(recording) == numbers(10, 30)
 
 
-async def test_samples_that_turn_out_to_be_no_counts_begin_another_recording(
-    running: Any, root: Path
-) -> None:
+async def test_samples_that_turn_out_to_be_no_counts_begin_another_recording(running, root):
     async with running(root) as rig:
         rig.send(0, 12)
         rig.send(12, 20, by=0.25)
@@ -176,9 +163,7 @@ async def test_samples_that_turn_out_to_be_no_counts_begin_another_recording(
     assert (first.manifest.sample_type, second.manifest.sample_type) == ("int16", "float32")
 
 
-async def test_a_part_that_is_damaged_before_it_is_joined_is_set_aside(
-    running: Any, root: Path
-) -> None:
+async def test_a_part_that_is_damaged_before_it_is_joined_is_set_aside(running, root):
     async with running(root) as rig:
         rig.send(0, 30)
         await rig.until(lambda: rig.tape.n_written == 300)
@@ -191,9 +176,7 @@ async def test_a_part_that_is_damaged_before_it_is_joined_is_set_aside(
     assert samples(open_recording(whole)) == numbers(0, 10) + numbers(20, 30)
 
 
-async def test_what_another_process_is_writing_of_its_own_units_is_let_alone(
-    running: Any, root: Path
-) -> None:
+async def test_what_another_process_is_writing_of_its_own_units_is_let_alone(running, root):
     theirs = [
         root / f"U2-20260101T000000.000Z-continuous{end}" for end in (".parts", ".incomplete")
     ]
@@ -212,8 +195,8 @@ class Plant:
     def __init__(self) -> None:
         self.clock = StandingClock()
         self.bus = Bus(100, self.clock)
-        self.is_full, self.refuses_questions = False, True
-        self.pressure = Pressure(self.bus, lambda: self.is_full, lambda: self.refuses_questions)
+        self.is_full = False
+        self.pressure = Pressure(self.bus, lambda: self.is_full)
 
 
 @pytest.fixture
@@ -221,9 +204,7 @@ def plant() -> Plant:
     return Plant()
 
 
-async def test_blocks_that_wait_long_come_before_recording_until_they_wait_no_more(
-    plant: Plant,
-) -> None:
+async def test_blocks_that_wait_long_come_before_recording_until_they_wait_no_more(plant):
     await plant.bus.publish(counted_block(0))
     plant.clock.s = pressure.BEHIND_S
     assert plant.pressure.look() is None
@@ -240,21 +221,12 @@ async def test_blocks_that_wait_long_come_before_recording_until_they_wait_no_mo
     assert plant.pressure.look() is None
 
 
-async def test_a_queue_that_fills_does_as_well(plant: Plant) -> None:
+async def test_a_queue_that_fills_does_as_well(plant):
     for number in range(26):
         await plant.bus.publish(counted_block(number))
     assert plant.pressure.look() is DropReason.ANALYSIS_BEHIND
 
 
-async def test_questions_are_given_up_before_samples_are(plant: Plant) -> None:
-    plant.refuses_questions = False
-    await plant.bus.publish(counted_block(0))
-    plant.clock.s = 10 * pressure.BEHIND_S
-    assert plant.pressure.look() is None
-    plant.refuses_questions = True
-    assert plant.pressure.look() is DropReason.ANALYSIS_BEHIND
-
-
-def test_a_disk_that_is_nearly_full_takes_no_more_recordings(plant: Plant) -> None:
+def test_a_disk_that_is_nearly_full_takes_no_more_recordings(plant):
     plant.is_full = True
     assert plant.pressure.look() is DropReason.DISK_FULL

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rigs.blocks import cell_block
 from rigs.memory_folder import path_in_memory  # noqa: F401 - a fixture
 from rigs.standing_clock import StandingClock
 
-from acquisition.delivery.blocks import RawBlock
 from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
 from core.machine.channel import Measurand
@@ -46,7 +46,8 @@ def recording(folder: Path, start_ns: int, unit: str = "U1", step_ns: int = 10**
         for first in range(0, N_SAMPLES, 50):
             counts = np.array([index, -index])[:, first : first + 50]
             stamp = start_ns + first // 50 * step_ns
-            writer.write(RawBlock(1, first, stamp, RATE_HZ, counts, (True, True), ()))
+            own = {"calibration": recorded.calibration}
+            writer.write(cell_block(1, first, stamp, RATE_HZ, counts, (True, True), (), **own))
     return folder
 
 

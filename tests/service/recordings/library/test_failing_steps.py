@@ -34,7 +34,7 @@ def index(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     return index
 
 
-def test_a_full_disk_is_freed_though_the_index_cannot_be_written(rig: Any, index: Any) -> None:
+def test_a_full_disk_is_freed_though_the_index_cannot_be_written(rig, index):
     for hour in range(3):
         rig.make(hour)
     rig.caretaker.look()
@@ -57,9 +57,7 @@ def test_a_full_disk_is_freed_though_the_index_cannot_be_written(rig: Any, index
     assert rig.caretaker.found.n_missing == 0
 
 
-def test_what_could_not_be_told_before_a_restart_is_not_taken_for_a_loss(
-    rig: Any, index: Any
-) -> None:
+def test_what_could_not_be_told_before_a_restart_is_not_taken_for_a_loss(rig, index):
     rig.make(0)
     rig.caretaker.look()
     rig.space, index.is_away = FULL, True
@@ -73,9 +71,7 @@ def test_what_could_not_be_told_before_a_restart_is_not_taken_for_a_loss(
     assert (rig.caretaker.found.n_missing, rig.caretaker.found.n_damaged) == (0, 0)
 
 
-def test_one_that_comes_back_before_its_removal_was_told_is_there(
-    rig: Any, index: Any, tmp_path: Path
-) -> None:
+def test_one_that_comes_back_before_its_removal_was_told_is_there(rig, index, tmp_path):
     folder = rig.make(0)
     shutil.copytree(folder, tmp_path / "copy")
     rig.caretaker.look()
@@ -90,7 +86,7 @@ def test_one_that_comes_back_before_its_removal_was_told_is_there(
     assert rig.names() == [folder.name]
 
 
-def test_files_of_others_in_a_removed_folder_stay_and_stop_nothing(rig: Any) -> None:
+def test_files_of_others_in_a_removed_folder_stay_and_stop_nothing(rig):
     annotated, other = rig.make(0), rig.make(1)
     rig.caretaker.look()
     (annotated / "notes.txt").write_text("to be kept")
@@ -107,7 +103,7 @@ def test_files_of_others_in_a_removed_folder_stay_and_stop_nothing(rig: Any) -> 
     assert RecordingLibrary((rig.roots[CONTINUOUS],)).newest(10) == []
 
 
-def test_a_folder_that_is_away_stops_nothing_in_another(rig: Any, tmp_path: Path) -> None:
+def test_a_folder_that_is_away_stops_nothing_in_another(rig, tmp_path):
     rig.make(0, CAPTURE)
     rig.make(0)
     rig.caretaker.look()
@@ -126,7 +122,7 @@ def test_a_folder_that_is_away_stops_nothing_in_another(rig: Any, tmp_path: Path
     assert rig.names() == []
 
 
-def test_one_that_cannot_be_removed_costs_the_next_one(rig: Any) -> None:
+def test_one_that_cannot_be_removed_costs_the_next_one(rig):
     stuck, old, young = (rig.make(hour) for hour in range(3))
     rig.caretaker.look()
     size = max(file.n_bytes for file in rig.files())
@@ -140,9 +136,7 @@ def test_one_that_cannot_be_removed_costs_the_next_one(rig: Any) -> None:
     assert (stuck.exists(), old.exists(), young.exists()) == (True, False, True)
 
 
-def test_evidence_that_cannot_be_read_costs_no_room_for_continuous_ones(
-    rig: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_evidence_that_cannot_be_read_costs_no_room_for_continuous_ones(rig, monkeypatch):
     def refused(_: object) -> frozenset[str]:
         raise OSError(errno.EIO, "Input/output error")
 
@@ -159,7 +153,7 @@ def test_evidence_that_cannot_be_read_costs_no_room_for_continuous_ones(
     assert len(rig.names(CAPTURE)) == 2
 
 
-def test_room_is_measured_though_nobody_can_look_after_the_recordings(rig: Any) -> None:
+def test_room_is_measured_though_nobody_can_look_after_the_recordings(rig):
     def hire() -> Any:
         raise StoreError("the database is away")
 
@@ -176,7 +170,7 @@ def test_room_is_measured_though_nobody_can_look_after_the_recordings(rig: Any) 
     keeper.close()
 
 
-def test_a_disk_that_does_not_say_leaves_the_others_measured(rig: Any) -> None:
+def test_a_disk_that_does_not_say_leaves_the_others_measured(rig):
     def measured(root: Path) -> DiskSpace:
         if root == rig.roots[CAPTURE]:
             raise OSError(errno.EIO, "Input/output error")
@@ -193,7 +187,7 @@ def test_a_disk_that_does_not_say_leaves_the_others_measured(rig: Any) -> None:
     assert rig.names() == []
 
 
-def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Any) -> None:
+def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig, index):
     keeper = rig.keeper(lambda: rig.caretaker)
     parts: Any = SimpleNamespace(
         store_error=None,
@@ -207,7 +201,7 @@ def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Any) -> 
         condition=None,
         trouble=None,
     )
-    look = health_of([], *[parts] * 7, recordings=keeper, soundness=parts)
+    look = health_of([], *[parts] * 6, recordings=keeper, soundness=parts)
     folder = rig.make(0)
     index.is_away = True
     keeper.look()
@@ -227,9 +221,7 @@ def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Any) -> 
     keeper.close()
 
 
-def test_a_folder_that_is_closed_holds_up_no_other(
-    rig: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_that_is_closed_holds_up_no_other(rig, monkeypatch):
     listed = Path.iterdir
 
     def refused(folder: Path) -> Iterator[Path]:

@@ -34,9 +34,7 @@ def refusal(monkeypatch: pytest.MonkeyPatch) -> dict[str, OSError]:
 
 
 @pytest.mark.parametrize("number", [errno.EMFILE, errno.EIO, errno.ENOMEM])
-def test_a_passing_error_makes_nothing_damaged(
-    rig: Any, refusal: dict[str, OSError], number: int
-) -> None:
+def test_a_passing_error_makes_nothing_damaged(rig, refusal, number):
     folder, other = rig.make(0), rig.make(1)
     rig.caretaker.look()
     refusal[folder.name] = OSError(number, "not now")
@@ -56,7 +54,7 @@ def test_a_passing_error_makes_nothing_damaged(
     assert len({file.checked_ns for file in rig.files()} & set(checked.values())) == 1
 
 
-def test_a_passing_error_renames_nothing_that_is_new(rig: Any, refusal: dict[str, OSError]) -> None:
+def test_a_passing_error_renames_nothing_that_is_new(rig, refusal):
     folder, other = rig.make(0), rig.make(1)
     refusal[folder.name] = OSError(errno.EMFILE, "Too many open files")
     with pytest.raises(OSError, match=f"Too many open files: '{folder.name}'"):
@@ -70,9 +68,7 @@ def test_a_passing_error_renames_nothing_that_is_new(rig: Any, refusal: dict[str
     assert [file.name for file in rig.files()] == [folder.name, other.name]
 
 
-def test_the_check_of_all_names_what_cannot_be_read_and_goes_on(
-    rig: Any, refusal: dict[str, OSError]
-) -> None:
+def test_the_check_of_all_names_what_cannot_be_read_and_goes_on(rig, refusal):
     folder, other = rig.make(0), rig.make(1)
     rig.caretaker.look()
     refusal[folder.name] = OSError(errno.EIO, "Input/output error")
@@ -83,9 +79,7 @@ def test_the_check_of_all_names_what_cannot_be_read_and_goes_on(
     assert (two.name, two.found) == (other.name, RecordingState.SOUND)
 
 
-def test_memory_that_is_short_makes_nothing_damaged(
-    rig: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_memory_that_is_short_makes_nothing_damaged(rig, monkeypatch):
     def short(_: Path) -> Any:
         raise ConfigError("no") from MemoryError()
 
@@ -96,7 +90,7 @@ def test_memory_that_is_short_makes_nothing_damaged(
     assert rig.names() == [folder.name]
 
 
-def test_nothing_of_a_recording_that_is_known_to_be_damaged_is_handed_out(rig: Any) -> None:
+def test_nothing_of_a_recording_that_is_known_to_be_damaged_is_handed_out(rig):
     folder = rig.make(0)
     shelf = RecordingLibrary(
         (rig.roots[WaveformKind.CONTINUOUS],), {folder.name: "a bit has flipped"}
@@ -112,7 +106,7 @@ def test_nothing_of_a_recording_that_is_known_to_be_damaged_is_handed_out(rig: A
     assert kept.fault == "a bit has flipped"
 
 
-def test_every_damage_is_noticed_when_the_recording_is_read_once_more(rig: Any) -> None:
+def test_every_damage_is_noticed_when_the_recording_is_read_once_more(rig):
     folder = rig.make(0)
     rig.caretaker.look()
     [entry] = rig.files()

@@ -122,7 +122,7 @@ KINDS = [flip, flip, flip, drop, swap, renumber, shift, double, cut]
 
 
 @pytest.mark.parametrize("n_corruptions", fast_and_long(150, 2000))
-def test_many_ways_to_damage_a_trail_are_all_noticed(bench: Bench, n_corruptions: int) -> None:
+def test_many_ways_to_damage_a_trail_are_all_noticed(bench, n_corruptions):
     assert file_trail(bench.path).verify().is_whole
     unnoticed = []
     for seed in range(n_corruptions):
@@ -140,7 +140,7 @@ def test_many_ways_to_damage_a_trail_are_all_noticed(bench: Bench, n_corruptions
 
 
 @pytest.mark.parametrize("n_bits", fast_and_long(1, 8))
-def test_every_bit_of_the_head_counts(bench: Bench, n_bits: int) -> None:
+def test_every_bit_of_the_head_counts(bench, n_bits):
     whole = bench.head.read_bytes()
     for at in range(len(whole)):
         for bit in ((at + n) % 8 for n in range(n_bits)):
@@ -165,9 +165,9 @@ ALTERED: list[tuple[str, str]] = [
     ("DELETE FROM audit WHERE number BETWEEN 4 AND 6", "entries 4 to 6 are missing"),
     (
         "DELETE FROM audit WHERE number > 7",
-        "entries 8 to 9 are missing at the end: the head names 9",
+        "entries 8 to 9 are missing at the end: the head file names entry 9",
     ),
-    ("DELETE FROM audit", "entries 1 to 9 are missing at the end: the head names 9"),
+    ("DELETE FROM audit", "entries 1 to 9 are missing at the end: the head file names entry 9"),
     (
         "DELETE FROM audit WHERE number = 3; UPDATE audit SET number = 3 WHERE number = 8",
         "entry 3 is out of order; its content is that of entry 8",
@@ -179,18 +179,16 @@ ALTERED: list[tuple[str, str]] = [
 ]
 
 
-def test_the_first_wrong_entry_is_named(bench: Bench) -> None:
+def test_the_first_wrong_entry_is_named(bench):
     for statement, expected in ALTERED:
         assert finding_after(bench, statement) == expected
         bench.repair()
 
 
-def test_a_whole_trail_of_another_database_is_not_taken_for_this_one(
-    bench: Bench, tmp_path: Path, deed: Callable[..., AuditAction]
-) -> None:
+def test_a_whole_trail_of_another_database_is_not_taken_for_this_one(bench, tmp_path, deed):
     with closing(SqliteStore(tmp_path / "other.sqlite3")) as other:
         other.audit.record([deed(n, actor="somebody else") for n in range(N_ENTRIES)])
     bench.path.write_bytes((tmp_path / "other.sqlite3").read_bytes())
 
     found: Any = file_trail(bench.path).verify().finding
-    assert found.detail == "entry 9 does not match the head's hash"
+    assert found.detail == "entry 9 does not match the hash in the head file"

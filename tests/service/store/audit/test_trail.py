@@ -27,9 +27,7 @@ def all_of(store: SqliteStore) -> list[AuditEntry]:
     return list(reversed(store.audit.entries(AuditQuery(limit=10_000))))
 
 
-def test_what_was_done_is_read_back_newest_first_and_page_by_page(
-    store: SqliteStore, deed: Build
-) -> None:
+def test_what_was_done_is_read_back_newest_first_and_page_by_page(store, deed):
     store.audit.record([deed(n) for n in range(5)])
     first = store.audit.entries(AuditQuery(limit=2))
     second = store.audit.entries(AuditQuery(limit=2, before=first[-1].number))
@@ -42,7 +40,7 @@ def test_what_was_done_is_read_back_newest_first_and_page_by_page(
     assert newest.previous_hash == first[1].hash
 
 
-def test_entries_are_found_by_actor_action_object_and_time(store: SqliteStore, deed: Build) -> None:
+def test_entries_are_found_by_actor_action_object_and_time(store, deed):
     deeds = [deed(0), deed(1, actor="B"), deed(2, action="x.y"), deed(3, object="U2")]
     store.audit.record(deeds)
 
@@ -56,9 +54,7 @@ def test_entries_are_found_by_actor_action_object_and_time(store: SqliteStore, d
     assert numbers(actor="' OR 1=1 --") == []
 
 
-def test_the_database_refuses_to_change_entries(
-    store: SqliteStore, path: Path, deed: Build
-) -> None:
+def test_the_database_refuses_to_change_entries(store, path, deed):
     store.audit.record([deed(0), deed(1)])
     for statement in (
         "UPDATE audit SET actor = 'nobody'",
@@ -77,9 +73,7 @@ def test_the_database_refuses_to_change_entries(
 @example("🦭" * 500, "a\ud800b\r\n\u202e")
 @example("\x00", "=HYPERLINK(1)")
 @example("", "'; DROP TABLE audit; --")
-def test_any_name_and_any_reason_can_be_written(
-    store: SqliteStore, path: Path, deed: Build, actor: str, reason: str
-) -> None:
+def test_any_name_and_any_reason_can_be_written(store, path, deed, actor, reason):
     texts = {"object": reason, "action": reason, "peer": actor, "after": {"a": actor}}
     store.audit.record([deed(actor=actor, reason=reason, **texts)])
 
@@ -89,7 +83,7 @@ def test_any_name_and_any_reason_can_be_written(
     assert file_trail(path).verify().is_whole
 
 
-def test_a_document_without_end_is_kept_as_its_beginning(store: SqliteStore, deed: Build) -> None:
+def test_a_document_without_end_is_kept_as_its_beginning(store, deed):
     store.audit.record([deed(after={"text": "x" * (2 * MAX_DOCUMENT)})])
     [entry] = all_of(store)
     assert entry.after is not None
@@ -97,7 +91,7 @@ def test_a_document_without_end_is_kept_as_its_beginning(store: SqliteStore, dee
     assert f'"n_characters":{2 * MAX_DOCUMENT + 11}' in entry.after
 
 
-def test_several_writers_leave_no_hole(store: SqliteStore, path: Path, deed: Build) -> None:
+def test_several_writers_leave_no_hole(store, path, deed):
     with closing(SqliteStore(path)) as other, ThreadPoolExecutor(6) as pool:
         list(pool.map(lambda n: (store, other)[n % 2].audit.record([deed(n)] * 3), range(24)))
 
@@ -106,9 +100,7 @@ def test_several_writers_leave_no_hole(store: SqliteStore, path: Path, deed: Bui
     assert read_head(head_path(path)) == AuditHead(72, verdict.hash)
 
 
-def test_an_entry_that_is_written_while_the_trail_is_read_is_no_crash(
-    store: SqliteStore, path: Path, deed: Build
-) -> None:
+def test_an_entry_that_is_written_while_the_trail_is_read_is_no_crash(store, path, deed):
     @contextmanager
     def read_late() -> Iterator[sqlite3.Connection]:
         store.audit.record([deed(1)])
@@ -120,9 +112,7 @@ def test_an_entry_that_is_written_while_the_trail_is_read_is_no_crash(
     assert (verdict.finding, verdict.n_entries, verdict.n_behind) == (None, 2, 0)
 
 
-def test_a_crash_before_the_head_was_written_is_no_tampering_and_is_repaired(
-    store: SqliteStore, path: Path, deed: Build
-) -> None:
+def test_a_crash_before_the_head_was_written_is_no_tampering_and_is_repaired(store, path, deed):
     store.audit.record([deed(0)])
     before = head_path(path).read_bytes()
     store.audit.record([deed(1), deed(2)])
@@ -138,7 +128,7 @@ def test_a_crash_before_the_head_was_written_is_no_tampering_and_is_repaired(
     assert repaired.n_entries == 4
 
 
-def test_a_crash_before_the_very_first_entry_is_no_tampering(path: Path, deed: Build) -> None:
+def test_a_crash_before_the_very_first_entry_is_no_tampering(path, deed):
     SqliteStore(path).close()
     empty = file_trail(path).verify()
     store = SqliteStore(path)
@@ -170,13 +160,13 @@ def test_a_cut_trail_stays_noticed_after_the_service_has_gone_on(
     assert (verdict.is_whole, verdict.contradictions) == (True, (3,))
     assert (told.actor, told.action) == ("padwatch", HEAD_DIFFERED)
     assert told.reason == (
-        "the head names entry 4, but the trail ends at 2"
+        "the head file names entry 4, but the trail ends at 2"
         if with_head
-        else "the head does not exist"
+        else "the head file does not exist"
     )
 
 
-def test_a_database_that_was_put_in_the_place_of_another_tells_so(path: Path, deed: Build) -> None:
+def test_a_database_that_was_put_in_the_place_of_another_tells_so(path, deed):
     for _ in range(2):
         path.unlink(missing_ok=True)
         with closing(SqliteStore(path)) as store:
@@ -184,9 +174,7 @@ def test_a_database_that_was_put_in_the_place_of_another_tells_so(path: Path, de
     assert file_trail(path).verify().contradictions == (1,)
 
 
-def test_a_head_that_cannot_be_written_stops_no_deed_and_is_written_later(
-    store: SqliteStore, path: Path, deed: Build
-) -> None:
+def test_a_head_that_cannot_be_written_stops_no_deed_and_is_written_later(store, path, deed):
     head = head_path(path)
     store.audit.record([deed(0)])
     head.unlink()
@@ -205,7 +193,7 @@ def test_a_head_that_cannot_be_written_stops_no_deed_and_is_written_later(
     assert file_trail(path).verify().is_whole
 
 
-def test_results_leave_the_head_alone(store: SqliteStore, path: Path, deed: Build) -> None:
+def test_results_leave_the_head_alone(store, path, deed):
     store.audit.record([deed(0)])
     before = head_path(path).stat()
     for n in range(20):
@@ -214,9 +202,7 @@ def test_results_leave_the_head_alone(store: SqliteStore, path: Path, deed: Buil
     assert head_path(path).stat().st_mtime_ns == before.st_mtime_ns
 
 
-def test_a_transaction_that_fails_leaves_no_entry(
-    store: SqliteStore, path: Path, deed: Build
-) -> None:
+def test_a_transaction_that_fails_leaves_no_entry(store, path, deed):
     store.audit.record([deed(0)])
     with pytest.raises(StoreError):
         store.audit.record([deed(1), replace(deed(2), time_ns="soon")])  # type: ignore[arg-type]
@@ -227,9 +213,7 @@ def test_a_transaction_that_fails_leaves_no_entry(
     assert file_trail(path).verify().is_whole
 
 
-def test_a_trail_is_verified_while_others_write(
-    store: SqliteStore, path: Path, deed: Build
-) -> None:
+def test_a_trail_is_verified_while_others_write(store, path, deed):
     with ThreadPoolExecutor(2) as pool:
         writing = pool.map(lambda n: store.audit.record([deed(n)]), range(100))
         verdicts = [file_trail(path).verify() for _ in range(30)]
@@ -237,7 +221,7 @@ def test_a_trail_is_verified_while_others_write(
     assert [(v.finding, v.contradictions) for v in verdicts] == [(None, ())] * 30
 
 
-def test_where_there_is_no_trail_that_is_said(tmp_path: Path) -> None:
+def test_where_there_is_no_trail_that_is_said(tmp_path):
     with pytest.raises(StoreError, match="the database does not exist"):
         file_trail(tmp_path / "nothing.sqlite3").verify()
     sqlite3.connect(tmp_path / "other.sqlite3").close()

@@ -54,8 +54,8 @@ def copy(database: Path, folder: Path) -> Path:
 
 
 def test_a_copy_of_a_database_in_use_is_one_private_file_with_all_that_was_committed(
-    database: Path, folder: Path
-) -> None:
+    database, folder
+):
     with closing(SqliteStore(database)) as store:
         write_gaps(store, 0, 100)
         made = back_up(database, folder, NOW_NS, 3)
@@ -70,9 +70,7 @@ def test_a_copy_of_a_database_in_use_is_one_private_file_with_all_that_was_commi
     assert gaps_in(database) == 101
 
 
-def test_a_copy_is_of_one_moment_while_the_service_writes_without_pause(
-    database: Path, folder: Path
-) -> None:
+def test_a_copy_is_of_one_moment_while_the_service_writes_without_pause(database, folder):
     done = Event()
     with closing(SqliteStore(database)) as store:
 
@@ -97,9 +95,7 @@ def test_a_copy_is_of_one_moment_while_the_service_writes_without_pause(
     assert all(n_gaps % 10 == 0 for n_gaps in found)
 
 
-def test_only_the_newest_copies_are_kept_and_other_files_are_left_alone(
-    database: Path, folder: Path
-) -> None:
+def test_only_the_newest_copies_are_kept_and_other_files_are_left_alone(database, folder):
     folder.mkdir()
     (folder / "padwatch-notes.sqlite3").write_text("mine", encoding="utf-8")
     (folder / ".padwatch-20250101T000000Z.sqlite3.part").write_text("a crash", encoding="utf-8")
@@ -114,9 +110,7 @@ def test_only_the_newest_copies_are_kept_and_other_files_are_left_alone(
     }
 
 
-def test_a_clock_that_was_set_back_does_not_cost_the_copy_just_made(
-    database: Path, folder: Path
-) -> None:
+def test_a_clock_that_was_set_back_does_not_cost_the_copy_just_made(database, folder):
     with closing(SqliteStore(database)):
         late = back_up(database, folder, NOW_NS + HOUR_NS, 1)
         early = back_up(database, folder, NOW_NS, 1)
@@ -132,9 +126,7 @@ def damage(path: Path) -> None:
         file.write(b"\xff" * 8192)
 
 
-def test_a_damaged_database_gives_no_copy_and_costs_no_older_one(
-    database: Path, copy: Path, folder: Path
-) -> None:
+def test_a_damaged_database_gives_no_copy_and_costs_no_older_one(database, copy, folder):
     with closing(sqlite3.connect(database)) as connection:
         connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     damage(database)
@@ -145,15 +137,13 @@ def test_a_damaged_database_gives_no_copy_and_costs_no_older_one(
     assert list(folder.iterdir()) == [copy]
 
 
-def test_what_is_not_there_gives_no_copy_and_makes_no_folder(database: Path, folder: Path) -> None:
+def test_what_is_not_there_gives_no_copy_and_makes_no_folder(database, folder):
     with pytest.raises(BackupError, match="the database does not exist"):
         back_up(database, folder, NOW_NS, 1)
     assert not folder.exists()
 
 
-def test_a_copy_takes_the_place_of_a_database_that_is_kept_beside_it(
-    database: Path, copy: Path
-) -> None:
+def test_a_copy_takes_the_place_of_a_database_that_is_kept_beside_it(database, copy):
     done = restore(copy, database, NOW_NS)
 
     assert gaps_in(database) == 100
@@ -162,7 +152,7 @@ def test_a_copy_takes_the_place_of_a_database_that_is_kept_beside_it(
     assert gaps_in(copy) == 100
 
 
-def test_a_copy_is_put_where_there_is_nothing_or_only_damage(copy: Path, tmp_path: Path) -> None:
+def test_a_copy_is_put_where_there_is_nothing_or_only_damage(copy, tmp_path):
     elsewhere = tmp_path / "new" / "padwatch.sqlite3"
 
     assert restore(copy, elsewhere, NOW_NS).before is None
@@ -172,9 +162,7 @@ def test_a_copy_is_put_where_there_is_nothing_or_only_damage(copy: Path, tmp_pat
     assert gaps_in(elsewhere) == 100
 
 
-def test_nothing_is_restored_while_the_service_has_the_database_open(
-    database: Path, copy: Path
-) -> None:
+def test_nothing_is_restored_while_the_service_has_the_database_open(database, copy):
     with closing(SqliteStore(database)) as store:
         with pytest.raises(BackupError, match="is in use; stop padwatch"):
             restore(copy, database, NOW_NS)
@@ -197,7 +185,7 @@ def crashed(database: Path) -> None:
         os.replace(aside.with_name(aside.name + ending), f"{database}{ending}")
 
 
-def test_the_log_of_a_crash_does_not_get_into_what_is_restored(database: Path, copy: Path) -> None:
+def test_the_log_of_a_crash_does_not_get_into_what_is_restored(database, copy):
     crashed(database)
 
     done = restore(copy, database, NOW_NS)
@@ -231,9 +219,7 @@ SPOILT: dict[str, tuple[Callable[[Path], None], str]] = {
 
 
 @pytest.mark.parametrize("name", SPOILT)
-def test_a_copy_that_is_not_whole_or_not_ours_is_refused_and_changes_nothing(
-    name: str, database: Path, copy: Path
-) -> None:
+def test_a_copy_that_is_not_whole_or_not_ours_is_refused_and_changes_nothing(name, database, copy):
     do, words = SPOILT[name]
     do(copy)
 
@@ -244,7 +230,7 @@ def test_a_copy_that_is_not_whole_or_not_ours_is_refused_and_changes_nothing(
 
 
 @pytest.mark.usefixtures("copy")
-def test_a_database_is_not_restored_from_itself(database: Path) -> None:
+def test_a_database_is_not_restored_from_itself(database):
     with pytest.raises(BackupError, match="is the database itself"):
         restore(database, database, NOW_NS)
     assert gaps_in(database) == 150

@@ -1,12 +1,10 @@
 """Trends over what has become coarser say the same, whatever comes late, in whatever order."""
 
 from contextlib import ExitStack, closing
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from harness.places import Place
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rigs.assessments import assessment
@@ -26,25 +24,17 @@ from rigs.old_results import (
     require_same_hours,
 )
 from rigs.rolled_trends import gather_all, n_rows
-from rigs.store_fixtures import Execute
 from rigs.tiers import fast_and_long
 
 from core.condition.operating_state import OperatingState
 from service.store import retention as deleting
 from service.store.port import ValueRange
-from service.store.retention import Ages
 from service.store.rollups import gathering as rolling
 from service.store.sqlite import SqliteStore
 
 
 @pytest.mark.parametrize(("limits", "widths"), TIERS)
-def test_late_readings_are_added_to_what_is_left_of_their_hour(
-    rolled: SqliteStore,
-    plain: SqliteStore,
-    path: Path,
-    limits: Ages,
-    widths: tuple[int, ...],
-) -> None:
+def test_late_readings_are_added_to_what_is_left_of_their_hour(rolled, plain, path, limits, widths):
     delete_all(rolled, limits)
     random = np.random.default_rng(2)
     late = [
@@ -76,7 +66,7 @@ STEPS = st.lists(
 
 
 @pytest.mark.parametrize("n_examples", fast_and_long(6, 60))
-def test_whatever_happens_in_whatever_order_hours_say_what_was_read(n_examples: int) -> None:
+def test_whatever_happens_in_whatever_order_hours_say_what_was_read(n_examples):
     @settings(max_examples=n_examples, deadline=None)
     @given(STEPS, st.integers(0, 2**31))
     def check(steps: list[tuple[str, int]], seed: int) -> None:
@@ -138,15 +128,7 @@ def overwritten(writer: Any, series: int, hour_ns: int, _: object) -> None:
         ),
     ],
 )
-def test_planted_bugs_are_found(
-    rolled: SqliteStore,
-    plain: SqliteStore,
-    execute: Execute,
-    monkeypatch: pytest.MonkeyPatch,
-    module: object,
-    name: str,
-    bug: object,
-) -> None:
+def test_planted_bugs_are_found(rolled, plain, execute, monkeypatch, module, name, bug):
     """Late readings that overwrite their hour, and deleting unseen what was not rolled up."""
     monkeypatch.setattr(module, name, bug)
     execute("DELETE FROM rollup_cell WHERE width_s = 3600 AND start_ns = ?", (T0 + 2 * HOUR_NS,))
@@ -165,9 +147,7 @@ def test_planted_bugs_are_found(
 @pytest.mark.parametrize(
     ("limits", "width_s"), [(TIERS[0][0], 60), (TIERS[1][0], 600), (TIERS[2][0], 3600)]
 )
-def test_a_trend_over_what_is_gone_says_how_fine_it_is(
-    rolled: SqliteStore, limits: Ages, width_s: int
-) -> None:
+def test_a_trend_over_what_is_gone_says_how_fine_it_is(rolled, limits, width_s):
     before = rolled.trend(asked(1, max_points=5000))
     assert (before.bucket_ns, before.coarse_until_ns) == (None, None)
 
@@ -183,7 +163,7 @@ def test_a_trend_over_what_is_gone_says_how_fine_it_is(
     assert len(newest.time_ns) > 30
 
 
-def test_pages_of_single_readings_say_from_when_on_there_are_any(rolled: SqliteStore) -> None:
+def test_pages_of_single_readings_say_from_when_on_there_are_any(rolled):
     delete_all(rolled)
 
     page = rolled.trend(asked(is_page=True, max_points=1000))
@@ -192,7 +172,7 @@ def test_pages_of_single_readings_say_from_when_on_there_are_any(rolled: SqliteS
     assert min(page.time_ns) >= NOW_NS - HOUR_NS
 
 
-def test_bounds_take_cells_that_are_wholly_within(rolled: SqliteStore, plain: SqliteStore) -> None:
+def test_bounds_take_cells_that_are_wholly_within(rolled, plain):
     delete_all(rolled)
     bounds = {"oil_temperature_c": ValueRange(45.7, 46.9)}
 
@@ -208,7 +188,7 @@ def test_bounds_take_cells_that_are_wholly_within(rolled: SqliteStore, plain: Sq
     assert all(high is None or high <= 46.9 for high in oil.maximum)
 
 
-def test_both_databases_say_the_same_before_and_after(store_place: Place) -> None:
+def test_both_databases_say_the_same_before_and_after(store_place):
     with closing(store_place.open()) as store:
         store.append(life(assessment, 150), [])
         gather_all(store)

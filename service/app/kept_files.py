@@ -1,0 +1,181 @@
+"""Construction of recorders, evidence collector, retention and disk monitor of a plant."""
+
+from collections.abc import Callable
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+
+from acquisition.clock import Clock
+from service.app.recordings import recording_writer
+from service.app.storage import (
+    CAPTURES,
+    EVIDENCE,
+    RECORDINGS,
+    built_configuration,
+    evidence_folders,
+    recordings_folder,
+)
+from service.measuring.alarm_engine import AlarmEngine
+from service.measuring.films import FilmMonitor
+from service.measuring.live_view import LiveView
+from service.recordings.around_alarms import Captures, CaptureSettings
+from service.recordings.continuous_recorder import ContinuousRecorder, DropReason
+from service.recordings.folders import place_of
+from service.recordings.index import Index
+from service.recordings.keeper import RecordingIndexer, RecordingLock
+from service.recordings.retention import RecordingRetention, RetentionRules, RoomLimits, SpaceGauge
+from service.recordings.segment import SegmentSettings
+from service.reports.collector import EvidenceCollector, SnapshotTaker
+from service.reports.document import Maker
+from service.reports.folders import captures_in_use
+from service.reports.retention import EvidenceLimits, EvidenceRetention
+from service.reports.writer import EvidenceWriter
+from service.runtime.disk import SpaceLimits, SpaceWatch, measure_disk
+from service.settings.adapter_values import recorded_unit
+from service.settings.core_values import analysis_of, film_rules_of
+from service.settings.plant import PlantFile
+from service.settings.sources.devices import ModbusVectorSettings
+from service.settings.storage import Origin, SpaceSettings
+from service.settings.units import UnitSettings
+from service.store.store import Store
+from service.store.waveforms import WaveformKind
+
+BYTES_PER_GB = 1e9
+
+
+def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
+    """Return the capture recorder of the units of a live plant; a replay makes no captures."""
+    found = plant.capture
+    kept = origin is Origin.LIVE and found.samples == "kept"
+    # a vector rack has no samples
+    waveforms = [u for u in plant.unit if not isinstance(u.source, ModbusVectorSettings)]
+    units = waveforms if kept else []
+    settings = CaptureSettings(
+        pre_s=found.pre_s,
+        post_s=found.post_s,
+        max_s=found.max_s,
+        window_s=max((_window_s(plant, unit) for unit in units), default=0.0),
+    )
+    return Captures(
+        Path(plant.service.data_folder) / CAPTURES,
+        settings,
+        {unit.id: partial(recording_writer, unit) for unit in units},
+        {unit.id: unit.sampling_hz for unit in units},
+        clock,
+    )
+
+
+def _window_s(plant: PlantFile, unit: UnitSettings) -> float:
+    """Return the length of an averaging window of a watched film; 0 if none is watched."""
+    if isinstance(film_rules_of(unit, plant.films), str):
+        return 0.0
+    analysis = analysis_of(plant.analysis)
+    n_samples = analysis.segment_samples + (analysis.n_segments - 1) * analysis.hop_samples
+    return n_samples / unit.sampling_hz
+
+
+def tape_of(
+    plant: PlantFile, origin: Origin, clock: Clock, press: Callable[[], DropReason | None]
+) -> ContinuousRecorder:
+    """Return the continuous recorder of the selected units; `press` returns why it must pause."""
+    found = plant.recording
+    units = {
+        unit.id: recorded_unit(unit)
+        for unit in plant.unit
+        # a vector rack has no samples; a replay is not recorded again
+        if found.keeps(unit.id)
+        and origin is Origin.LIVE
+        and not isinstance(unit.source, ModbusVectorSettings)
+    }
+    settings = SegmentSettings(60.0 * found.length_min, found.sync_s)
+    owned = [unit.id for unit in plant.unit] if origin is Origin.LIVE else []
+    return ContinuousRecorder(recordings_folder(plant), units, settings, clock, press, owned)
+
+
+def evidence_of(
+    plant: PlantFile,
+    origin: Origin,
+    live: LiveView,
+    films: FilmMonitor,
+    store: Store,
+    captures: Captures,
+    clock: Clock,
+) -> EvidenceCollector:
+    """Return the collector of alarm evidence; `watch` connects it to the alarms."""
+    limits, folders = limits_of(plant), evidence_folders(plant)
+    configuration = built_configuration(plant)
+    maker = Maker(plant, configuration, f"padwatch {version('padwatch')}", origin)
+    writer = EvidenceWriter(folders.evidence, maker, store.films, limits)
+    camera = SnapshotTaker({unit.id: unit for unit in plant.unit}, live, films)
+    room = EvidenceRetention(folders.evidence, limits, clock)
+    return EvidenceCollector(folders, camera, writer, room, configuration, captures, clock)
+
+
+def watch(
+    keeper: EvidenceCollector, alarms: AlarmEngine, captures: Captures, origin: Origin
+) -> None:
+    """Connect the collector of evidence to the alarms; a replay collects no evidence."""
+    if origin is Origin.LIVE:
+        alarms.set_observer(keeper.see)
+        captures.set_listener(keeper.captured)
+
+
+def limits_of(plant: PlantFile) -> EvidenceLimits:
+    """Return the limits of stored evidence."""
+    found = plant.evidence
+    return EvidenceLimits(
+        max_bytes=round(found.max_gb * BYTES_PER_GB),
+        hard_max_bytes=round(found.hard_max_gb * BYTES_PER_GB),
+        keep_days=found.keep_days,
+        max_per_alarm=found.max_per_alarm,
+        trend_days=found.trend_days,
+    )
+
+
+def space_watch(plant: PlantFile, clock: Clock) -> SpaceWatch:
+    """Return the free-space monitor of all data folders; they may be on different disks."""
+    data = Path(plant.service.data_folder)
+    folders = {"data": data, CAPTURES: data / CAPTURES, EVIDENCE: data / EVIDENCE}
+    if plant.recording.samples == "kept":
+        folders[RECORDINGS] = recordings_folder(plant)
+    return SpaceWatch(folders, space_limits(plant.space), clock)
+
+
+def space_limits(settings: SpaceSettings) -> SpaceLimits:
+    """Return the limits of free disk space from the settings."""
+    return SpaceLimits(
+        settings.alert_free_share,
+        settings.danger_free_share,
+        round(settings.alert_free_gb * BYTES_PER_GB),
+        round(settings.danger_free_gb * BYTES_PER_GB),
+    )
+
+
+def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> RecordingIndexer:
+    """Return the indexer of the recordings of a live plant, with their retention."""
+    data, rules = Path(plant.service.data_folder), retention_rules(plant)
+
+    def open_retention() -> RecordingRetention:
+        return RecordingRetention(rules, Index(store.waveforms, place_of(data)), clock)
+
+    return RecordingIndexer(rules.gauge, open_retention, clock, RecordingLock(data))
+
+
+def retention_rules(plant: PlantFile) -> RetentionRules:
+    """Return the folders of recordings and the rules of their retention."""
+    data = Path(plant.service.data_folder)
+    room = RoomLimits(
+        continuous_bytes=round(plant.recording.max_gb * BYTES_PER_GB),
+        capture_bytes=round(plant.capture.max_gb * BYTES_PER_GB),
+        continuous_days=plant.recording.max_days,
+    )
+    roots = {
+        WaveformKind.CAPTURE: data / CAPTURES,
+        WaveformKind.CONTINUOUS: recordings_folder(plant),
+    }
+    return RetentionRules(
+        roots=roots,
+        room=room,
+        gauge=SpaceGauge(roots, space_limits(plant.space), measure_disk),
+        in_use=partial(captures_in_use, data / EVIDENCE),
+    )

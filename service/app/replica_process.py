@@ -1,0 +1,149 @@
+"""`padwatch serve`: a serving process of a cluster, which reads reports from the database."""
+
+import asyncio
+import socket
+from collections.abc import Callable
+from contextlib import closing
+
+from acquisition.clock import Clock
+from service.api.auth.authenticator import Authenticator
+from service.api.context import Context
+from service.app.listener import require_protected
+from service.app.notifications import receivers_of
+from service.app.process import Supervision, run_until_stopped, start_loops
+from service.app.service_audit import ServiceTrail
+from service.app.serving_process import references_of, serve_requests
+from service.app.storage import open_access, open_store
+from service.app.web import access_desk
+from service.cluster.replica_metrics import replica_metrics
+from service.cluster.serving_side import DatabaseOperators, Feed, ReplicaDeliveries
+from service.live.client import LiveClient
+from service.runtime.heartbeats import Heartbeats, Pulse
+from service.runtime.service_manager import NO_MANAGER, ServiceManager
+from service.settings.core_values import refresh_s
+from service.settings.plant import PlantFile
+from service.settings.storage import Origin
+from service.store.store import Store
+
+
+class Replica:
+    """State of a plant from the reports of other processes in the database."""
+
+    def __init__(self, plant: PlantFile, store: Store, clock: Clock) -> None:
+        self._plant, self._store, self._clock = plant, store, clock
+        self.live = LiveClient(plant, store.films, clock)
+        self.feed = Feed(store, self.live, clock)
+        self.references = references_of(plant, store, clock)
+        self.deliveries = ReplicaDeliveries(receivers_of(plant, Origin.LIVE, clock), store.outbox)
+
+    async def start(self) -> None:
+        """Read the current state; to be called before the first request.
+
+        Raises
+        ------
+        StoreError
+            If the state cannot be read.
+        """
+        await self.feed.start()
+        await self.references.look()
+
+    def checks(self) -> dict[str, str]:
+        """Return the status of each unit's analysis in words, by name of the check."""
+        return {f"analysis of {unit.id}": self._words_of(unit.id) for unit in self._plant.unit}
+
+    def _words_of(self, unit: str) -> str:
+        silence_s = self.live.units.silence_s(unit)
+        if silence_s is None:
+            return "no heartbeat yet"
+        said = f"last heartbeat {silence_s:.1f} s ago"
+        return said if self.live.units.is_alive(unit) else f"silent: {said}"
+
+    async def _metrics(self) -> bytes:
+        bearings = {unit.id: [bearing.id for bearing in unit.bearing] for unit in self._plant.unit}
+        live, kind = self.live, self._store.kind
+        seen = (live.units, live.alarms, live.films, self.deliveries, self._clock)
+        return await replica_metrics(bearings, *seen, kind)
+
+    def context(self, desk: Authenticator, beats: Heartbeats) -> Context:
+        """Return the API context of this process."""
+        plant, store, live = self._plant, self._store, self.live
+        return Context(
+            plant_name=plant.plant.name,
+            units={unit.id: unit for unit in plant.unit},
+            live=live.units,
+            alarms=live.alarms,
+            films=live.films,
+            plant=lambda: live.plant,
+            operators=DatabaseOperators(store, live.alarms, self._clock),
+            references=self.references,
+            store=store,
+            clock=self._clock,
+            refresh_s=refresh_s(plant),
+            receivers=self.deliveries.look,
+            max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
+            metrics=self._metrics,
+            loops=beats.look,
+            checks=self.checks,
+            access=desk,
+        )
+
+
+async def run_serve(
+    plant: PlantFile,
+    listener: socket.socket,
+    clock: Clock,
+    announce: Callable[[str], None],
+    manager: ServiceManager = NO_MANAGER,
+) -> None:
+    """Serve the API from the database until SIGINT or SIGTERM.
+
+    Parameters
+    ----------
+    listener, announce
+        As in `run_service`.
+
+    Raises
+    ------
+    StoreError
+        If the database cannot be used.
+    ClosedError
+        If the service would be reachable from other hosts without TLS or accounts.
+    """
+    with closing(open_store(plant)) as store, closing(open_access(plant)) as access:
+        require_protected(plant, access)
+        desk = access_desk(plant, access, clock)
+        replica, beats = Replica(plant, store, clock), Heartbeats(clock)
+        await replica.start()
+        audit = ServiceTrail(plant, Origin.LIVE, store.audit, clock)
+        await audit.begin()
+        context = replica.context(desk, beats)
+        units = [unit.id for unit in plant.unit]
+        supervision = Supervision(manager, beats, replica.live.units, units, clock)
+        ended = asyncio.Event()
+
+        async def ready(url: str, token: str | None) -> None:
+            supervision.ready()
+            announce(url)
+            if token is not None:
+                announce(f"token to create the first account, valid once within one hour: {token}")
+
+        async def serve(pulse: Pulse) -> None:
+            pulse.rest()
+            loops = {"feed": replica.feed.run, "references": replica.references.run}
+            await serve_requests(context, plant, listener, desk, loops, ended, ready)
+
+        serving: list[asyncio.Task[None]] = []
+
+        def begin(tasks: asyncio.TaskGroup, _: asyncio.Event) -> list[asyncio.Task[None]]:
+            serving.extend(start_loops({"serve": serve}, beats, tasks))
+            return serving
+
+        async def drain() -> None:
+            ended.set()
+            await asyncio.wait(serving)
+
+        try:
+            await run_until_stopped(supervision, begin, drain)
+        finally:
+            await desk.close()
+            await audit.end()

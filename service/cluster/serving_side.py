@@ -1,0 +1,189 @@
+"""Serving side of a cluster: reads reports from the database, and writes operators' commands."""
+
+import asyncio
+from collections.abc import Sequence
+from uuid import uuid4
+
+import structlog
+
+from acquisition.clock import Clock
+from core.units import ns_from_s
+from service.live.client import LiveClient
+from service.live.commands import (
+    OperatorCommand,
+    encoded,
+)
+from service.live.current_state import LiveAlarms
+from service.live.operators import Operators
+from service.live.receivers import (
+    ReceiverStatus,
+    ReceiverView,
+    SenderState,
+    SenderStatus,
+    receiver_views,
+)
+from service.live.snapshot import (
+    Report,
+    UnitReport,
+    UnreadableSnapshotError,
+    link_of_document,
+    snapshot_of_document,
+)
+from service.notifications.sender import Receiver
+from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.periodic import TroubleLog, periodic
+from service.store.access.audit_entries import acting
+from service.store.outbox import Outbox
+from service.store.port import StoreError
+from service.store.sharing import OPEN, Answer, Command, CommandState, UnitBeat
+from service.store.store import Store
+
+log = structlog.get_logger()
+
+READ_EVERY_S = 0.5
+
+Revision = tuple[str, int]
+"""Id of a process, and revision of the unit state that it wrote."""
+
+
+class Feed:
+    """Reader of the reports in the database, for the serving process of a cluster."""
+
+    def __init__(self, store: Store, live: LiveClient, clock: Clock) -> None:
+        self._store, self._live, self._clock = store, live, clock
+        self._revisions: dict[str, Revision] = {}
+        self._unreadable: str | None = None
+        self._trouble = TroubleLog("unit states cannot be read", "unit states can be read again")
+
+    async def start(self) -> None:
+        """Read the stored alarms and the reports, before the first request is served.
+
+        Raises `StoreError` if the database cannot be read.
+        """
+        self._live.alarms.take_stored(await asyncio.to_thread(self._store.alarms))
+        await self._take()
+
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
+        """Read the reports periodically, until cancelled."""
+        await periodic(self.look, READ_EVERY_S, self._clock, pulse)
+
+    async def look(self) -> None:
+        """Read the reports once; after a failure the old values remain, and their ages increase."""
+        try:
+            await self._take()
+        except StoreError as error:
+            self._live.units.read_error = str(error)
+        else:
+            self._live.units.read_error = None
+        self._trouble.note(self._live.units.read_error)
+
+    async def _take(self) -> None:
+        for report, revision in await asyncio.to_thread(self._read):
+            await self._live.take(report)
+            if revision is not None:
+                self._revisions[report.units[0].unit] = revision
+
+    def _read(self) -> list[tuple[Report, Revision | None]]:
+        states = self._store.unit_states
+        beats = [beat for beat in states.beats() if beat.unit in self._live.units.units]
+        new = [b.unit for b in beats if self._revisions.get(b.unit) != (b.process, b.revision)]
+        documents = states.states(new) if new else {}
+        found = (self._report(beat, documents.get(beat.unit)) for beat in beats)
+        return [each for each in found if each is not None]
+
+    def _report(
+        self, beat: UnitBeat, document: tuple[str, int, bytes] | None
+    ) -> tuple[Report, Revision | None] | None:
+        """Decode a report; log an unreadable report once and return None."""
+        try:
+            link = link_of_document(beat.signs)
+            snapshot = None if document is None else snapshot_of_document(document[2])
+        except UnreadableSnapshotError as error:
+            if str(error) != self._unreadable:
+                reason = self._unreadable = str(error)
+                log.error("a reported unit state is unreadable", unit=beat.unit, reason=reason)
+            return None
+        unit = UnitReport(beat.unit, link, beat.revision, snapshot)
+        revision = None if document is None else document[:2]
+        return Report(beat.process, beat.n_beats, (unit,), None), revision
+
+
+WAIT_S = 5.0
+"""Maximum wait of a replica for an answer of the process that analyses the unit, s."""
+
+EXPIRES_S = 15.0
+"""Age above which a command is not executed, s, in case the replica cannot withdraw it. The clocks
+of the two hosts may differ by a few seconds."""
+
+POLL_EVERY_S = 0.1
+
+
+class DatabaseOperators(Operators):
+    """Sender of operators' commands, through the database, to the process of the unit."""
+
+    def __init__(self, store: Store, alarms: LiveAlarms, clock: Clock) -> None:
+        super().__init__(store, alarms)
+        self._clock = clock
+
+    async def send(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
+        """Store a command and wait for its answer; withdraw it if no answer arrives in time."""
+        stored = self._command(unit, command, actor)
+        await asyncio.to_thread(self._store.commands.ask, stored)
+        return await self._answer(stored)
+
+    def _command(self, unit: str, task: OperatorCommand, actor: str) -> Command:
+        kind, document = encoded(task)
+        now_ns = self._clock.now_ns()
+        expires_ns = now_ns + ns_from_s(EXPIRES_S)
+        who = (actor, acting().peer)
+        return Command(uuid4().hex, unit, kind, document, *who, now_ns, expires_ns)
+
+    async def _answer(self, command: Command) -> Answer:
+        until_s = self._clock.monotonic_s() + WAIT_S
+        while True:
+            found = await asyncio.to_thread(self._store.commands.look, command.id)
+            if found is None:
+                return Answer(CommandState.WITHDRAWN, "the command no longer exists")
+            if found.state not in OPEN:
+                return found
+            if self._clock.monotonic_s() >= until_s:
+                return await asyncio.to_thread(self._give_up, command, found)
+            await self._clock.sleep(POLL_EVERY_S)
+
+    def _give_up(self, command: Command, found: Answer) -> Answer:
+        words = (
+            f"the process of the unit has not replied within {WAIT_S:g} s; the command was"
+            " withdrawn"
+        )
+        if self._store.commands.withdraw(command.id, words, self._clock.now_ns()):
+            return Answer(CommandState.WITHDRAWN, words)
+        return self._store.commands.look(command.id) or found
+
+
+class ReplicaDeliveries:
+    """State of the notification receivers in a replica, which reads the outbox without sending."""
+
+    def __init__(self, receivers: Sequence[Receiver], outbox: Outbox) -> None:
+        self._receivers, self._outbox = receivers, outbox
+
+    async def look(self) -> list[ReceiverView]:
+        """Return the state of all receivers; raise `StoreError` if the outbox cannot be read."""
+        return await asyncio.to_thread(self._look)
+
+    def _look(self) -> list[ReceiverView]:
+        statuses = [
+            ReceiverStatus(
+                each.name, each.settings.kind, each.channel.address, self._status(each.name)
+            )
+            for each in self._receivers
+        ]
+        return receiver_views(statuses, self._outbox)
+
+    def _status(self, name: str) -> SenderStatus:
+        """Return the sender status of a receiver, from its oldest waiting message."""
+        for first in self._outbox.waiting(name, 1):
+            if not first.n_attempts:
+                return SenderStatus(SenderState.SENDING)
+            n_attempts, since_ns = first.n_attempts, first.queued_ns
+            return SenderStatus(SenderState.RETRYING, n_attempts, since_ns, first.answer)
+        return SenderStatus()

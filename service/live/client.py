@@ -1,0 +1,94 @@
+"""`LiveClient`: present state of the plant in the serving process, and operators' commands."""
+
+import asyncio
+from dataclasses import replace
+
+import structlog
+
+from acquisition.clock import Clock
+from core.alarms.alarm import PLANT
+from service.live.commands import CommandFailedError, OperatorCommand, encoded
+from service.live.current_state import Ask, LiveAlarms, LiveFilms, LiveUnits
+from service.live.exchange import MeasuringGoneError, ServingEnd
+from service.live.operators import Operators
+from service.live.snapshot import PlantSnapshot, Report
+from service.settings.core_values import chatter_rule_of, stale_after_s
+from service.settings.plant import PlantFile
+from service.store.access.audit_entries import acting
+from service.store.films import FilmStore
+from service.store.port import StoreError
+from service.store.sharing import Answer
+
+log = structlog.get_logger()
+
+
+class LiveClient:
+    """Present state of all units, alarms and films, from the reports of measuring processes.
+
+    Parameters
+    ----------
+    films
+        Store from which baselines in force are read.
+    ask
+        Function that asks the measuring process, as in `LiveUnits`.
+    """
+
+    def __init__(
+        self, plant: PlantFile, films: FilmStore, clock: Clock, ask: Ask | None = None
+    ) -> None:
+        units = [unit.id for unit in plant.unit]
+        self.units = LiveUnits(units, clock, stale_after_s(plant), ask)
+        self.alarms = LiveAlarms(units, self.units.is_alive, chatter_rule_of(plant.alarms))
+        self.films = LiveFilms(plant, films)
+        self._plant = PlantSnapshot()
+
+    @property
+    def plant(self) -> PlantSnapshot:
+        """Newest state of the measuring process; without reports, its loops count as stuck."""
+        silence_s = self.units.silence_s(PLANT)
+        if silence_s is None or self.units.is_alive(PLANT):
+            return self._plant
+        fault = f"stuck: no report of the measuring process for {silence_s:.0f} s"
+        return replace(self._plant, loops=dict.fromkeys(self._plant.loops, fault))
+
+    async def take(self, report: Report, *, is_direct: bool = False) -> None:
+        """Apply a report; `is_direct` as in `LiveUnits.update`.
+
+        A baseline that has come into force and cannot be read is not shown; the next report with
+        results of its unit tries again.
+        """
+        known = [each for each in report.units if each.unit in self.units.units]
+        fetched = {}
+        for each in known:
+            if each.snapshot is not None and not self.films.has(each.unit, each.snapshot):
+                try:
+                    found = await asyncio.to_thread(self.films.fetch, each.unit, each.snapshot)
+                except StoreError as error:
+                    log.error("baselines cannot be read", unit=each.unit, reason=str(error))
+                else:
+                    fetched[each.unit] = found
+        for each in known:
+            if each.snapshot is not None:
+                self.units.set_results(each.unit, each.snapshot.bearings)
+                self.alarms.take(each.unit, each.snapshot)
+                self.films.take(each.unit, each.snapshot, fetched.get(each.unit))
+            self.units.update(
+                each.unit, report.process, report.number, each.link, is_direct=is_direct
+            )
+        if report.plant is not None:
+            self._plant = report.plant
+
+
+class SocketOperators(Operators):
+    """Sender of operators' commands over the socket to the measuring process."""
+
+    exchange: ServingEnd
+
+    async def send(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
+        """Send a command and return its answer, as described in `Operators.send`."""
+        try:
+            answer: Answer = await self.exchange.ask(*encoded(command), actor, acting().peer)
+        except MeasuringGoneError as error:
+            detail = f"unit {unit}: {error}; whether the command was carried out is not known"
+            raise CommandFailedError("No answer", detail) from error
+        return answer

@@ -1,0 +1,519 @@
+"""Present state of units, films and alarms in the serving process, from received reports."""
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from acquisition.clock import Clock
+from core.alarms.alarm import PLANT, Alarm, AlarmState
+from core.alarms.statistics import ChatterRule
+from core.baseline.baseline import BearingBaseline
+from core.change.film_judge import FilmNews
+from core.change.settings import FilmRules
+from core.monitor.assessment import Assessment
+from core.quality import Reason
+from core.samples.blocks import SampleBlock
+from core.spectra.cross_spectrum import NO_SPECTRUM
+from core.units import NS_PER_S, ns_from_s
+from service.live.alarm_list import SHARED, AlarmCount, count_of, is_shared, reporting_unit
+from service.live.commands import FilmPlace, NotAvailableError
+from service.live.exchange import MeasuringGoneError
+from service.live.snapshot import BearingSnapshot, UnitLink, UnitSnapshot
+from service.live.status import (
+    CurrentBearing,
+    LinkState,
+    UnitStatus,
+    current_bearing,
+    why_not_current,
+)
+from service.settings.core_values import film_rules_of
+from service.settings.plant import PlantFile
+from service.store.films import FilmStore
+
+MAX_DRIFT = 1e-3
+"""Upper bound of the relative drift of two monotonic clocks."""
+
+SILENT_AFTER_S = 5.0
+"""Age of the last report, s, above which a unit counts as not analysed; the period is 1 s."""
+
+CHECK_S = 0.2
+"""Time after which a unit without a new report is looked at again for stale results, s."""
+
+NOT_ANALYSED = "no process is analysing this unit"
+
+NOT_REPORTED = UnitStatus(LinkState.NOT_CONNECTED, NOT_ANALYSED)
+
+
+NO_LINK = UnitLink(UnitStatus(), None, {})
+
+
+@dataclass(frozen=True)
+class LatestReport:
+    """Latest report on a unit, and the link status derived from the report.
+
+    Parameters
+    ----------
+    beat
+        Process and sequence number of the report; None before the first report.
+    sent_s
+        Time at which the report was sent, by the monotonic clock of this process, s. None for the
+        first report of a process, whose age is unknown.
+    status
+        Link status of the unit, valid while reports arrive.
+    results
+        Newest result of each bearing, by bearing id.
+    received_ns
+        Arrival time of the samples of each result by the host clock of this process, UTC
+        nanoseconds since 1970, by bearing id; without the results whose age is unknown.
+    n_changes
+        Number of changes of `results`.
+    """
+
+    beat: tuple[str, int] | None = None
+    sent_s: float | None = None
+    link: UnitLink = NO_LINK
+    status: UnitStatus = NO_LINK.status
+    results: Mapping[str, Assessment] = field(default_factory=dict)
+    received_ns: Mapping[str, int] = field(default_factory=dict)
+    n_changes: int = 0
+
+
+Ask = Callable[[str, str], Awaitable[Any]]
+"""Function that asks the measuring process a question of a kind, with its arguments as JSON."""
+
+
+class LiveUnits:
+    """State of all units from their latest reports; outdated values do not count as current.
+
+    Ages count from the send time of a report, by the monotonic clock of this process: the arrival
+    minus the estimated delay. The clocks of the hosts need not agree, and the delay of a report by
+    the database does not reduce the ages of its values.
+
+    Parameters
+    ----------
+    ask
+        Function that asks the measuring process; None if it cannot be asked.
+    """
+
+    def __init__(
+        self, units: Iterable[str], clock: Clock, stale_after_s: float, ask: Ask | None = None
+    ) -> None:
+        self._clock, self._stale_after_s, self._ask = clock, stale_after_s, ask
+        self._delays = ReportDelays()
+        self._latest = dict.fromkeys((*units, PLANT, SHARED), LatestReport())
+        self._revisions = dict.fromkeys(self._latest, 0)
+        self._seen: dict[str, object] = {}
+        self._checked: dict[str, tuple[LatestReport, float]] = {}
+        self._asked: dict[tuple[str, ...], tuple[object, asyncio.Future[Any]]] = {}
+        self.read_error: str | None = None
+        """Error of the newest attempt to read the reports; None if the attempt succeeded."""
+
+    @property
+    def units(self) -> Sequence[str]:
+        """All units of the plant, and the pseudo-units `PLANT` and `SHARED`."""
+        return tuple(self._latest)
+
+    def revision(self, unit: str) -> int:
+        """Return a counter that increases with every change of a unit's link and results.
+
+        A result that becomes outdated is a change; new samples and greater ages are not.
+        """
+        latest, now_s = self._latest[unit], self._clock.monotonic_s()
+        checked, checked_s = self._checked.get(unit, (None, 0.0))
+        if latest is checked and now_s - checked_s < CHECK_S:
+            return self._revisions[unit]
+        self._checked[unit] = latest, now_s
+        status = self.status(unit)
+        current = [self.current(unit, bearing).is_current for bearing in latest.results]
+        link = (status.state, status.reason, status.since_ns)
+        seen = (latest.n_changes, latest.received_ns, current, link)
+        if seen != self._seen.get(unit):
+            self._seen[unit] = seen
+            self._revisions[unit] += 1
+        return self._revisions[unit]
+
+    def update(
+        self, unit: str, process: str, n_beats: int, link: UnitLink, *, is_direct: bool = False
+    ) -> None:
+        """Apply the latest report on a unit; a report that was applied before has no effect.
+
+        Parameters
+        ----------
+        n_beats
+            Sequence number of the report in its `process`.
+        is_direct
+            Whether the report comes directly from the process, so that the age of a first report
+            is known; False if it was read from the database.
+        """
+        latest, beat = self._latest[unit], (process, n_beats)
+        if latest.beat == beat:
+            return
+        now_s = self._clock.monotonic_s()
+        delay_s = self._delays.delay_s(process, link.said_s, now_s)
+        is_first = latest.beat is None or latest.beat[0] != process
+        sent_s = None if is_first and not is_direct else now_s - delay_s
+        status, received_ns = link.status, latest.received_ns
+        if sent_s is not None:
+            sent_ns = self._clock.now_ns() - ns_from_s(now_s - sent_s)
+            ages_s = link.result_ages_s.items()
+            # the arrival time of a result stays the same, although reports differ in their delays
+            found_ns = {b: sent_ns - ns_from_s(age_s) for b, age_s in ages_s}
+            received_ns = {**found_ns, **received_ns}
+            if link.data_age_s is not None:
+                arrived_ns = sent_ns - ns_from_s(link.data_age_s)
+                received_s = sent_s - link.data_age_s
+                status = replace(status, received_s=received_s, received_ns=arrived_ns)
+        self._latest[unit] = replace(
+            latest, beat=beat, sent_s=sent_s, link=link, status=status, received_ns=received_ns
+        )
+
+    def set_results(self, unit: str, results: Mapping[str, BearingSnapshot]) -> None:
+        """Set the newest results of a unit, by bearing id."""
+        found = {
+            bearing: Assessment(unit, bearing, spectrum=NO_SPECTRUM, orbit=None, **vars(state))
+            for bearing, state in results.items()
+        }
+        latest = self._latest[unit]
+        times_ns = {bearing: known.time_ns for bearing, known in latest.results.items()}
+        same = {b for b, result in found.items() if times_ns.get(b) == result.time_ns}
+        self._latest[unit] = replace(
+            latest,
+            results=found,
+            received_ns={b: then_ns for b, then_ns in latest.received_ns.items() if b in same},
+            n_changes=latest.n_changes + (len(same) < len(found)),
+        )
+
+    def past_revision(self, unit: str, end_ns: int) -> Hashable:
+        """Return a value that changes with the stored results of a unit before a time.
+
+        Results are stored in order of time: what is older than the newest stored result changes
+        only by retention, which the hour of the request stands for. A process that takes over a
+        unit counts its writes from zero, and an ended process may have stored results without a
+        report on them.
+        """
+        latest = self._latest[unit]
+        stored = latest.link.stored
+        if end_ns < stored.newest_ns:
+            return "closed", self._clock.now_ns() // (3600 * NS_PER_S)
+        return latest.beat and latest.beat[0], stored, self.is_alive(unit)
+
+    def silence_s(self, unit: str) -> float | None:
+        """Return the time since the last report on a unit, s; None before a report of known age."""
+        sent_s = self._latest[unit].sent_s
+        return None if sent_s is None else self._clock.monotonic_s() - sent_s
+
+    def is_alive(self, unit: str) -> bool:
+        """Return whether a process has reported on the unit within `SILENT_AFTER_S`."""
+        silence_s = self.silence_s(unit)
+        return silence_s is not None and silence_s <= SILENT_AFTER_S
+
+    @property
+    def store_error(self) -> str | None:
+        """Error of reading reports, or store error of a process that reports; None without one."""
+        errors = (self._latest[u].link.store_error for u in self._latest if self.is_alive(u))
+        return self.read_error or next((error for error in errors if error), None)
+
+    @property
+    def n_unstored(self) -> int:
+        """Number of findings that the reporting processes have not stored since their start."""
+        latest = self._latest.values()
+        return sum({each.beat[0]: each.link.n_unstored for each in latest if each.beat}.values())
+
+    def status(self, unit: str) -> UnitStatus:
+        """Return the link status of a unit; "not connected" while no reports on the unit arrive."""
+        latest = self._latest[unit]
+        if latest.beat is None:
+            return NOT_REPORTED
+        if self.is_alive(unit):
+            return latest.status
+        return replace(
+            latest.status, state=LinkState.NOT_CONNECTED, reason=NOT_ANALYSED, since_ns=None
+        )
+
+    @property
+    def can_ask(self) -> bool:
+        """Whether live samples, spectra and orbits are available from this process."""
+        return self._ask is not None
+
+    async def blocks(self, unit: str) -> Sequence[SampleBlock]:
+        """Return the newest blocks of a unit, oldest first; they may be out of date.
+
+        Raises
+        ------
+        NotAvailableError
+            If the process that analyses the unit cannot be asked.
+        """
+        blocks: Sequence[SampleBlock]
+        blocks = await self._answer(self._latest[unit].beat, "blocks", unit)
+        return blocks
+
+    async def assessment(self, unit: str, bearing: str) -> Assessment | None:
+        """Return the newest result of a bearing with spectrum and orbit; None before the first.
+
+        Raises
+        ------
+        NotAvailableError
+            If the process that analyses the unit cannot be asked.
+        """
+        known = self._latest[unit].results.get(bearing)
+        if known is None:
+            return None
+        found: Assessment | None = await self._answer(known.time_ns, "result", unit, bearing)
+        return found
+
+    async def _answer(self, fresh: object, kind: str, *which: str) -> Any:
+        """Return an answer of the measuring process, shared by all who ask while it is fresh."""
+        if self._ask is None:
+            raise NotAvailableError(
+                f"live samples, spectra and orbits of unit {which[0]} exist only in the process"
+                " that analyses it; spectra over time are available here"
+            )
+        held = self._asked.get((kind, *which))
+        if held is None or held[0] != fresh:
+            asking = asyncio.ensure_future(self._ask(kind, json.dumps(which)))
+            held = self._asked[kind, *which] = (fresh, asking)
+        try:
+            return await asyncio.shield(held[1])
+        except MeasuringGoneError as error:
+            self._asked.pop((kind, *which), None)
+            raise NotAvailableError(f"{kind} of unit {which[0]}: {error}") from error
+
+    def why_no_samples(self, unit: str) -> Reason | None:
+        """Return the reason why the newest samples of a unit are not current; None if current."""
+        return self._why_not_current(unit, self.data_age_s(unit))
+
+    def data_age_s(self, unit: str) -> float | None:
+        """Return the age of the newest block of a unit, s; None if unknown."""
+        return self._age_s(unit, self._latest[unit].link.data_age_s)
+
+    def current(self, unit: str, bearing: str) -> CurrentBearing:
+        """Return the newest result of a bearing; its readings are missing if it is not current."""
+        latest = self._latest[unit]
+        age_s = self._age_s(unit, latest.link.result_ages_s.get(bearing))
+        why_not = self._why_not_current(unit, age_s)
+        received_ns = latest.received_ns.get(bearing)
+        return current_bearing(latest.results.get(bearing), age_s, why_not, received_ns)
+
+    def _age_s(self, unit: str, then_s: float | None) -> float | None:
+        silence_s = self.silence_s(unit)
+        return None if then_s is None or silence_s is None else then_s + silence_s
+
+    def _why_not_current(self, unit: str, age_s: float | None) -> Reason | None:
+        return why_not_current(self.status(unit).state, age_s, self._stale_after_s)
+
+
+class ReportDelays:
+    """Estimator of the delays of reports relative to the fastest report of the same process.
+
+    The offset of two monotonic clocks is constant. The common delay of all reports is unobservable;
+    reading the database twice a second keeps it below half a second.
+    """
+
+    def __init__(self) -> None:
+        self._fastest: dict[str, tuple[float, float]] = {}
+
+    def delay_s(self, process: str, sent_s: float | None, received_s: float) -> float:
+        """Return the delay of a report relative to the fastest report of the process, s.
+
+        Parameters
+        ----------
+        sent_s
+            Send time by the monotonic clock of the reporting process, s; None if not reported.
+        received_s
+            Arrival time by the monotonic clock of this process, s.
+        """
+        if sent_s is None:
+            return 0.0
+        offset_s = received_s - sent_s
+        fastest_s, since_s = self._fastest.get(process, (offset_s, received_s))
+        fastest_s = min(offset_s, fastest_s + MAX_DRIFT * (received_s - since_s))
+        self._fastest[process] = (fastest_s, received_s)
+        return offset_s - fastest_s
+
+
+Key = tuple[str, str]
+"""Unit id and bearing id."""
+
+
+class LiveFilms:
+    """State of the oil films: verdicts from the reports, and baselines from the store."""
+
+    def __init__(self, plant: PlantFile, store: FilmStore) -> None:
+        self._store = store
+        found = {unit.id: film_rules_of(unit, plant.films) for unit in plant.unit}
+        self._rules = {unit: rules for unit, rules in found.items() if isinstance(rules, FilmRules)}
+        self.settings = plant.films
+        self.unwatched = {unit: why for unit, why in found.items() if isinstance(why, str)}
+        """Reason why the films of a unit are not monitored, by unit."""
+        self._newest: dict[Key, FilmNews] = {}
+        self._baselines: dict[Key, BearingBaseline] = {}
+
+    def rules(self, unit: str) -> FilmRules | None:
+        """Return the film rules of a unit; None if its films are not monitored."""
+        return self._rules.get(unit)
+
+    def place(self, unit: str, bearing: str) -> FilmPlace | None:
+        """Return a bearing and its stiffness estimator; None if its film is not monitored."""
+        rules = self.rules(unit)
+        if rules is None or bearing not in rules.estimators:
+            return None
+        return FilmPlace(unit, bearing, rules.estimators[bearing])
+
+    def newest(self, unit: str, bearing: str) -> FilmNews | None:
+        """Return the newest film reading of a bearing with its verdicts; None without one."""
+        return self._newest.get((unit, bearing))
+
+    def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
+        """Return the baseline in force for a bearing; None if no baseline is in force."""
+        return self._baselines.get((unit, bearing))
+
+    def has(self, unit: str, state: UnitSnapshot) -> bool:
+        """Return whether the baselines in force of a unit snapshot are in memory."""
+        return len(self._held(unit, state)) == len(state.baselines)
+
+    def _held(self, unit: str, state: UnitSnapshot) -> dict[str, BearingBaseline]:
+        """Return the baselines in memory that a unit snapshot has in force, by bearing."""
+        found = {bearing: self.baseline(unit, bearing) for bearing in state.baselines}
+        return {
+            bearing: held
+            for bearing, held in found.items()
+            if held is not None and held.origin.version == state.baselines[bearing]
+        }
+
+    def fetch(self, unit: str, state: UnitSnapshot) -> Mapping[str, BearingBaseline]:
+        """Return the baselines in force of a unit snapshot from the store, by bearing.
+
+        Raises
+        ------
+        StoreError
+            If a baseline cannot be read.
+        """
+        found = {
+            bearing: self._store.baseline(unit, bearing, version)
+            for bearing, version in state.baselines.items()
+        }
+        return {bearing: baseline for bearing, baseline in found.items() if baseline is not None}
+
+    def take(
+        self, unit: str, state: UnitSnapshot, fetched: Mapping[str, BearingBaseline] | None
+    ) -> None:
+        """Apply a unit snapshot.
+
+        Parameters
+        ----------
+        fetched
+            Baselines in force, as returned by `fetch`; None to keep those in memory.
+        """
+        for bearing, film in state.films.items():
+            self._newest[unit, bearing] = FilmNews(film.reading, film.findings, film.decisions)
+        if fetched is None:
+            fetched = self._held(unit, state)
+        others = {key: held for key, held in self._baselines.items() if key[0] != unit}
+        self._baselines = others | {(unit, b): found for b, found in fetched.items()}
+
+
+ShownAlarm = tuple[Alarm, bool, bool]
+"""Alarm, whether its condition is known, and whether it is chattering."""
+
+
+class LiveAlarms:
+    """List of all alarms, from reports and from the database.
+
+    While no reports on a unit arrive, the conditions of its alarms are unknown.
+    """
+
+    def __init__(
+        self, units: Iterable[str], is_alive: Callable[[str], bool], chatter_rule: ChatterRule
+    ) -> None:
+        self._units = frozenset(units)
+        self._is_alive, self.chatter_rule = is_alive, chatter_rule
+        self._alarms: dict[str, dict[str, Alarm]] = {}
+        self._judged: dict[str, frozenset[str]] = {}
+        self._chattering: dict[str, frozenset[str]] = {}
+        self._alive: dict[str, bool] = {}
+        self._shown: dict[str, Sequence[ShownAlarm]] = {}
+        self._revision = 0
+
+    @property
+    def revision(self) -> int:
+        """Counter that increases with every change of `shown`."""
+        for unit, was_alive in self._alive.items():
+            if self._is_alive(unit) != was_alive:  # a unit falls silent without a report
+                self._show(unit)
+        return self._revision
+
+    @property
+    def shown(self) -> Sequence[Alarm]:
+        """Alarms that are not normal, and normal alarms whose condition is unknown."""
+        return [alarm for shown in self._shown.values() for alarm, *_ in shown]
+
+    def take(self, unit: str, state: UnitSnapshot) -> None:
+        """Apply the alarms of a reported unit state."""
+        self._judged[unit], self._chattering[unit] = state.judged, state.chattering
+        # a process may still have alarms of units for which another process is now responsible
+        self._keep(alarm for alarm in state.alarms if self._owner(alarm) == unit)
+        self._show(unit)
+
+    def take_stored(self, alarms: Iterable[Alarm]) -> None:
+        """Apply stored alarms that are at least as new as the alarms in memory."""
+        for unit in self._keep(alarms):
+            self._show(unit)
+
+    def _keep(self, alarms: Iterable[Alarm]) -> set[str]:
+        """Keep alarms that are at least as new as those in memory; return their units."""
+        units = set()
+        for alarm in alarms:
+            units.add(unit := self._owner(alarm))
+            of_unit = self._alarms.setdefault(unit, {})
+            held = of_unit.get(alarm.identity.id)
+            if held is None or alarm.n_events >= held.n_events:
+                of_unit[alarm.identity.id] = alarm
+        return units
+
+    def _show(self, unit: str) -> None:
+        self._alive[unit] = self._is_alive(unit)
+        known = ((a, self.is_judged(a), self.is_chattering(a)) for a in self._of(unit))
+        shown = [each for each in known if each[0].state is not AlarmState.NORMAL or not each[1]]
+        self._revision += shown != self._shown.get(unit, [])
+        self._shown[unit] = shown
+
+    def _of(self, unit: str) -> Sequence[Alarm]:
+        return list(self._alarms.get(unit, {}).values())
+
+    @property
+    def alarms(self) -> Sequence[Alarm]:
+        """All alarms, in any state."""
+        return [alarm for unit in list(self._alarms) for alarm in self._of(unit)]
+
+    def alarm(self, id_: str) -> Alarm:
+        """Return the alarm with an id; raise `LookupError` if it does not exist."""
+        found = (alarms[id_] for alarms in self._alarms.values() if id_ in alarms)
+        alarm = next(found, None)
+        if alarm is None:
+            raise LookupError(id_)
+        return alarm
+
+    def is_judged(self, alarm: Alarm) -> bool:
+        """Return whether the condition of an alarm is known now according to the latest report."""
+        unit = self._owner(alarm)
+        return self._is_alive(unit) and alarm.identity.id in self._judged.get(unit, ())
+
+    def is_chattering(self, alarm: Alarm) -> bool:
+        """Return whether an alarm is chattering according to the latest report."""
+        return alarm.identity.id in self._chattering.get(self._owner(alarm), ())
+
+    def owner(self, id_: str) -> str:
+        """Return the unit whose process updates an alarm; raise `LookupError` for an unknown id."""
+        return self._owner(self.alarm(id_))
+
+    def _owner(self, alarm: Alarm) -> str:
+        if is_shared(alarm):
+            return SHARED
+        unit = reporting_unit(alarm.identity)
+        return unit if unit in self._units else PLANT
+
+    def count(self) -> AlarmCount:
+        """Return the numbers of active, unacknowledged, hidden and unjudged alarms."""
+        return count_of(self.shown, self.is_judged)

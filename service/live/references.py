@@ -1,0 +1,140 @@
+"""Gap references in force for each bearing."""
+
+import asyncio
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import structlog
+
+from acquisition.clock import Clock
+from core.machine.unit import Bearing, Unit
+from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.periodic import TroubleLog
+from service.store.port import StoreError
+from service.store.references import GapReference
+from service.store.store import Store
+
+log = structlog.get_logger()
+
+LOOK_EVERY_S = 2.0
+
+
+Key = tuple[str, str]
+"""Unit id and bearing id."""
+
+
+def opposite_axes(bearing: Bearing) -> tuple[bool, bool]:
+    """Return whether the axis x, and whether the axis y, of a bearing has an opposite probe."""
+    return bearing.opposite_x is not None, bearing.opposite_y is not None
+
+
+def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
+    """Return a bearing with its gap reference replaced by a stored reference.
+
+    If the stored reference has no gaps of opposite probes, those of the plant file remain.
+    """
+    opposite = reference.opposite_reference_um
+    if opposite is None or not any(opposite_axes(bearing)):
+        opposite = bearing.opposite_reference_um
+    return replace(
+        bearing,
+        gap_reference_um=reference.gap_reference_um,
+        opposite_reference_um=opposite,
+    )
+
+
+class HasUnit(Protocol):
+    """Protocol of objects with a replaceable unit description, such as a monitor."""
+
+    unit: Unit
+
+    def replace_description(self, unit: Unit) -> None:
+        """Replace the description of the unit."""
+        ...
+
+
+class ReferencesInForce:
+    """Gap references in force: the newest stored reference of a bearing, or its plant-file gaps.
+
+    Parameters
+    ----------
+    monitors
+        Monitors by unit, built from the plant file; their descriptions receive new references.
+    """
+
+    def __init__(self, monitors: Mapping[str, HasUnit], store: Store, clock: Clock) -> None:
+        self._monitors, self._store, self._clock = monitors, store, clock
+        self._bearings: dict[Key, Bearing] = {
+            (unit, bearing.id): bearing
+            for unit, monitor in monitors.items()
+            for bearing in monitor.unit.bearings
+        }
+        self._in_force: dict[Key, GapReference] = {}
+        self._unknown: set[Key] = set()
+        self._trouble = TroubleLog("references cannot be read", "references can be read again")
+
+    def of(self, unit: str, bearing: str) -> GapReference | None:
+        """Return the stored gap reference of a bearing; None if it has that of the plant file."""
+        return self._in_force.get((unit, bearing))
+
+    def bearing(self, unit: str, bearing: str) -> Bearing:
+        """Return the description of a bearing with the gap reference in force."""
+        described = self._bearings[unit, bearing]
+        reference = self.of(unit, bearing)
+        return described if reference is None else with_reference(described, reference)
+
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
+        """Read the stored references periodically until cancelled."""
+        while True:
+            pulse.beat(LOOK_EVERY_S)
+            await self._clock.sleep(LOOK_EVERY_S)
+            await self.look()
+
+    async def look(self) -> None:
+        """Read the stored references once; after an error, references in force are unchanged."""
+        try:
+            found = await asyncio.to_thread(self._store.references)
+        except StoreError as error:
+            self._trouble.note(str(error))
+            return
+        self._trouble.note(None)
+        self._take(found)
+
+    def _take(self, found: Iterable[GapReference]) -> None:
+        news = {(r.unit, r.bearing): r for r in found if self._is_news(r)}
+        self._in_force |= news
+        for unit in {unit for unit, _ in news}:
+            monitor = self._monitors[unit]
+            monitor.replace_description(self._described(monitor.unit))
+        for (unit, bearing), reference in news.items():
+            log.info(
+                "reference in force",
+                unit=unit,
+                bearing=bearing,
+                gap_reference_um=reference.gap_reference_um,
+                author=reference.author,
+            )
+
+    def _is_news(self, reference: GapReference) -> bool:
+        key = (reference.unit, reference.bearing)
+        if key in self._bearings:
+            return self._in_force.get(key) != reference
+        if key not in self._unknown:
+            self._unknown.add(key)
+            log.warning("reference of an unknown bearing is ignored", unit=key[0], bearing=key[1])
+        return False
+
+    def _described(self, unit: Unit) -> Unit:
+        return replace(unit, bearings=tuple(self.bearing(unit.id, b.id) for b in unit.bearings))
+
+
+@dataclass
+class UnitDescription:
+    """Holder of the description of a unit, for a process without a monitor of the unit."""
+
+    unit: Unit
+
+    def replace_description(self, unit: Unit) -> None:
+        """Replace the description by a new description of the same unit."""
+        self.unit = unit

@@ -1,0 +1,308 @@
+"""Snapshots of units and of the measuring process, and their encoding as documents."""
+
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import version
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from core.alarms.alarm import Alarm
+from core.change.decision import Decision
+from core.change.film_judge import FilmFinding
+from core.change.film_reading import FilmReading
+from core.condition.cells import BearingCondition
+from core.machine.unit import Estimator
+from core.monitor.assessment import AveragingWindow
+from core.quality import Quality, Reading
+from core.spectra.runout import RunoutVerdict
+from core.spectra.segments import Evidence
+from core.spectra.speed import SpeedSource
+from core.uncertainty import Budget
+from service.live.receivers import ReceiverStatus
+from service.live.status import StoredResults, UnitStatus
+
+OWN_VERSION = version("padwatch").encode() + b"\n"
+
+MAX_BYTES = 16_000_000
+"""Maximum size in bytes of a decompressed document, many times that of the largest unit."""
+
+
+class UnreadableSnapshotError(Exception):
+    """Error raised if a document of a unit's state is damaged or of another program version."""
+
+
+@dataclass(frozen=True)
+class BearingSnapshot:
+    """Newest result of a bearing: an `Assessment` without spectrum, orbit and recent values."""
+
+    time_ns: int
+    window: AveragingWindow
+    speed_source: SpeedSource
+    quality: Quality
+    readings: Mapping[str, Reading]
+    budgets: Mapping[str, Budget]
+    estimators: Mapping[str, Estimator | None]
+    runout: Mapping[str, RunoutVerdict]
+    clipped_share: Mapping[str, float]
+    evidence: Evidence
+    condition: BearingCondition | None
+
+
+@dataclass(frozen=True)
+class FilmSnapshot:
+    """Newest reading of an oil film, with its finding and decision in each direction (x, y)."""
+
+    reading: FilmReading
+    findings: tuple[FilmFinding, FilmFinding]
+    decisions: tuple[Decision, Decision]
+
+
+@dataclass(frozen=True)
+class UnitSnapshot:
+    """State of a unit that changes with each result; `bearings` and `films` are by bearing id.
+
+    Parameters
+    ----------
+    alarms
+        All alarms of the unit.
+    judged, chattering
+        Ids of the alarms whose condition is now known, and of the chattering alarms.
+    baselines
+        Baseline version in force, by bearing id.
+    """
+
+    bearings: Mapping[str, BearingSnapshot]
+    alarms: tuple[Alarm, ...]
+    judged: frozenset[str]
+    chattering: frozenset[str]
+    films: Mapping[str, FilmSnapshot]
+    baselines: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class UnitLink:
+    """Part of a unit's state that changes continuously: link, and age of samples and results.
+
+    Parameters
+    ----------
+    data_age_s
+        Age of the newest samples in seconds; None before the first.
+    result_ages_s
+        Age of the newest result in seconds, by bearing id.
+    n_unstored
+        Number of findings that the process could not store.
+    store_error
+        Present error of the database in the process that analyses the unit, or None.
+    said_s
+        Monotonic time of the process at which the state was published; None in states of older
+        versions.
+    stored
+        Results of the unit that this process has stored.
+    """
+
+    status: UnitStatus
+    data_age_s: float | None
+    result_ages_s: Mapping[str, float]
+    n_unstored: int = 0
+    store_error: str | None = None
+    said_s: float | None = None
+    stored: StoredResults = field(default_factory=StoredResults)
+
+
+@dataclass(frozen=True)
+class UnitReport:
+    """Report of a measuring process on one unit.
+
+    Parameters
+    ----------
+    unit
+        Id of the unit; `PLANT` or `SHARED` for alarms that belong to no unit.
+    revision
+        Revision number of the snapshot, increased with each change.
+    snapshot
+        Snapshot of the unit; None if it has not changed since the previous report.
+    """
+
+    unit: str
+    link: UnitLink
+    revision: int
+    snapshot: UnitSnapshot | None
+
+
+@dataclass(frozen=True)
+class Report:
+    """Report of a measuring process at one time; `number` counts its reports.
+
+    Parameters
+    ----------
+    process
+        Identifier of the process, which changes with each start.
+    units
+        Reports on units; units without changes may be missing.
+    plant
+        State of the process; None if it has not changed.
+    """
+
+    process: str
+    number: int
+    units: tuple[UnitReport, ...]
+    plant: "PlantSnapshot | None"
+
+
+@dataclass(frozen=True)
+class SourceCounts:
+    """Counts of a unit's data source since the start.
+
+    Parameters
+    ----------
+    n_polls
+        Number of polls of the device; 0 if the source is not polled.
+    newest_s, mean_s
+        Newest and mean duration of a poll, s; None without polls.
+    refused_frames
+        Number of refused frames, by reason.
+    """
+
+    n_polls: int
+    newest_s: float | None
+    mean_s: float | None
+    refused_frames: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class CaptureStatus:
+    """State of the recordings around alarms.
+
+    Parameters
+    ----------
+    trouble
+        Reason why samples cannot be recorded now, or None.
+    error
+        Reason why the newest recording failed, or None.
+    n_written
+        Number of finished recordings since the start.
+    being_made
+        Alarm id and occurrence number of each recording in progress.
+    """
+
+    trouble: str | None = None
+    error: str | None = None
+    n_written: int = 0
+    being_made: frozenset[tuple[str, int]] = frozenset()
+
+    @property
+    def n_running(self) -> int:
+        """Number of recordings in progress."""
+        return len(self.being_made)
+
+
+@dataclass(frozen=True)
+class EvidenceStatus:
+    """State of the evidence of alarms.
+
+    Parameters
+    ----------
+    error
+        Present write error, or None.
+    n_waiting, n_written, n_lost
+        Numbers of bundles that wait to be written, and that were written and lost since the start.
+    pending
+        Alarm id and occurrence number of each bundle that is still to be written.
+    capturing
+        Alarm id and occurrence number of each recording that is not linked to its bundle yet.
+    """
+
+    error: str | None
+    n_waiting: int
+    n_written: int
+    n_lost: int
+    pending: frozenset[tuple[str, int]] = frozenset()
+    capturing: frozenset[tuple[str, int]] = frozenset()
+
+
+@dataclass(frozen=True)
+class PlantSnapshot:
+    """State of the measuring process itself.
+
+    Parameters
+    ----------
+    loops
+        Fault of each background loop by name; None for a working loop.
+    checks
+        Results, as text by name, of health checks that do not affect readiness.
+    audit_error
+        Error of the last attempt to write the head file of the audit trail, or None.
+    evidence
+        State of the evidence of alarms; None if no evidence is collected.
+    continuous
+        Ids of the units whose samples are recorded continuously.
+    continuous_trouble
+        Reason why continuous recording is interrupted, or None.
+    faults
+        Fault of each damaged recording, by name of the recording.
+    receivers
+        Receivers of notifications in the plant file.
+    sources
+        Counts of each unit's data source, by unit id.
+    """
+
+    loops: Mapping[str, str | None] = field(default_factory=dict)
+    checks: Mapping[str, str] = field(default_factory=dict)
+    audit_error: str | None = None
+    captures: CaptureStatus = CaptureStatus()
+    evidence: EvidenceStatus | None = None
+    continuous: tuple[str, ...] = ()
+    continuous_trouble: str | None = None
+    faults: Mapping[str, str] = field(default_factory=dict)
+    receivers: tuple[ReceiverStatus, ...] = ()
+    sources: Mapping[str, SourceCounts] = field(default_factory=dict)
+
+
+# wrapped in a tuple, so that the NaN setting applies to all nested values
+_WITH_NAN = ConfigDict(ser_json_inf_nan="constants")
+_SNAPSHOT = TypeAdapter(tuple[UnitSnapshot], config=_WITH_NAN)
+_SIGNS = TypeAdapter(tuple[UnitLink], config=_WITH_NAN)
+
+
+def snapshot_document(snapshot: UnitSnapshot) -> bytes:
+    """Return the snapshot as the version of the program, a line feed, and compressed JSON."""
+    return OWN_VERSION + zlib.compress(_SNAPSHOT.dump_json((snapshot,)), level=1)
+
+
+def snapshot_of_document(document: bytes) -> UnitSnapshot:
+    """Return the snapshot from a document of `snapshot_document`.
+
+    Raises
+    ------
+    UnreadableSnapshotError
+        If the document is damaged, or from another version of the program.
+    """
+    theirs, _, compressed = document.partition(b"\n")
+    if theirs != OWN_VERSION.rstrip():
+        raise UnreadableSnapshotError(
+            f"the snapshot was written by padwatch {theirs[:40].decode('ascii', 'replace')}, but"
+            f" this is padwatch {version('padwatch')}; update all processes to one version"
+        )
+    try:
+        unpacker = zlib.decompressobj()
+        content = unpacker.decompress(compressed, MAX_BYTES)
+        if unpacker.unconsumed_tail or not unpacker.eof:
+            words = f"the snapshot of a unit is truncated or longer than {MAX_BYTES} bytes"
+            raise UnreadableSnapshotError(words)
+        return _SNAPSHOT.validate_json(content)[0]
+    except (zlib.error, ValidationError) as error:
+        raise UnreadableSnapshotError(f"the snapshot of a unit cannot be read: {error}") from error
+
+
+def link_document(signs: UnitLink) -> str:
+    """Return the continuously changing state of a unit as a JSON document."""
+    return _SIGNS.dump_json((signs,)).decode()
+
+
+def link_of_document(document: str) -> UnitLink:
+    """Parse a document of `link_document`; raise `UnreadableSnapshotError` if it is damaged."""
+    try:
+        return _SIGNS.validate_json(document)[0]
+    except ValidationError as error:
+        raise UnreadableSnapshotError(f"the link of a unit cannot be read: {error}") from error

@@ -1,0 +1,29 @@
+"""Modules that the measuring and the serving process load."""
+
+import subprocess
+import sys
+
+import pytest
+
+MEASURING = [
+    "service.app.service",
+    "service.app.measuring_process",
+    "service.app.cluster_processes",
+]
+SERVING = ["service.app.serving_process", "service.app.replica_process"]
+HTTP = ["fastapi", "starlette", "uvicorn", "jinja2", "matplotlib", "service.api"]
+ANALYSIS = ["service.measuring", "core.monitor.monitor", "core.stiffness.dynamic"]
+
+
+@pytest.mark.parametrize(
+    ("process", "others"),
+    [*((name, HTTP) for name in MEASURING), *((name, ANALYSIS) for name in SERVING)],
+)
+def test_a_process_loads_nothing_of_the_other(process: str, others: list[str]) -> None:
+    program = f"import {process}, sys; print(*sys.modules)"
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    loaded = set(ended.stdout.split())
+    assert process in loaded
+    assert not loaded & set(others)

@@ -1,0 +1,79 @@
+"""Snapshots of units as documents in a database: whole and of this version, or refused."""
+
+import zlib
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.metadata import version
+
+import pytest
+
+from core.alarms.alarm import Alarm, AlarmIdentity
+from core.limits import AlarmLevel
+from core.monitor.assessment import Assessment
+from core.quality import Reading
+from service.live import snapshot
+from service.live.snapshot import (
+    UnitSnapshot,
+    UnreadableSnapshotError,
+    snapshot_document,
+    snapshot_of_document,
+)
+from service.measuring.snapshots import bearing_snapshot
+
+IDENTITY = AlarmIdentity("U1", "UJB", "order1_shaft_x")
+
+
+@pytest.fixture
+def published(assessment: Callable[..., Assessment]) -> UnitSnapshot:
+    """A unit with a result, of which one value is not a number, and an active alarm."""
+    found = assessment()
+    readings = {**found.readings, "power_mw": Reading(float("nan"))}
+    alarm = Alarm(IDENTITY, level=AlarmLevel.DANGER, occurrence=3, is_acknowledged=False)
+    return UnitSnapshot(
+        bearings={"UJB": bearing_snapshot(replace(found, readings=readings))},
+        alarms=(alarm,),
+        judged=frozenset({IDENTITY.id}),
+        chattering=frozenset(),
+        films={},
+        baselines={"UJB": 2},
+    )
+
+
+def test_a_snapshot_is_read_as_it_was_written(published: UnitSnapshot) -> None:
+    read = snapshot_of_document(snapshot_document(published))
+
+    assert repr(read) == repr(published)  # NaN is not equal to itself
+    assert read.alarms == published.alarms
+
+
+def test_a_snapshot_of_another_version_is_refused_with_both_named(published: UnitSnapshot) -> None:
+    _, _, content = snapshot_document(published).partition(b"\n")
+
+    with pytest.raises(UnreadableSnapshotError) as refused:
+        snapshot_of_document(b"0.0.1\n" + content)
+
+    assert "written by padwatch 0.0.1" in str(refused.value)
+    assert f"this is padwatch {version('padwatch')}" in str(refused.value)
+
+
+def test_a_damaged_snapshot_is_refused_or_read_as_it_was(published: UnitSnapshot) -> None:
+    document = snapshot_document(published)
+    refused = 0
+    for at in range(0, len(document), 7):
+        damaged = bytearray(document)
+        damaged[at] ^= 0x10
+        try:
+            assert repr(snapshot_of_document(bytes(damaged))) == repr(published)
+        except UnreadableSnapshotError:
+            refused += 1
+    for stop in range(0, len(document), 50):
+        with pytest.raises(UnreadableSnapshotError):
+            snapshot_of_document(document[:stop])
+
+    assert refused > 0.9 * len(document) / 7
+
+
+def test_a_snapshot_that_unpacks_to_too_much_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(snapshot, "MAX_BYTES", 1000)
+    with pytest.raises(UnreadableSnapshotError, match="longer than 1000 bytes"):
+        snapshot_of_document(snapshot.OWN_VERSION + zlib.compress(b"0" * 1001))
