@@ -63,12 +63,12 @@ def test_a_long_time_under_load_leaves_everything_as_it_was(
 
 
 def assert_nothing_grows(done: Soaked) -> None:
-    assert done.most("rss_mib") <= MAX_MIB
+    assert done.most("memory_mib") <= MAX_MIB
     assert done.most("n_files") <= MAX_FILES
     assert done.most("n_threads") <= MAX_THREADS
     settled_s = done.settled[-1].at_s - done.settled[0].at_s
     if settled_s >= MIN_SETTLED_S:
-        memory = done.growth("rss_mib")
+        memory = done.growth("memory_mib")
         assert memory.per_hour * settled_s / 3600.0 <= MAX_RISE_MIB, str(memory)
         assert done.rise("n_files") <= SPARE_FILES
         assert done.rise("n_threads") <= POOL_THREADS

@@ -35,7 +35,8 @@ class Usage:
     """One look at the measuring and the serving process, together, and the write-ahead log."""
 
     at_s: float
-    rss_mib: float
+    memory_mib: float
+    """Pages of their own, and once those that they share (libraries)."""
     n_files: int
     n_threads: int
     log_mib: float
@@ -47,9 +48,11 @@ class Usage:
 def look(processes: Sequence[psutil.Process], log: Path) -> Usage:
     """Look once at measuring and serving, in this order."""
     waited = Path(f"/proc/{processes[0].pid}/schedstat").read_text().split()[1]
+    memories = [process.memory_full_info() for process in processes]
+    shared = max(memory.rss - memory.uss for memory in memories)
     return Usage(
         at_s=time.monotonic(),
-        rss_mib=sum(process.memory_info().rss for process in processes) / MIB,
+        memory_mib=(shared + sum(memory.uss for memory in memories)) / MIB,
         n_files=sum(process.num_fds() for process in processes),
         n_threads=sum(process.num_threads() for process in processes),
         log_mib=log.stat().st_size / MIB if log.exists() else 0.0,
@@ -153,7 +156,7 @@ class Soaked:
             "service, cores": f"{self.cores:.2f} ({per_sample_us:.2f} µs a sample)",
             "waited for a processor": f"{100.0 * self.waiting_share:.0f} % of the time",
             "ledger DAQ, cores": f"{self.daq_cores:.2f}",
-            "memory, MiB": f"{self.most('rss_mib'):.0f}, {self.growth('rss_mib')} an hour",
+            "memory, MiB": f"{self.most('memory_mib'):.0f}, {self.growth('memory_mib')} an hour",
             "open files": f"{self.most('n_files'):.0f}, {self.growth('n_files')} an hour",
             "threads": f"{self.most('n_threads'):.0f}, {self.growth('n_threads')} an hour",
             "write-ahead log, MiB": f"{self.most('log_mib'):.1f} at most",
