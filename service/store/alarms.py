@@ -65,7 +65,8 @@ def insert_alarms(
 ) -> None:
     """Insert new alarm events with their messages and audit entries, and update the alarms.
 
-    `address` returns the outbox messages about an event.
+    `address` returns the outbox messages about an event. Stored events are skipped. The operator
+    command of an `ActedNews` is answered as done in the same transaction.
     """
     for each in news:
         for event in each.events:

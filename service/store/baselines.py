@@ -41,7 +41,7 @@ class StoredStep:
     version
         Version of the baseline; None for `RENEWED`.
     from_ns
-        Time from which readings are used for learning; only for `RENEWED`.
+        Time from which readings are used for learning, for `RENEWED`; None for other steps.
     """
 
     unit: str

@@ -187,7 +187,7 @@ class _References(AuditedTables, ABC, Generic[_Reference]):
 
 
 class GapReferenceStore(_References[GapReference]):
-    """Table of the gap references of all bearings; one reference is in force per bearing."""
+    """Table of the gap references of all bearings; the newest is in force for its bearing."""
 
     action = "gap_reference.set"
     table = "gap_reference"

@@ -33,13 +33,7 @@ class Place:
 
 
 class DamageLog:
-    """Log of the damaged and missing rows found since the start; thread-safe.
-
-    Parameters
-    ----------
-    most
-        Maximum number of rows that are listed.
-    """
+    """Log of the damaged and missing rows found since the start, `most` at most; thread-safe."""
 
     def __init__(self, most: int = MAX_PLACES) -> None:
         self._most = most
@@ -206,13 +200,7 @@ TABLES = """
 
 
 class Seals:
-    """Row checksums of one database file.
-
-    Parameters
-    ----------
-    damage
-        Log that receives the rows that do not match their checksums.
-    """
+    """Row checksums of one database file; rows that do not match are added to the log `damage`."""
 
     def __init__(self, damage: DamageLog) -> None:
         self._damage = damage

@@ -17,13 +17,7 @@ Identity = tuple[int, int]
 
 
 class OpenedFile:
-    """Identity of the database file that was opened.
-
-    Parameters
-    ----------
-    path
-        Path of the file.
-    """
+    """Identity of the database file that was opened."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -56,7 +50,7 @@ class OpenedFile:
             )
 
     def keep_logs_apart(self) -> None:
-        """Rename the WAL files of a database file that was replaced; call after `close`.
+        """Rename the WAL files of a database file that was replaced, after closing the connections.
 
         At the next start SQLite would apply these WAL files to the new database and damage it.
         """

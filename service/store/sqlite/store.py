@@ -34,7 +34,7 @@ class SqliteStore(Store):
     address
         Function that returns the outbox messages about an alarm event.
     spectra
-        Limits of stored spectra.
+        Limits of stored spectra; None for the defaults of `SpectraLimits`.
 
     Raises
     ------
