@@ -117,7 +117,8 @@ def decide_all(
 ) -> DecisionHistory:
     """Return the decision after each stored reading, from the initial decision on.
 
-    Readings that `is_settled` (n,) excludes are not judged; without a baseline, none is.
+    Readings that `is_settled` (n,) excludes are not judged; without a baseline, none is. The
+    direction is "x" or "y".
     """
     nothing = (np.nan, np.nan, np.nan)
     rows = [
