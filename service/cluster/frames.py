@@ -21,6 +21,8 @@ from core.samples.calibration import UnitCalibration
 from service.live.status import LinkState
 from service.measuring.acquirer import LinkNews
 
+SENDER = "check which program writes to the stream"
+
 
 class WireError(ValueError):
     """Error raised if a stream message cannot be used; another attempt would also fail.
@@ -40,13 +42,13 @@ def require_possible(block: SampleBlock) -> None:
     a negative number of rejected samples.
     """
     if not block.n_samples:
-        raise WireError("impossible", "a block without samples")
+        raise WireError("impossible", f"a block without samples; {SENDER}")
     if not all(math.isfinite(c.unit_per_count) for c in block.calibration.channels):
-        raise WireError("impossible", "a block with a calibration that is not finite")
+        raise WireError("impossible", f"a block with a calibration that is not finite; {SENDER}")
     if not all(math.isfinite(reading.value or 0.0) for reading in block.slow.values()):
-        raise WireError("impossible", "a block with a slow value that is not finite")
+        raise WireError("impossible", f"a block with a slow value that is not finite; {SENDER}")
     if any(rejection.n_samples < 0 for rejection in block.rejected):
-        raise WireError("impossible", "a block with a negative number of rejected samples")
+        raise WireError("impossible", f"a block with a negative number of rejections; {SENDER}")
 
 
 FINGERPRINT_BYTES = 16
@@ -320,7 +322,7 @@ def _side_values(head: BlockHead) -> SideValues:
         or any(start >= stop for start, stop in itertools.pairwise(edges))
         or any(len(cell.slow) != n_slow or cell.ok >> n_channels for cell in head.cells)
     ):
-        raise WireError("not_understood", "a block whose cells do not match its samples")
+        raise WireError("not_understood", f"a block whose cells do not match its samples; {SENDER}")
     slow = np.array([cell.slow for cell in head.cells], dtype=np.float64)
     return SideValues(
         starts=np.array(starts, dtype=np.int64),

@@ -113,7 +113,7 @@ class UnitProgress:
         measured delays of blocks.
     done
         Epoch, sample index and time at which the stored results end, if their position on the
-        stream is unknown.
+        stream is unknown; otherwise None.
     """
 
     def __init__(
@@ -157,12 +157,19 @@ class UnitProgress:
         if stored is None or self._memory is None or self.sequence:
             return
         if first_sequence > stored.sequence + 1:
-            log.error("the stream begins after the stored results; raise max_age_h", unit=self.unit)
+            log.error(
+                "the stream begins after the stored results, so samples are missing; raise"
+                " [stream] max_age_h in the plant file",
+                unit=self.unit,
+            )
         elif first_sequence > stored.window_sequence:
             log.warning("the stream begins within the window of the analysis", unit=self.unit)
 
     async def take(self, sequence: int, payload: bytes) -> bool:
-        """Process the message with a sequence number; return False if the message is refused."""
+        """Process the message with a sequence number; return False if the message is refused.
+
+        A message that was processed before is only counted as repeated.
+        """
         if sequence <= self.sequence:
             self._arrived_s = self._clock.monotonic_s()
             self.n_repeated += 1

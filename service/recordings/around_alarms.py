@@ -121,7 +121,7 @@ class Capture:
         self.deadline_s = now_s + self._settings.post_s + PATIENCE_S
 
     def add(self, block: SampleBlock) -> None:
-        """Append a block unless it starts after the end of the capture."""
+        """Append a block, unless it starts after the end or the capture is full or abandoned."""
         if block.start_ns < self._end_ns and self._n_left > 0 and not self.is_lost:
             self.pending.append(block)
             self._n_left -= block.n_samples

@@ -184,7 +184,7 @@ class RecordingWindow:
 
 
 def window_of(recording: Recording, start_s: float, seconds: float) -> RecordingWindow:
-    """Return the blocks from ``start_s`` to ``start_s + seconds`` after the first sample.
+    """Return the blocks that overlap ``start_s`` to ``start_s + seconds`` after the first sample.
 
     Raises
     ------

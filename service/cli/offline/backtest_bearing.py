@@ -82,7 +82,8 @@ class Period:
     version
         Number of the baseline, from 1.
     begin, learned, end
-        The baseline is learned from rows `begin` to `learned`, and compared with rows up to `end`.
+        Row numbers: the baseline is learned from the rows before `learned`, from `begin` on, and
+        compared with the rows from `learned` on, before `end`.
     event
         Machine event at the beginning of the period; empty for the first period.
     """
