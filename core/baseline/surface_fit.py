@@ -106,7 +106,7 @@ class Fit:
         return tuple(tuple(row) for row in part.tolist())
 
     def std(self, design: FloatArray) -> FloatArray:
-        """Return the standard uncertainty of the surface (n,) at the rows of a design matrix."""
+        """Return the standard uncertainty (n,) of the surface for design (n, n_coefficients)."""
         variance = np.einsum("ij,jk,ik->i", design, self.covariance, design)
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 

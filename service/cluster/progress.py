@@ -57,7 +57,9 @@ def usable(stored: StreamPosition | None, stream: str, newest: int) -> StreamPos
         log.error("the stream was replaced: the stored position is discarded", unit=stored.unit)
         return None
     if stored.sequence > newest:
-        log.error("the stream has lost confirmed messages", unit=stored.unit)
+        log.error(
+            "the stream has lost confirmed messages; check the servers' disks", unit=stored.unit
+        )
         return None
     return stored
 

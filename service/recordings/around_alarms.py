@@ -155,8 +155,6 @@ class Captures(WriterThread):
 
     Parameters
     ----------
-    root
-        Folder of all captures.
     make_writer
         Function that opens a recording, by unit; other units are not captured.
     rate_hz
@@ -190,7 +188,7 @@ class Captures(WriterThread):
         self.n_written = self.n_failed = 0
 
     def set_listener(self, listener: Callable[[Outcome], None]) -> None:
-        """Set the function that is called on the event loop with the outcome of each capture."""
+        """Set the function that gets the outcome of each capture; it runs on the event loop."""
         self._listener = listener
 
     def expects(self, event: AlarmEvent) -> bool:

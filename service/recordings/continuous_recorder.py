@@ -265,8 +265,6 @@ class ContinuousRecorder(WriterThread):
 
     Parameters
     ----------
-    root
-        Folder of the recordings.
     units
         Units to record; blocks of other units are ignored.
     pressure

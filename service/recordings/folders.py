@@ -69,7 +69,8 @@ def damaged_folder(folder: Path, part: Path) -> Path:
 def remove_incomplete(root: Path, units: Container[str | None]) -> list[Path]:
     """Remove the incomplete recordings of units after a crash of the service; return their folders.
 
-    Recordings of other units are kept: another process may be writing them.
+    Recordings of other units are kept: another process may be writing them. None includes names
+    without a unit.
 
     Raises
     ------

@@ -85,7 +85,7 @@ def _remove_stale(path: Path) -> None:
         except OSError as error:
             raise PortInUseError(f"cannot listen on {path}: {error.strerror}") from error
         else:
-            raise PortInUseError(f"cannot listen on {path}: another program listens on it")
+            raise PortInUseError(f"cannot listen on {path}: another program listens on it; stop it")
 
 
 class CertificateError(Exception):

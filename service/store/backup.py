@@ -61,7 +61,7 @@ def checked(path: Path, origin: Origin | None = Origin.LIVE) -> Content:
     Raises
     ------
     BackupError
-        If the backup is damaged, is not the database of a live plant, or has a newer schema.
+        If the backup is missing or damaged, has another origin, or has a newer schema.
     """
     if not path.is_file():
         raise BackupError(f"{path}: the backup does not exist; check the path")
@@ -159,7 +159,7 @@ def back_up(
         If the backup, its verification or the removal of older backups fails.
     """
     if not database.is_file():
-        raise BackupError(f"{database}: the database does not exist")
+        raise BackupError(f"{database}: the database does not exist; check the path")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with alone_in(folder):

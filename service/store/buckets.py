@@ -49,7 +49,7 @@ class Summaries:
     def of(
         cls, names: tuple[str, ...], time_ns: IntArray, value: FloatArray, level: LevelArray
     ) -> "Summaries":
-        """Return the summaries of single readings; an unusable reading has the value NaN."""
+        """Return summaries of n readings: (n, n_names) `value`, NaN if unusable, and `level`."""
         count = np.isfinite(value).astype(np.int64)
         return cls(names, time_ns, count, value, value, value, level)
 
@@ -66,7 +66,7 @@ class Summaries:
         return found.at(np.argsort(found.time_ns, kind="stable"))
 
     def at(self, rows: IntArray | npt.NDArray[np.bool_]) -> "Summaries":
-        """Return the rows selected by a mask, or by indices and in the order of the indices."""
+        """Return the rows selected by a mask (n,), or by indices (m,) in the order of these."""
         return Summaries(self.names, **{name: getattr(self, name)[rows] for name in ROWS})
 
     def only(self, names: tuple[str, ...]) -> "Summaries":
@@ -84,7 +84,7 @@ class Summaries:
         return self.summed(starts, number[starts] * width_ns)
 
     def summed(self, starts: IntArray, time_ns: IntArray) -> "Summaries":
-        """Return the aggregate of each run of consecutive rows, of which there is at least one.
+        """Return the aggregate of each run of consecutive rows; `starts` is not empty.
 
         Parameters
         ----------

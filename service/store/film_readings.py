@@ -225,9 +225,8 @@ def select_decisions(reader: Connection, unit: str, bearing: str) -> list[Stored
             for direction, estimator, version, document in rows
         ]
     except ValueError as error:
-        raise StoreError(
-            f"stored decision of unit {unit} bearing {bearing} is invalid: {error}"
-        ) from error
+        name = f"stored decision of unit {unit} bearing {bearing}"
+        raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
 
 
 def select_film_history(reader: Connection, query: FilmQuery) -> FilmHistory:

@@ -17,12 +17,10 @@ MAX_PLACES = 1000
 
 @dataclass(frozen=True)
 class Place:
-    """Table and key of a damaged or missing row.
+    """Table and key, as text, of a damaged or missing row.
 
     Parameters
     ----------
-    key
-        Key of the row as text.
     is_missing
         Whether the row is missing; False if the row is damaged.
     """

@@ -267,7 +267,7 @@ class Commands(Tables):
             answer_command(writer, id_, answer, now_ns)
 
     def withdraw(self, id_: str, words: str, now_ns: int) -> bool:
-        """Withdraw a waiting command; return False if it was taken or answered."""
+        """Withdraw a waiting command with the answer `words`; return False if it is not waiting."""
         with self._writing() as writer:
             return bool(writer.execute(WITHDRAW, (words, now_ns, id_)).rowcount == 1)
 

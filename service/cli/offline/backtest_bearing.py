@@ -98,7 +98,7 @@ class Period:
 def periods_of(
     time_ns: TimeArray, events: Sequence[MachineEvent], learning: Learning
 ) -> list[Period]:
-    """Return the periods of a bearing between its events, except periods without readings."""
+    """Return the periods between events that have readings; `time_ns` (n,) is ascending."""
     ordered = sorted(events, key=lambda event: event.time_ns)
     cuts = [0, *(int(np.searchsorted(time_ns, event.time_ns)) for event in ordered), time_ns.size]
     texts = ["", *(event.text for event in ordered)]

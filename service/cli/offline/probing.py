@@ -59,7 +59,7 @@ class RegisterLook:
 
 @dataclass(frozen=True)
 class ValueLook:
-    """Value of a register map with its raw registers.
+    """Value of a register map, None unless finite, with its raw registers.
 
     Parameters
     ----------

@@ -47,13 +47,13 @@ def read_head(path: Path) -> AuditHead:
         with path.open("rb") as file:
             text = file.read(MAX_BYTES)
     except FileNotFoundError:
-        raise HeadError("the head file does not exist") from None
+        raise HeadError(f"the head file {path.name} does not exist") from None
     except OSError as error:
-        raise HeadError(f"the head file cannot be read: {error.strerror}") from error
+        raise HeadError(f"the head file {path.name} cannot be read: {error.strerror}") from error
     try:
         return _head(json.loads(text))
     except (ValueError, RecursionError):
-        raise HeadError("the head file has no valid number and hash of an entry") from None
+        raise HeadError(f"the head file {path.name} is damaged; restore it from a backup") from None
 
 
 def write_head(path: Path, head: AuditHead) -> None:

@@ -123,7 +123,7 @@ class AccountStore(AuditedTables):
             if found and tuple(found[:3]) == (name, role.value, password_hash):
                 return  # already written by a call whose outcome was unknown: hashes are unique
             if not insert_account(writer, name, role, password_hash, now_ns, must_change):
-                raise AccessRefusedError(f"account {name} already exists")
+                raise AccessRefusedError(f"account {name} already exists; choose another name")
             self._audit.add(writer, [_account_action("added", name, now_ns, after=role)])
 
     def get(self, name: str) -> Account | None:
@@ -250,7 +250,10 @@ def insert_account(
     now_ns: int,
     must_change: bool = False,
 ) -> bool:
-    """Insert an account within an open transaction; return False if the name is taken."""
+    """Insert an account within an open transaction; return False if the name is taken.
+
+    With `must_change`, the account must change its password at the first login.
+    """
     row = (name, role.value, password_hash, now_ns, now_ns, int(must_change))
     insert = "INSERT INTO account VALUES (?, ?, ?, 1, ?, ?, ?) ON CONFLICT (name) DO NOTHING"
     return writer.execute(insert, row).rowcount == 1

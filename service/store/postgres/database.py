@@ -349,5 +349,5 @@ class PostgresDatabase:
         return True
 
     def hold(self, name: str) -> PostgresHold:
-        """Return a lock on a name, exclusive among all processes that use this database."""
+        """Return an advisory lock on a name; its errors are as for `Database.hold`."""
         return PostgresHold(self.address, name)

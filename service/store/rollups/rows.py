@@ -118,7 +118,7 @@ def together(one: Cells, other: Cells) -> Cells:
 
 
 def bins(value: FloatArray, width: float) -> IntArray:
-    """Return the bin number of each value, `NO_BIN` for NaN; bin edges are multiples of `width`."""
+    """Return the bin numbers of values (n,), `NO_BIN` for NaN; edges are multiples of `width`."""
     known = np.isfinite(value)
     safe = np.clip(np.where(known, value, 0.0), -1e9, 1e9)
     number = np.floor(safe / width).astype(np.int64)

@@ -43,7 +43,7 @@ def findings(path: Path, progress: Callable[[float], None] = lambda _: None) -> 
         If the file does not exist.
     """
     if not path.exists():
-        raise StoreError(f"{path.absolute()}: the database does not exist")
+        raise StoreError(f"{path.absolute()}: the database does not exist; check data_folder")
     in_file = _mark_beside(path)  # read before the database, which may be ahead of it
     log = DamageLog(EVERY)
     seals = Seals(log)

@@ -128,8 +128,6 @@ class Writer:
 
     Parameters
     ----------
-    marks
-        High-water mark of the database.
     prepare
         Function that prepares a connection for writing, within a transaction.
     """

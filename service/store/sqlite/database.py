@@ -96,7 +96,7 @@ class SqliteReading:
         return connection.execute(EVER_HAD, (table,)).fetchone() is not None
 
     def hold(self, name: str) -> FileHold:
-        """Return an exclusive lock on a name, implemented by a lock file beside the database."""
+        """Return a lock on a name, which is a lock file; its errors are as for `Database.hold`."""
         return held(self._path, name)
 
     @contextmanager

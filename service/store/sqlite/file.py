@@ -206,6 +206,6 @@ class FileHold:
 
 
 def held(database: Path, name: str) -> FileHold:
-    """Return an exclusive lock on a name, implemented by a lock file beside the database."""
+    """Return a lock on a name, which is a lock file; its errors are as for `Database.hold`."""
     safe = re.sub(r"[^A-Za-z0-9_-]", lambda found: f"%{ord(found[0]):x}", name)
     return FileHold(database.with_name(f"{database.name}.{safe}.lock"), name)
