@@ -139,14 +139,14 @@ class Limits:
         return danger if level is AlarmLevel.DANGER else alert
 
     def reason(self, level: AlarmLevel | None, value: float) -> str:
-        """Return the code word "ok", "below_limit" or "above_limit" for a level and its value."""
+        """Return "below_limit" or "above_limit" by the value, or "ok" if the level is None."""
         if level is None:
             return "ok"
         return "below_limit" if self.is_low(value) else "above_limit"
 
 
 def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Judgement:
-    """Return the judgement of a reading by limits; `held` is the level of the previous judgement.
+    """Return the judgement of a reading; `held` is the level of the previous judgement, or None.
 
     A reading at an implausible speed may be too low: it can raise an alarm but not clear it. At
     standstill the alarms are suppressed but not cleared, because the speed reading may be wrong.

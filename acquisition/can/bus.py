@@ -26,7 +26,8 @@ LINUX_ERROR_FRAMES = ("socketcan", "slcan", "gs_usb", "virtual")
 def foreign_errors_renamed(where: str) -> Iterator[None]:
     """Convert exceptions of python-can, pyserial and the system to acquisition errors.
 
-    The messages begin with `where`, the name of the bus.
+    A missing driver becomes ConfigError, a lost bus LinkError, and an invalid value FrameError; the
+    messages begin with `where`, the name of the bus.
     """
     try:
         yield

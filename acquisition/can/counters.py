@@ -35,12 +35,15 @@ class CounterFollower:
     """Converter of frame counters of any width to sample indices on one axis.
 
     A frame close to the newest frame gets its sample index at once. A frame farther away is held
-    until a second frame confirms it. The jump is a gap if the counter increased, if the clock
-    matches a counter wrap, or if a device that reports restarts has reported none; otherwise the
-    device has restarted its counter, and a new epoch begins.
+    until a second frame confirms it. The jump is a gap if the device reports no new epoch and the
+    counter increased, or the jump matches the clock, or the device reports epochs but these frames
+    have none or the counter wrapped by at most half its period. Otherwise the device has restarted
+    its counter, and a new epoch begins.
 
     Parameters
     ----------
+    plan
+        Decoding plan, with the sampling rate and the widest counter.
     axis
         Sample axis, at the first sample of the newest frame.
     refused

@@ -86,7 +86,7 @@ class DbcMessage:
             values: Any = self._source.decode(data, decode_choices=False, scaling=False)
             value: int | float = values[name]
         except (DatabaseError, ValueError, KeyError) as exc:
-            raise FrameError(f"{self.name}.{name}: {exc}") from exc
+            raise FrameError(f"{self.name}.{name} cannot be decoded: {exc}") from exc
         return value
 
 

@@ -78,7 +78,7 @@ def require_bus(message: Message) -> None:
     if message.arbitration_id & BUS_OFF:
         raise LinkError("the CAN controller is bus-off; check bit rate, wiring and termination")
     if _controller_state(message) & (RX_PASSIVE | TX_PASSIVE):
-        raise LinkError("the CAN controller is error-passive after too many errors on the bus")
+        raise LinkError("the CAN controller is error-passive; check bit rate and termination")
 
 
 def lost_in_controller(message: Message) -> bool:

@@ -178,7 +178,7 @@ class FrameReader:
                 self._hand_over(Batch(frames, self._arrived, self._stamp_fault))
                 self._stamp_fault = None
         if not frames and bus.state is can.BusState.ERROR:
-            raise LinkError(f"{self._where}: the CAN interface is in an error state")
+            raise LinkError(f"{self._where}: the CAN interface is in an error state; check wiring")
 
     def _receive(self, bus: can.BusABC, frames: list[Frame], timeout_s: float) -> None:
         """Append the received frames to `frames`; wait at most `timeout_s` for the first frame."""
@@ -217,7 +217,7 @@ class FrameReader:
                 require_bus(message)
                 self._refused[Refusal.OVERFLOW] += lost_in_controller(message)
             return message
-        raise LinkError(f"{self._where}: received {_MAX_NONSENSE} malformed messages in a row")
+        raise LinkError(f"{self._where}: {_MAX_NONSENSE} malformed messages; check the adapter")
 
     def _hand_over(self, batch: Batch) -> None:
         n_frames = len(batch.frames)

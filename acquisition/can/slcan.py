@@ -111,7 +111,7 @@ class SlcanBus(slcanBus):
 
     @classmethod
     def require_speed(cls, bitrate: int | None, data_bitrate: int | None) -> None:
-        """Check that slcan has the bit rates in bit/s; python-can would report a lost link.
+        """Check that slcan has the bit rates in bit/s, if given; python-can reports a lost link.
 
         Raises
         ------

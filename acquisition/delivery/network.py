@@ -63,7 +63,7 @@ class KnownAddresses:
                 self._found = await self._look_up.addresses()
         except TimeoutError:
             if not self._found:
-                raise OSError(f"no name server answered within {limit_s} s") from None
+                raise OSError(f"no name server answered within {limit_s} s; check DNS") from None
         except OSError:
             if not self._found:
                 raise

@@ -66,7 +66,7 @@ def known_unit(spelling: str) -> str | None:
 
 
 def spellings(unit: str) -> str:
-    """Return all accepted spellings of a unit, quoted and separated by commas, for a message."""
+    """Return all spellings of a canonical unit, quoted and separated by commas, for a message."""
     return ", ".join(f'"{spelling}"' for spelling in _SAME[unit])
 
 

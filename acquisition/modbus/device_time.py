@@ -22,8 +22,6 @@ class EpochTime:
 
     Parameters
     ----------
-    seconds
-        Cell of the seconds since 1970 UTC.
     parts
         Cell of the fraction; None if the device has whole seconds only.
     parts_per_s

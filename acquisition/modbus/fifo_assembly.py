@@ -169,7 +169,7 @@ def place_records(
     counters = () if piece.counters is None else piece.counters
     places = [samples.place(int(counter), now_s) for counter in counters]
     if len({place.epoch for place in places if place is not None}) > _MAX_EPOCHS:
-        raise LinkError("FIFO: the sample counter restarts more than once in a read")
+        raise LinkError("FIFO: the sample counter restarts repeatedly in a read; check address")
     return list(_joined(places, piece.counts))
 
 

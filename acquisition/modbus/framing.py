@@ -67,7 +67,7 @@ class RtuFraming:
         return body + crc16(body).to_bytes(2, "little")
 
     def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, memoryview] | None:
-        """Extract the reply to a request from received bytes; results as `TcpFraming.take`."""
+        """Extract the reply to a request; results and errors are as those of `TcpFraming.take`."""
         if len(data) < 2:
             return None
         if data[0] != pending.unit:

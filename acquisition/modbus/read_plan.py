@@ -35,7 +35,7 @@ class ReadPlan:
     base: int
 
     def span_of(self, cell: Cell) -> Span:
-        """Return the range, read by one request, that contains a cell."""
+        """Return the range, read by one request, that contains a cell of the planned map."""
         start, stop = cell.start(self.base), cell.stop(self.base)
         return next(
             span

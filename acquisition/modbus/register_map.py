@@ -123,8 +123,6 @@ class Together:
     ----------
     address
         Address of the first register as printed in the manual.
-    count
-        Number of registers.
     """
 
     address: int

@@ -187,7 +187,7 @@ class RingFollower:
         if (again.epoch, again.layout) != (header.epoch, header.layout):
             raise LinkError(
                 f"{self._reader.where}: block ring: epoch or layout differ between two reads of"
-                " the header"
+                " the header; if this recurs, check the device"
             )
 
     def _go_back_to_start(self, newest: Slot | None, header: RingHeader) -> None:

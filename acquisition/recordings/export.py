@@ -58,7 +58,7 @@ def export_recording(
         the recording cannot be read.
     """
     if os.path.lexists(out):
-        raise ConfigError(f"{out}: the file exists already and is not overwritten")
+        raise ConfigError(f"{out}: the file exists already; choose another path")
     aside = out.with_name(out.name + ".incomplete")
     try:
         with foreign_errors_of(out):

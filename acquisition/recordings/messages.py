@@ -99,10 +99,6 @@ def blocks_message(
 
     Parameters
     ----------
-    heads
-        Headers of the blocks.
-    rejected
-        Rejections before the blocks.
     counts
         (n_channels, n_samples) samples of all blocks; None for a message with headers only.
     done

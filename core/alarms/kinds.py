@@ -199,7 +199,7 @@ class Watch:
         return self.identity.id
 
     def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
-        """Return the judgement of a reading by the limits; see `LimitRule.judge`.
+        """Return the judgement of a reading by the limits; `held` is as in `LimitRule.judge`.
 
         Raises `TypeError` if the alarm has no limits.
         """

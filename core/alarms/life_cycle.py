@@ -15,7 +15,7 @@ Timers = tuple[DelayTimer, DelayTimer]
 def update(
     alarm: Alarm, condition: Judgement, now_ns: int, rule: AlarmRule
 ) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
-    """Update an alarm with the newest judgement; return the alarm and its new events.
+    """Update an alarm with the judgement at the time `now_ns`; return it and its new events.
 
     While the condition is unknown, the level does not change and the delays are paused. Level,
     value and limit of an unknown condition are the last known ones.

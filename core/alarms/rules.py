@@ -22,7 +22,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Region:
-    """Set of operating points: operating states, and ranges of values; None for no restriction.
+    """Set of operating points: operating states, and half-open ranges; None for no restriction.
 
     A condition cell is a region with the bounds of the cell. Attitude angles are within 0° to 360°.
     """

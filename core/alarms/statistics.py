@@ -106,7 +106,7 @@ class AlarmFigures:
 
 
 def is_announced(event: AlarmEvent) -> bool:
-    """Whether an event announces an alarm: newly raised, escalated, or active and unhidden."""
+    """Whether an event announces an alarm: raised, escalated, or active after it was hidden."""
     return event.state_after is AlarmState.UNACKNOWLEDGED and (
         event.change in ANNOUNCED or event.state_before in HIDDEN
     )

@@ -157,7 +157,7 @@ class UnitAlarms(AlarmBoard):
     def restore(
         self, stored: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
     ) -> list[AlarmNews]:
-        """Restore alarms after a restart, as `AlarmBoard.restore` does.
+        """Restore alarms after a restart, as `AlarmBoard.restore` does with the same arguments.
 
         A link event since the last block overrides the memory: a lost link stays lost until samples
         arrive.

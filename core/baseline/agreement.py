@@ -77,7 +77,7 @@ def learning_drift(
 def drift_within(
     day: npt.NDArray[np.int64], value: FloatArray, cell: npt.NDArray[np.int64]
 ) -> Drift | None:
-    """Return the drift of values (n,) over the days (n,), compared within each cell (n,).
+    """Return the drift of n ≥ 1 values over their days, compared within each cell; all are (n,).
 
     None if fewer than `MIN_SPELLS` time blocks contain values that can be compared.
     """

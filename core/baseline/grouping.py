@@ -60,7 +60,7 @@ def group_readings(
 
 
 def group_medians(x: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
-    """Return the median of x (n,) in each group; `group` (n,) numbers the groups from 0 on."""
+    """Return the median of x (n,) in each group; `group` (n,) numbers them from 0 without gaps."""
     x = x[np.lexsort((x, group))]
     count = np.bincount(group)
     start = np.cumsum(count) - count

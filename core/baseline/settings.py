@@ -14,8 +14,6 @@ class BaselineSettings:
 
     Parameters
     ----------
-    grid
-        Grid of the condition cells.
     uses_attitude
         Whether the surface depends on the attitude angle, because pads are set unevenly and x and
         y differ. `grid` defines whether the cells depend on the attitude angle.

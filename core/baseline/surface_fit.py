@@ -106,7 +106,7 @@ class Fit:
         return tuple(tuple(row) for row in part.tolist())
 
     def std(self, design: FloatArray) -> FloatArray:
-        """Return the standard uncertainty of the surface (n,) at the rows of a design matrix."""
+        """Return the standard uncertainty (n,) of the surface for design (n, n_coefficients)."""
         variance = np.einsum("ij,jk,ik->i", design, self.covariance, design)
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
@@ -181,7 +181,7 @@ def _std(
 
 
 def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Surface:
-    """Return the surface refitted to groups with `is_used` (n_groups,) 1, weighted as in `fit`."""
+    """Return the surface refitted to groups where `is_used` (n_groups,) is 1, weighted as `fit`."""
     shape, offset = fit.surface.shape, fit.surface.offset
     points = _Points.of(groups, shape, offset)
     precision = is_used * fit.robust_weight / (fit.group_std**2 * fit.clustering)

@@ -104,7 +104,7 @@ class DecisionHistory:
     time_scale_h: FloatArray
 
     def raised(self) -> npt.NDArray[np.int64]:
-        """Return the row numbers at which the level is higher than in the row before."""
+        """Return the rows (n_raised,) in which the level is higher than in the row before."""
         return np.flatnonzero(np.diff(self.level, prepend=np.int8(0)) > 0)
 
 
@@ -117,7 +117,8 @@ def decide_all(
 ) -> DecisionHistory:
     """Return the decision after each stored reading, from the initial decision on.
 
-    Readings that `is_settled` (n,) excludes are not judged; without a baseline, none is.
+    Readings that `is_settled` (n,) excludes are not judged; without a baseline, none is. The
+    direction is "x" or "y".
     """
     nothing = (np.nan, np.nan, np.nan)
     rows = [
@@ -137,7 +138,10 @@ def last_decision(
     baseline: QuantityBaseline,
     rules: FilmRules,
 ) -> Decision:
-    """Return the decision after the last stored reading as if `baseline` had always been active."""
+    """Return the decision after the last stored reading as if `baseline` had always been active.
+
+    Readings that `is_settled` (n,) excludes are not judged. Without readings, the initial decision.
+    """
     watched = (history, is_settled, baseline.direction, baseline)
     found = deque(_decisions(*watched, rules.change, rules.lapsed_ns), maxlen=1)
     return found[0] if found else INITIAL_DECISION

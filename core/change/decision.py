@@ -57,7 +57,8 @@ def outcomes(
     """Yield, for each reading of a film in one direction, its comparison with the baseline.
 
     Readings that cannot be compared yield a verdict, as do all readings without a baseline. Columns
-    are (n,): `value` is ln of the stiffness, NaN if missing; `codes` are of `ReadingOutcome`.
+    are (n,): `value` is ln of the stiffness, NaN if missing, with the random standard uncertainty
+    `u_random`; `codes` are of `ReadingOutcome`.
     """
     unusable = np.full(value.size, -1)
     columns: tuple[FloatArray, ...] = (np.zeros(value.size),) * 4

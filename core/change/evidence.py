@@ -56,7 +56,7 @@ class ScaleSums:
         )
 
     def finding(self, time: TimeScatter) -> "Finding":
-        """Return the mean deviation over the time scale of `time`, with its standard uncertainty.
+        """Return the mean deviation of at least one reading over the time scale of `time`.
 
         `time.share` scales the scatter, which is larger before the time scale has fully elapsed.
         """

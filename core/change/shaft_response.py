@@ -88,10 +88,15 @@ def learn_response(
 ) -> ShaftResponse | None:
     """Learn the shaft response of a unit from stiffness histories by bearing id, at common times.
 
+    Parameters
+    ----------
+    is_settled : (n,)
+        Mask of the times at which the operating condition was settled; the others are not used.
+
     Returns
     -------
-    The response; None if fewer than `MIN_MEANS` times `MEAN_READINGS` readings are settled
-    (`is_settled`, (n,)) and have stiffness and amplitude of all films.
+    The response; None if fewer than `MIN_MEANS` times `MEAN_READINGS` settled times have stiffness
+    and amplitude of all films.
 
     Raises
     ------

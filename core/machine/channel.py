@@ -91,10 +91,10 @@ class Channel:
 
 
 def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexArray:
-    """Return the factors (n_lines,) from phasors in the channel's unit to displacement in µm.
+    """Return the factors from phasors in the channel's unit to displacement in µm, (n_lines,).
 
-    Velocity is integrated once, acceleration twice, by division by iω and (iω)²; the transducer's
-    response and the channel's delay are compensated. The factor of a key-phase channel is zero.
+    The frequencies (n_lines,) are positive. Velocity is integrated once, acceleration twice; the
+    transducer's response and the channel's delay are compensated. Key-phase channels give zero.
     """
     if channel.measurand is Measurand.KEY_PHASE_V:
         return np.zeros(np.shape(frequency_hz), dtype=np.complex128)

@@ -47,15 +47,7 @@ from core.uncertainty import Budget, Budgeted, Found, with_budgets
 
 @dataclass(frozen=True)
 class BearingReadings:
-    """Readings of one bearing, averaged over segments or polls.
-
-    Parameters
-    ----------
-    readings, budgets, estimators, spectrum
-        As in `core.monitor.assessment.Assessment`.
-    evidence
-        Kind of the input: waveforms, vectors with phase, or amplitudes only.
-    """
+    """Readings of one bearing, averaged over segments or polls; fields are as in `Assessment`."""
 
     readings: Mapping[str, Reading]
     budgets: Mapping[str, Budget]

@@ -30,7 +30,7 @@ OVERALL_NAMES = (*SHAFT_SPANS, ORBIT, *BEARING_SPEEDS)
 def overall_readings(
     segments: Sequence[Segment], rows: Sequence[int], bearing: Bearing, number: int
 ) -> Found:
-    """Return the broad-band vibration, averaged over the segments, and its budgets, by quantity.
+    """Return the broad-band vibration, averaged over at least one segment, and its budgets.
 
     Peak-to-peak values and farthest excursions are averaged linearly, velocities as squares; all
     are missing for polls. `rows` are the rows of the bearing's four channels, `number` is the

@@ -76,7 +76,7 @@ class SlowCalibration:
         Parameters
         ----------
         values : (n,)
-            Slow values, oldest first.
+            Slow values, oldest first; at least one.
         weights : (n,)
             Number of samples for which each value holds.
         """

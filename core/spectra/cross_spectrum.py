@@ -23,7 +23,6 @@ class CrossSpectrum:
     Parameters
     ----------
     frequency_hz : (n_lines,)
-        Frequency of each line.
     matrix : (n_lines, n_channels, n_channels)
         Mean of ``P_i · conj(P_j)`` of the zero-to-peak displacement phasors, µm². Hermitian.
     power : (n_lines, n_channels, n_channels)

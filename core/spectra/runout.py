@@ -62,7 +62,7 @@ def take_off_runout(
 def runout_verdict(
     vector: SlowRollVector | None, probe: str, rated_speed_rpm: float, has_key_phase: bool
 ) -> RunoutVerdict:
-    """Return `APPLIED` if a slow-roll vector is applicable to a probe, else the reason why not."""
+    """Return `APPLIED` if a slow-roll vector (None without one) fits a probe, else the reason."""
     if vector is None:
         return RunoutVerdict.NO_VECTOR
     if vector.probe != probe:

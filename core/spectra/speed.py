@@ -242,11 +242,12 @@ def read_key_phase(signal: FloatArray, rate_hz: float) -> KeyPhase | None:
 
 
 def rising_edges(signal: FloatArray) -> FloatArray:
-    """Return the positions at which a signal (n_samples,) rises through the middle of its range.
+    """Return the positions at which a finite signal (n_samples,) rises through its middle value.
 
     Returns
     -------
-    (n_edges,) fractional sample positions, ascending; noise within the hysteresis is ignored.
+    (n_edges,) fractional sample positions, ascending; noise within the hysteresis is ignored. Empty
+    for a constant signal.
     """
     low, high = float(signal.min()), float(signal.max())
     middle, margin = (low + high) / 2.0, HYSTERESIS * (high - low)

@@ -26,7 +26,7 @@ def vortex_frequency_hz(
 
     The shaft's power is weighted by its coherence with the bearing's motion, corrected for the bias
     of few segments, and summed over directions and bearings. A line of one probe alone (runout,
-    mains, a loose cable) does not count. `spectra` are those of the unit's bearings, at the same
+    mains, a loose cable) does not count. `spectra` are those of one or more bearings, at the same
     lines. None if no line of the band is a peak, or if none is coherent.
     """
     frequency_hz = spectra[0].frequency_hz

@@ -137,6 +137,9 @@ def little_leakage(shaft_power: FloatArray, lines: slice = slice(None)) -> npt.N
 def conditional_power(matrix: ComplexArray, given: ComplexArray, cross: ComplexArray) -> FloatArray:
     """Return the power of two signals that is not coherent with two inputs, (..., 2, n_lines).
 
+    Where the inputs are coherent with each other or one is zero, the whole power is returned.
+    Negative results, from rounding, are set to 0.
+
     Parameters
     ----------
     matrix : (..., 2, 2, n_lines)

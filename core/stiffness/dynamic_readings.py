@@ -49,13 +49,7 @@ NAMES = (
 
 
 def dynamic_readings(bearing: Bearing, found: DynamicStiffness, quality: Quality) -> Found:
-    """Return the readings of `dynamic` for a fitted film, and their budgets.
-
-    Parameters
-    ----------
-    quality
-        Quality of the input.
-    """
+    """Return the readings of `dynamic` for a fitted film, with budgets, from input of a quality."""
     damping = _damping_half_width(found, bearing.bracket, bearing.accuracy)
     quality = worst((quality, _fit_quality(found, bearing.accuracy.delay_s, damping)))
     coefficients = dynamic_budgets(found, bearing.bracket, bearing.accuracy)

@@ -207,7 +207,11 @@ class FilmFits:
         return _real_product(moved, self._left)
 
     def follow(self, change: int, fitted: Sequence[int]) -> FloatArray:
-        """Return the shift of fitted changes per unit of another, unfitted one, (n, n_fitted)."""
+        """Return how a wrong bracket property shifts those that are fitted, (n, n_fitted).
+
+        The properties are numbered as in `changes`: `change` is the wrong one, `fitted` are one or
+        two others. Shifts are per unit of the wrong property, and invalid where `estimate` is NaN.
+        """
         inverse, _ = _inverse(self._information[:, fitted][..., fitted])
         return -(inverse @ self._information[:, fitted, change, np.newaxis])[..., 0]
 

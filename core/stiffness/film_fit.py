@@ -46,7 +46,6 @@ class FilmLines:
     lines : (n_used,) of each bearing
         Indices of the used lines, ascending.
     frequency_hz : (n_lines,)
-        Frequencies of all lines.
     noise_power : (n, 2)
         Mean squared phasor of each probe's noise.
 

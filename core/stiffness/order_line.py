@@ -363,7 +363,7 @@ def floor_power(bins: CrossSpectrum, place: int, line_hz: float, lines_hz: Float
     ----------
     bins, place
         Cross-spectrum at evenly spaced frequencies, and index of the channel in it.
-    lines_hz
+    lines_hz : (n,)
         Frequencies of lines whose main lobes are excluded.
     """
     bin_hz = bins.frequency_hz[1] - bins.frequency_hz[0]

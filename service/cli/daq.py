@@ -39,8 +39,6 @@ class FastClock:
 
     Parameters
     ----------
-    clock
-        Reference clock.
     speed
         Seconds of this clock per second of the reference clock; above 0.
 

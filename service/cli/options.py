@@ -60,13 +60,7 @@ file, database or port. The names spare each command the modules of errors that 
 
 
 class CommandError(Exception):
-    """Failure of a command; the message is printed after the name of the command.
-
-    Parameters
-    ----------
-    code
-        Exit code.
-    """
+    """Failure of a command, with an exit code; the message is printed after the command's name."""
 
     def __init__(self, message: str, code: int = 1) -> None:
         super().__init__(message)

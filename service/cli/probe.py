@@ -186,7 +186,10 @@ def _place(
     except ValidationError as error:
         what = error.errors()[0]
         key = what["loc"][-1] if what["loc"] else "device"
-        fail(f"{device}: {key}: {what['msg']}", code=2)
+        fail(
+            f"invalid device {device}: {key}: {what['msg']}; use HOST[:PORT] or /dev/… of a port",
+            code=2,
+        )
 
 
 def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:

@@ -21,6 +21,8 @@ from core.samples.calibration import UnitCalibration
 from service.live.status import LinkState
 from service.measuring.acquirer import LinkNews
 
+SENDER = "check which program writes to the stream"
+
 
 class WireError(ValueError):
     """Error raised if a stream message cannot be used; another attempt would also fail.
@@ -40,13 +42,13 @@ def require_possible(block: SampleBlock) -> None:
     a negative number of rejected samples.
     """
     if not block.n_samples:
-        raise WireError("impossible", "a block without samples")
+        raise WireError("impossible", f"a block without samples; {SENDER}")
     if not all(math.isfinite(c.unit_per_count) for c in block.calibration.channels):
-        raise WireError("impossible", "a block with a calibration that is not finite")
+        raise WireError("impossible", f"a block with a calibration that is not finite; {SENDER}")
     if not all(math.isfinite(reading.value or 0.0) for reading in block.slow.values()):
-        raise WireError("impossible", "a block with a slow value that is not finite")
+        raise WireError("impossible", f"a block with a slow value that is not finite; {SENDER}")
     if any(rejection.n_samples < 0 for rejection in block.rejected):
-        raise WireError("impossible", "a block with a negative number of rejected samples")
+        raise WireError("impossible", f"a block with a negative number of rejections; {SENDER}")
 
 
 FINGERPRINT_BYTES = 16
@@ -127,18 +129,19 @@ def unframed(message: bytes, identity: UnitIdentity) -> Frame:
     """
     if len(message) < _START.size + _CRC.size or message[:4] != MAGIC:
         raise WireError(
-            "not_a_message", f"{len(message)} bytes that do not begin as a message of padwatch"
+            "not_a_message", f"{len(message)} bytes that are not a padwatch message; {SENDER}"
         )
     _, version, kind, plant, make, n_head, n_samples = _START.unpack_from(message)
     if version not in READABLE:
         raise WireError("other_version", _other_version(version))
     whole = _START.size + n_head + n_samples + _CRC.size
     if n_head > MAX_HEAD_BYTES or n_samples > MAX_SAMPLE_BYTES or whole != len(message):
-        raise WireError("wrong_length", f"a message of {len(message)} bytes, expected {whole}")
+        why = f"a message of {len(message)} bytes, expected {whole}; {SENDER}"
+        raise WireError("wrong_length", why)
     (crc,) = _CRC.unpack_from(message, whole - _CRC.size)
     body = memoryview(message)
     if crc != zlib.crc32(body[: whole - _CRC.size]):
-        raise WireError("damaged", "a message with a wrong checksum")
+        raise WireError("damaged", "a message with a wrong checksum; check the servers' disks")
     if plant != identity.plant:
         raise WireError("other_plant", "a message of another plant; use one stream for each plant")
     if make != identity.make:
@@ -148,7 +151,7 @@ def unframed(message: bytes, identity: UnitIdentity) -> Frame:
             " the same plant file for acquire and analyse",
         )
     if kind not in Kind.__members__.values():
-        raise WireError("unknown_kind", f"a message of unknown kind {kind}")
+        raise WireError("unknown_kind", f"a message of unknown kind {kind}; {SENDER}")
     head = bytes(body[_START.size : _START.size + n_head])
     samples = body[_START.size + n_head : whole - _CRC.size]
     return Frame(Kind(kind), head, samples)
@@ -288,7 +291,8 @@ def _block(frame: Frame, identity: UnitIdentity) -> Taken:
     if n_channels * head.n_samples * type_.itemsize != len(frame.samples):
         raise WireError(
             "wrong_length",
-            f"{len(frame.samples)} bytes for {n_channels} channels of {head.n_samples} samples",
+            f"{len(frame.samples)} bytes for {n_channels} channels of {head.n_samples} samples;"
+            f" {SENDER}",
         )
     counts = np.frombuffer(frame.samples, dtype=type_).reshape(n_channels, head.n_samples)
     block = SampleBlock(
@@ -320,7 +324,7 @@ def _side_values(head: BlockHead) -> SideValues:
         or any(start >= stop for start, stop in itertools.pairwise(edges))
         or any(len(cell.slow) != n_slow or cell.ok >> n_channels for cell in head.cells)
     ):
-        raise WireError("not_understood", "a block whose cells do not match its samples")
+        raise WireError("not_understood", f"a block whose cells do not match its samples; {SENDER}")
     slow = np.array([cell.slow for cell in head.cells], dtype=np.float64)
     return SideValues(
         starts=np.array(starts, dtype=np.int64),
@@ -343,5 +347,6 @@ def _read(adapter: TypeAdapter[T], head: bytes) -> T:
 def _require_own(unit: str, identity: UnitIdentity) -> None:
     if unit != identity.unit:
         raise WireError(
-            "other_unit", f"a message of unit {unit} in the subject of unit {identity.unit}"
+            "other_unit",
+            f"a message of unit {unit} in the subject of unit {identity.unit}; {SENDER}",
         )

@@ -57,7 +57,9 @@ def usable(stored: StreamPosition | None, stream: str, newest: int) -> StreamPos
         log.error("the stream was replaced: the stored position is discarded", unit=stored.unit)
         return None
     if stored.sequence > newest:
-        log.error("the stream has lost confirmed messages", unit=stored.unit)
+        log.error(
+            "the stream has lost confirmed messages; check the servers' disks", unit=stored.unit
+        )
         return None
     return stored
 
@@ -113,7 +115,7 @@ class UnitProgress:
         measured delays of blocks.
     done
         Epoch, sample index and time at which the stored results end, if their position on the
-        stream is unknown.
+        stream is unknown; otherwise None.
     """
 
     def __init__(
@@ -157,12 +159,19 @@ class UnitProgress:
         if stored is None or self._memory is None or self.sequence:
             return
         if first_sequence > stored.sequence + 1:
-            log.error("the stream begins after the stored results; raise max_age_h", unit=self.unit)
+            log.error(
+                "the stream begins after the stored results, so samples are missing; raise"
+                " [stream] max_age_h in the plant file",
+                unit=self.unit,
+            )
         elif first_sequence > stored.window_sequence:
             log.warning("the stream begins within the window of the analysis", unit=self.unit)
 
     async def take(self, sequence: int, payload: bytes) -> bool:
-        """Process the message with a sequence number; return False if the message is refused."""
+        """Process the message with a sequence number; return False if the message is refused.
+
+        A message that was processed before is only counted as repeated.
+        """
         if sequence <= self.sequence:
             self._arrived_s = self._clock.monotonic_s()
             self.n_repeated += 1

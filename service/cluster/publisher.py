@@ -38,13 +38,7 @@ from service.settings.processes import StreamSettings
 
 @dataclass(frozen=True)
 class Outgoing:
-    """Outgoing message; every attempt to publish it has the same id.
-
-    Parameters
-    ----------
-    is_news
-        Whether the message is a link state.
-    """
+    """Outgoing message, with one id for all attempts; `is_news` marks a link state."""
 
     id: str
     payload: bytes
@@ -162,7 +156,7 @@ class Publisher:
         return self._state.trouble
 
     async def publish(self, block: SampleBlock) -> None:
-        """Queue a block; wait while the queue is full."""
+        """Queue a block; wait while the queue is full. Raises `ValueError` if it is too large."""
         identity = self._identities[block.unit]
         message = encoded_block(block, identity, self._taken_ns(block))
         outgoing = Outgoing(message_id(identity, block), message)

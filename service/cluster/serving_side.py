@@ -126,7 +126,10 @@ class DatabaseOperators(Operators):
         self._clock = clock
 
     async def send(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
-        """Store a command and wait for its answer; withdraw it if no answer arrives in time."""
+        """Store a command and wait for its answer; withdraw it if no answer arrives in time.
+
+        Raises `StoreError` if the database cannot be used.
+        """
         stored = self._command(unit, command, actor)
         await asyncio.to_thread(self._store.commands.ask, stored)
         return await self._answer(stored)

@@ -191,7 +191,9 @@ async def _connected(settings: StreamSettings, name: str, lost: asyncio.Future[N
 
 async def _ended(lost: asyncio.Future[None], settings: StreamSettings) -> None:
     await lost
-    raise StreamError(f"the connection to NATS at {_places(settings)} was lost")
+    raise StreamError(
+        f"lost the connection to NATS at {_places(settings)}; check network and servers"
+    )
 
 
 async def _closed(client: Client) -> None:

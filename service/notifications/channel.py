@@ -94,7 +94,7 @@ def _start_of(path: Path) -> str:
 
 
 class TrustedAuthorities:
-    """Trusted certificate authorities: those of the system, or those of one file."""
+    """Trusted certificate authorities: those of `ca_file`, or those of the system if it is None."""
 
     def __init__(self, ca_file: str | None) -> None:
         self._ca_file = ca_file
@@ -120,8 +120,8 @@ def _context(ca_file: str | None) -> ssl.SSLContext:
 async def connected_socket(look_up: NameLookUp, port: int, timeout_s: float) -> socket.socket:
     """Return a non-blocking socket connected to the first address that accepts a connection.
 
-    `timeout_s` limits the name resolution and each attempt. Raises the `OSError` of the last
-    address if no address accepts a connection.
+    `timeout_s` limits the name resolution and each attempt. Raises `OSError` if the name cannot be
+    resolved, or the `OSError` of the last address if no address accepts a connection.
     """
     failure: OSError = OSError("the host has no address")
     async with asyncio.timeout(timeout_s):

@@ -51,13 +51,13 @@ def text(message: Message) -> str:
 
 
 def change_words(message: Message) -> str:
-    """Return the change of the alarm that a message reports, in words."""
+    """Return the change of the alarm that an alarm message reports, in words."""
     change: str = message["change"]
     return CHANGES.get(change, change.replace("_", " "))
 
 
 def value_words(message: Message) -> str | None:
-    """Return the alarm value with 95 % uncertainty and limit as text; None without a value."""
+    """Return value, 95 % uncertainty and limit in an alarm message as text; None if no value."""
     value, limit, std = message["value"], message["limit"], message["uncertainty"]
     if value is None:
         return None
@@ -140,7 +140,7 @@ class Mail:
         self._look_up = NameLookUp(settings.host, settings.port)
 
     async def send(self, message: Message, body: str) -> Outcome:  # noqa: ARG002
-        """Make one delivery attempt over a new SMTP connection, and return its outcome."""
+        """Make one delivery attempt over a new SMTP connection; return its outcome or failure."""
         mail = mail_of(message, self._settings.sender, self.address).as_bytes()
         try:
             async with asyncio.timeout(self._settings.total_timeout_s):

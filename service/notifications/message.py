@@ -122,7 +122,10 @@ class Composer:
         self._context, self._new_id = context, new_id
 
     def alarm(self, alarm: Alarm, event: AlarmEvent, is_active: bool, now_ns: int) -> Message:
-        """Return the message about an event of an alarm, written at the time `now_ns`."""
+        """Return the message about an event of an alarm, written at the time `now_ns`.
+
+        `alarm` is the state after the event; `is_active` is that of the `Notice` of the event.
+        """
         identity, context = event.identity, self._context(event.identity)
         return {
             **self._head("alarm", now_ns),
@@ -171,7 +174,7 @@ def dumps(message: Message) -> str:
 
 
 def loads(body: str) -> Message:
-    """Return the message that `dumps` serialized."""
+    """Return the message that `dumps` serialized. Raises `ValueError` if the text is not JSON."""
     message: Message = json.loads(body)
     return message
 

@@ -244,7 +244,7 @@ class Deliveries:
         self._outbox, self._clock = outbox, clock
 
     async def run(self, beats: Heartbeats | None = None) -> None:
-        """Run all senders until the task is cancelled, and record their heartbeats in `beats`."""
+        """Run all senders until the task is cancelled, with heartbeats in `beats` unless None."""
         beats = beats or Heartbeats(self._clock)
         loops = {f"deliver {name}": sender.run for name, sender in self._senders.items()}
         try:

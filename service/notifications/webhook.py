@@ -141,7 +141,7 @@ class Webhook:
         self._look_up = NameLookUp(url.hostname or "", port)
 
     async def send(self, message: Message, body: str) -> Outcome:
-        """Make one delivery attempt with a POST request, and return its outcome."""
+        """Make one delivery attempt with a POST request; return its outcome or failure."""
         try:
             async with asyncio.timeout(self._settings.total_timeout_s):
                 return await self._post(message["id"], body.encode())

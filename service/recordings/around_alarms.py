@@ -121,7 +121,7 @@ class Capture:
         self.deadline_s = now_s + self._settings.post_s + PATIENCE_S
 
     def add(self, block: SampleBlock) -> None:
-        """Append a block unless it starts after the end of the capture."""
+        """Append a block, unless it starts after the end or the capture is full or abandoned."""
         if block.start_ns < self._end_ns and self._n_left > 0 and not self.is_lost:
             self.pending.append(block)
             self._n_left -= block.n_samples
@@ -155,8 +155,6 @@ class Captures(WriterThread):
 
     Parameters
     ----------
-    root
-        Folder of all captures.
     make_writer
         Function that opens a recording, by unit; other units are not captured.
     rate_hz
@@ -190,7 +188,7 @@ class Captures(WriterThread):
         self.n_written = self.n_failed = 0
 
     def set_listener(self, listener: Callable[[Outcome], None]) -> None:
-        """Set the function that is called on the event loop with the outcome of each capture."""
+        """Set the function that gets the outcome of each capture; it runs on the event loop."""
         self._listener = listener
 
     def expects(self, event: AlarmEvent) -> bool:

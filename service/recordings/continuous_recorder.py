@@ -83,7 +83,10 @@ class Omission:
 
 
 def unseen_part(block: SampleBlock, end: Position | None) -> SampleBlock | None:
-    """Return the part of a block from `end` on, or all if `end` is None; None without a part."""
+    """Return the part of a block after the position `end`; None if there is none.
+
+    The whole block is returned if `end` is None, of another epoch, or not within the block.
+    """
     if end is None or end[0] != block.epoch or block.first_index >= end[1]:
         return block
     return None if block.stop_index <= end[1] else block.from_sample(end[1] - block.first_index)
@@ -262,8 +265,6 @@ class ContinuousRecorder(WriterThread):
 
     Parameters
     ----------
-    root
-        Folder of the recordings.
     units
         Units to record; blocks of other units are ignored.
     pressure

@@ -39,7 +39,7 @@ _NAME = re.compile(r"(.+)-\d{8}T\d{6}\.\d{3}Z-")
 
 
 def new_folder(root: Path, unit: str, time_ns: int, kind: str) -> Path:
-    """Return an unused folder for a recording; its name has unit, start time and `kind`."""
+    """Return an unused path for a recording's folder; its name has unit, start time and `kind`."""
     seconds, ns = divmod(time_ns, NS_PER_S)
     moment = f"{datetime.fromtimestamp(seconds, UTC):%Y%m%dT%H%M%S}.{ns // 1_000_000:03d}Z"
     return _free(root / f"{unit}-{moment}-{kind}", "", PARTS, INCOMPLETE)
@@ -62,14 +62,15 @@ def parts_folder(folder: Path) -> Path:
 
 
 def damaged_folder(folder: Path, part: Path) -> Path:
-    """Return an unused folder for an unreadable part of a segment."""
+    """Return an unused path for the folder of an unreadable part of a segment."""
     return _suffixed(folder.with_name(f"{folder.name}-{part.name}"), DAMAGED)
 
 
 def remove_incomplete(root: Path, units: Container[str | None]) -> list[Path]:
     """Remove the incomplete recordings of units after a crash of the service; return their folders.
 
-    Recordings of other units are kept: another process may be writing them.
+    Recordings of other units are kept: another process may be writing them. None includes names
+    without a unit.
 
     Raises
     ------
@@ -137,7 +138,10 @@ def being_removed(root: Path) -> list[str]:
 
 
 def begin_removal(folder: Path) -> None:
-    """Rename the folder of a recording to mark it as being removed; `finished` then omits it."""
+    """Rename the folder of a recording to mark it as being removed; `finished` then omits it.
+
+    Raises `OSError` if the folder cannot be renamed.
+    """
     folder.rename(_removed(folder))
 
 
@@ -177,7 +181,10 @@ def finish_removal(folder: Path) -> Path | None:
 
 
 def set_aside(folder: Path) -> Path:
-    """Rename the folder of a recording to mark it as damaged; return the new path."""
+    """Rename the folder of a recording to mark it as damaged; return the new path.
+
+    A marked folder is not renamed again. Raises `OSError` if the folder cannot be renamed.
+    """
     if folder.name.endswith(DAMAGED):
         return folder
     return folder.rename(_suffixed(folder, DAMAGED))

@@ -198,14 +198,7 @@ class CheckResult:
 
 
 class RecordingCheck:
-    """Check of all recordings in given folders against the index.
-
-    Parameters
-    ----------
-    roots
-        Folder of each kind of recordings.
-    files
-        Entries of the index.
+    """Check of the recordings in the folders of each kind, `roots`, against index entries, `files`.
 
     Attributes
     ----------

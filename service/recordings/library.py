@@ -93,7 +93,7 @@ class RecordingLibrary:
         """
         folder = self._folder(name)
         if folder is None:
-            raise ConfigError(f"{name}: the recording does not exist")
+            raise ConfigError(f"{name}: the recording does not exist; it may have been removed")
         if name in self._faults:
             raise ConfigError(f"{name}: {self._faults[name]}")
         return open_recording(folder)
@@ -184,7 +184,7 @@ class RecordingWindow:
 
 
 def window_of(recording: Recording, start_s: float, seconds: float) -> RecordingWindow:
-    """Return the blocks from ``start_s`` to ``start_s + seconds`` after the first sample.
+    """Return the blocks that overlap ``start_s`` to ``start_s + seconds`` after the first sample.
 
     Raises
     ------

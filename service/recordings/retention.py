@@ -34,17 +34,10 @@ MAX_LENGTH_NS = 3600 * NS_PER_S
 
 
 class AgeLimit:
-    """Age limit of continuous recordings, by the clock of each unit.
+    """Age limit `keep_ns` of continuous recordings (`files`), by the clock of each unit.
 
     The age is counted back from the start of the newest day of recordings, or from now if that is
     earlier, so that a forward step of the clock does not make all recordings too old.
-
-    Parameters
-    ----------
-    files
-        Index entries of all continuous recordings.
-    keep_ns
-        Maximum age in nanoseconds.
     """
 
     def __init__(self, files: Iterable[WaveformFile], now_ns: int, keep_ns: int) -> None:
@@ -110,6 +103,8 @@ def make_room(
     short_bytes
         Disk space to free, in bytes, by kind. To free it, captures are removed only if the removal
         of continuous recordings frees too little, and never if evidence refers to the captures.
+    in_use, remove
+        Function that returns the names of these captures, and function that removes a recording.
 
     Raises
     ------

@@ -82,6 +82,8 @@ class CaptureFile:
     def finish(self, alarms: Sequence[AlarmEvent]) -> None:
         """Write the alarms, sync the capture to the disk, and rename it to its final name.
 
+        No effect before the first write, and on a closed capture.
+
         Raises
         ------
         CaptureError
@@ -118,7 +120,7 @@ class CaptureFile:
 
 
 def write_alarms(path: Path, alarms: Sequence[AlarmEvent]) -> None:
-    """Write alarm events to a JSON file with a checksum, and sync it to the disk."""
+    """Write alarm events to a JSON file with a checksum, synced. Raises `OSError` if this fails."""
     document: dict[str, object] = {"alarms": [_alarm(event) for event in alarms]}
     text = json.dumps(document | {"checksum": checksum_of(document)}, indent=1) + "\n"
     write_synced(path, text.encode())
@@ -204,7 +206,7 @@ class Segment:
         return 0 if self._writer is None else self._writer.n_samples
 
     def write(self, block: SampleBlock, now_s: float) -> None:
-        """Append a block to the open part.
+        """Append a block to the open part; if none is open, open one at monotonic time `now_s`.
 
         Raises
         ------

@@ -141,11 +141,14 @@ class EvidenceArchive:
             text = (place.folder / DOCUMENT).read_bytes()
             found = Evidence.model_validate_json(text)
         except (OSError, ValidationError) as error:
-            raise DamagedEvidenceError(f"{place.folder.name}: {error}") from error
+            why = f"{place.folder.name}: the document cannot be read: {error}"
+            raise DamagedEvidenceError(why) from error
         content = json.loads(text)
         if hashlib.sha256(canonical(_without_hash(content))).hexdigest() != found.sha256:
             name = place.folder.name
-            raise DamagedEvidenceError(f"{name}: the document was changed since it was written")
+            raise DamagedEvidenceError(
+                f"{name}: the document was changed since it was written; restore a copy"
+            )
         return found
 
     def samples(self, found: Occurrence, capturing: Occurrences) -> SamplesState:

@@ -165,7 +165,7 @@ class Evidence(EvidencePart):
 
 
 def file_part(path: Path) -> FilePart:
-    """Return size and checksum of a file."""
+    """Return size and checksum of a file. Raises `OSError` if the file cannot be read."""
     hashed, size = hashlib.sha256(), 0
     with path.open("rb") as file:
         while chunk := file.read(CHUNK):

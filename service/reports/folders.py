@@ -64,7 +64,7 @@ def places(root: Path, unit: str | None = None) -> list[Place]:
 
 
 def note_beginning(root: Path, now_ns: int) -> None:
-    """Write the time since which evidence is kept, once; evidence of older alarms is not lost."""
+    """Write the time since which evidence is kept, once. Raises `OSError` if this fails."""
     path = root / KEPT_SINCE
     if not path.exists():
         root.mkdir(parents=True, exist_ok=True)
@@ -78,7 +78,10 @@ def kept_since_ns(root: Path) -> int | None:
 
 
 def clear_leftovers(root: Path) -> list[Path]:
-    """Remove the folders of bundles that a crash left unfinished; return their paths."""
+    """Remove the folders of bundles that a crash left unfinished; return their paths.
+
+    Raises `OSError` if a folder cannot be removed.
+    """
     left = [path for path in root.glob(f"*/*{INCOMPLETE}") if path.is_dir()]
     for path in left:
         shutil.rmtree(path)

@@ -59,13 +59,13 @@ class ReadingPart(EvidencePart):
     """Reason for the quality."""
 
     u_random: float | None
-    """Random standard uncertainty, in the unit of the value."""
+    """Random standard uncertainty, in the unit of the value; null if unknown."""
 
     u_systematic: float | None
-    """Systematic standard uncertainty, in the unit of the value."""
+    """Systematic standard uncertainty, in the unit of the value; null if unknown."""
 
     interval_95: tuple[float, float] | None
-    """95 % confidence interval, in the unit of the value."""
+    """95 % confidence interval, in the unit of the value; null if unknown."""
 
 
 class EstimatorPart(EvidencePart):
@@ -150,7 +150,7 @@ class ConditionPart(EvidencePart):
     """Bins of eccentricity, oil temperature and, if used, attitude; null if unknown."""
 
     bounds: list[tuple[float, float]] | None
-    """Limits of the cell along each of these axes, [low, high]."""
+    """Limits of the cell along each of these axes, [low, high]; null if `cell` is null."""
 
 
 class CausePart(EvidencePart):
@@ -163,16 +163,16 @@ class CausePart(EvidencePart):
     """Reason for the attribution."""
 
     film_share: float | None
-    """Fraction of the change due to the film if the rest is due to an accelerometer."""
+    """Fraction of the change due to the film if the rest is a transducer's; null if unknown."""
 
     film_share_std: float | None
-    """Standard uncertainty of `film_share`."""
+    """Standard uncertainty of `film_share`; null if that is null."""
 
     shaft_change: float | None
-    """Change of the shaft motion against the expected motion, ln of the ratio."""
+    """Change of the shaft motion against the expected motion, ln of the ratio; null if unknown."""
 
     bearing_change: float | None
-    """Change of the bearing motion against the expected motion, ln of the ratio."""
+    """Change of the bearing's motion against the expected motion, ln of the ratio, or null."""
 
 
 class FindingPart(EvidencePart):
@@ -188,22 +188,22 @@ class FindingPart(EvidencePart):
     """Alarm level of the film; null without an alarm."""
 
     change: float | None
-    """Most significant mean deviation from the baseline, in ln."""
+    """Most significant mean deviation from the baseline, in ln; null if there is none yet."""
 
     change_std: float | None
-    """Standard uncertainty of `change`."""
+    """Standard uncertainty of `change`; null if that is null."""
 
     time_scale_h: float | None
-    """Time scale over which `change` was averaged, in running hours."""
+    """Time scale over which `change` was averaged, in running hours; null if `change` is null."""
 
     deviation: float | None
     """Deviation of the newest reading from the baseline, in ln; null unless it was compared."""
 
     deviation_std: float | None
-    """Standard uncertainty of `deviation`."""
+    """Standard uncertainty of `deviation`; null if that is null."""
 
     baseline_version: int | None
-    """Version of the baseline."""
+    """Version of the baseline; null without a baseline."""
 
     attribution: CausePart | None
     """Cause of the change; null without an alarm level."""
@@ -376,7 +376,7 @@ class ComparisonPart(EvidencePart):
     """Time of the reading."""
 
     stiffness_n_per_m: float | None
-    """Measured stiffness, in N/m."""
+    """Measured stiffness, in N/m; null if missing."""
 
     u_random: float | None
     """Random standard uncertainty of ln stiffness."""

@@ -50,7 +50,7 @@ class OccurrenceModel(ApiModel):
     """Change of the alarm: raised or escalated."""
 
     level: Literal["alert", "danger"] | None
-    """Alarm level after the event."""
+    """Alarm level after the event; null without a level."""
 
     time: Time
     """Time of the event."""

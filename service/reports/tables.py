@@ -36,7 +36,7 @@ class TableError(Exception):
 
 
 def spectra_table(found: Iterable[Assessment]) -> bytes:
-    """Return the Parquet table of cross-spectra, amplitudes and coherence of some bearings."""
+    """Return the Parquet table of spectra, amplitudes and coherence of one or more bearings."""
     tables = [_spectrum(each.bearing, each.spectrum) for each in found]
     return _written(pa.concat_tables(tables))
 

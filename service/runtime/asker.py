@@ -6,13 +6,7 @@ from dataclasses import dataclass
 
 @dataclass
 class Asker:
-    """Connection state of the client of a request, which other threads read.
-
-    Parameters
-    ----------
-    has_gone
-        Whether the client has disconnected.
-    """
+    """Whether the client of a request has disconnected (`has_gone`); other threads read it."""
 
     has_gone: bool = False
 

@@ -25,7 +25,7 @@ PROGRAM = "service.app.serving_process"
 
 
 def start_child() -> Child:
-    """Start the child, with the descriptor of its end of a socket pair as argument.
+    """Start the child and return it; its argument is the descriptor of its end of a socket pair.
 
     The child has a session of its own: Ctrl-C in a terminal stops this process, which stops it.
     The child must end when this process closes its end.

@@ -107,7 +107,8 @@ DEADBAND_SHARE = 0.2
 class SpaceLimits:
     """Alert and danger limits of free space, as shares of the capacity and in bytes.
 
-    The higher limit of share and bytes applies.
+    The higher limit of share and bytes applies; on small disks the bytes are limited to `MAX_ALERT`
+    and `MAX_DANGER` of the capacity.
     """
 
     alert_share: float = 0.1
@@ -174,7 +175,7 @@ class SpaceWatch:
         await periodic(self.look, PERIOD_S, self._clock, pulse)
 
     async def look(self) -> None:
-        """Measure all disks once and update `disks`."""
+        """Measure all disks once and update `disks`, unless the measurement fails."""
         try:
             found = await asyncio.to_thread(self._measured)
         except OSError as error:

@@ -22,7 +22,7 @@ STORED = (".parquet",)
 
 
 def write_synced(path: Path, content: bytes) -> None:
-    """Write a file, not atomically, and sync its content to the disk."""
+    """Write a file, not atomically, and sync its content. Raises `OSError` if this fails."""
     with path.open("wb") as file:
         file.write(content)
         file.flush()
@@ -30,7 +30,10 @@ def write_synced(path: Path, content: bytes) -> None:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file atomically: under a temporary name, with a sync before and after the rename."""
+    """Write a file atomically: under a temporary name, with a sync before and after the rename.
+
+    Only one process may write the file at a time. Raises `OSError` if the disk cannot be written.
+    """
     aside = path.with_name(path.name + ASIDE)
     try:
         write_synced(aside, content)
@@ -43,7 +46,8 @@ def write_whole(path: Path, content: bytes) -> None:
 def write_private(path: Path, content: bytes) -> None:
     """Write a file atomically, readable by its owner only.
 
-    Several processes may write the same file at the same time.
+    Several processes may write the same file at the same time. Raises `OSError` if the disk cannot
+    be written; the previous file then stays, unless only the sync after the rename failed.
     """
     descriptor, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
     aside = Path(name)
@@ -62,14 +66,14 @@ def create_private(path: Path) -> None:
 
 
 def put_in_place(aside: Path, path: Path) -> None:
-    """Sync a complete temporary file, rename it to `path` atomically and sync the folder."""
+    """Sync a temporary file, rename it to `path`, sync the folder. Raises `OSError` on failure."""
     _sync(aside)
     aside.replace(path)
     sync_folder(path.parent)
 
 
 def sync_folder(folder: Path) -> None:
-    """Sync the directory entries of a folder to the disk."""
+    """Sync the directory entries of a folder to the disk. Raises `OSError` if this fails."""
     _sync(folder)
 
 

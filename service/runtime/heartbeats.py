@@ -80,7 +80,7 @@ class Heartbeats:
             self._pulses.pop(name, None)
 
     def look(self) -> dict[str, str | None]:
-        """Return, by loop name, that the loop has ended or is stuck; None if it runs."""
+        """Return the `LoopPulse.trouble` of each loop, by loop name; None if the loop runs."""
         return {name: pulse.trouble for name, pulse in self._pulses.items()}
 
     @property

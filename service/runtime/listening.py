@@ -76,7 +76,7 @@ def _remove_stale(path: Path) -> None:
     except OSError:
         return  # bind reports the error
     if not stat.S_ISSOCK(mode):
-        raise PortInUseError(f"cannot listen on {path}: the file is not a socket")
+        raise PortInUseError(f"cannot listen on {path}: another file is there; remove or rename it")
     with closing(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)) as caller:
         try:
             caller.connect(str(path))
@@ -85,7 +85,7 @@ def _remove_stale(path: Path) -> None:
         except OSError as error:
             raise PortInUseError(f"cannot listen on {path}: {error.strerror}") from error
         else:
-            raise PortInUseError(f"cannot listen on {path}: another program listens on it")
+            raise PortInUseError(f"cannot listen on {path}: another program listens on it; stop it")
 
 
 class CertificateError(Exception):

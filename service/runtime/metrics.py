@@ -31,7 +31,7 @@ class Families(Collector):
         self._families: dict[str, Metric] = {}
 
     def declare(self, meanings: Mapping[str, str]) -> None:
-        """Declare families by name without ``padwatch_``; a name in ``_total`` is a counter."""
+        """Declare families by name without ``padwatch_``; a name that ends in ``_total`` counts."""
         for name, meaning in meanings.items():
             family = CounterMetricFamily if name.endswith("_total") else GaugeMetricFamily
             self._families[name] = family(f"padwatch_{name}", meaning)

@@ -44,7 +44,7 @@ class TroubleLog:
 async def periodic(
     work: Callable[[], Awaitable[None]], every_s: float, clock: Clock, pulse: Pulse
 ) -> None:
-    """Run `work` repeatedly, with a heartbeat before and a pause of `every_s` after each run."""
+    """Repeat `work` until it raises, with a heartbeat before and a pause of `every_s` after it."""
     while True:
         pulse.beat(every_s)
         await work()

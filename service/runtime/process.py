@@ -111,7 +111,7 @@ def person() -> str:
 
 
 def stop_on_signals() -> asyncio.Event:
-    """Return an event that is set by the signals SIGINT and SIGTERM."""
+    """Return an event that SIGINT and SIGTERM set; call it in the running event loop."""
     stopped = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):

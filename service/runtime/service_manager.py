@@ -14,10 +14,8 @@ US_PER_S = 1e6
 class ServiceManager:
     """Client of the service manager; without ``NOTIFY_SOCKET`` it sends nothing.
 
-    Parameters
-    ----------
-    environment
-        Environment variables ``NOTIFY_SOCKET``, ``WATCHDOG_USEC`` and ``WATCHDOG_PID``.
+    `environment` may contain ``NOTIFY_SOCKET``, ``WATCHDOG_USEC`` and ``WATCHDOG_PID``; from them
+    comes `watchdog_s`, the time-out of the watchdog, None without a watchdog.
     """
 
     def __init__(self, environment: Mapping[str, str]) -> None:
@@ -31,13 +29,7 @@ class ServiceManager:
         return self._address is not None
 
     def notify(self, **assignments: str) -> None:
-        """Send one datagram without blocking; log the first failure.
-
-        Parameters
-        ----------
-        assignments
-            Variables of sd_notify(3): ``READY``, ``STATUS``, ``WATCHDOG``, ``STOPPING``.
-        """
+        """Send variables of sd_notify(3), such as ``READY``, without blocking; log failure once."""
         if self._address is None:
             return
         message = "\n".join(f"{key}={_one_line(value)}" for key, value in assignments.items())

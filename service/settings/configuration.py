@@ -40,7 +40,10 @@ def configuration_of(plant: PlantFile, program: str, commit: str | None) -> Conf
 
 
 def canonical(document: object) -> bytes:
-    """Return a document as canonical JSON: sorted keys, no spaces, UTF-8."""
+    """Return a document as canonical JSON (sorted keys, no spaces, UTF-8).
+
+    Raises `ValueError` if a number is not finite.
+    """
     text = json.dumps(
         document, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
     )

@@ -152,7 +152,10 @@ class LimitSettings(WatchSettings):
         return self
 
     def within(self, table: LimitTableSettings) -> Self:
-        """Return the limits of a table, completed by the keys of this main table."""
+        """Return the limits of a table, completed by the keys of this main table.
+
+        Raises `pydantic.ValidationError` if the keys contradict each other.
+        """
         own = {key: getattr(self, key) for key in LIMITS if hasattr(self, key)}
         given = {key: getattr(table, key) for key in LIMITS if getattr(table, key) is not None}
         return type(self).model_validate(own | given)

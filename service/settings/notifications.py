@@ -83,7 +83,7 @@ class QuietSettings(Settings):
         return self
 
     def include(self, time_ns: int) -> bool:
-        """Return whether a time, UTC nanoseconds since 1970, is within the quiet hours."""
+        """Return whether a time, UTC ns since 1970, is not before `start` and is before `end`."""
         moment = datetime.fromtimestamp(time_ns // NS_PER_S, ZoneInfo(self.time_zone)).time()
         start, end = time.fromisoformat(self.start), time.fromisoformat(self.end)
         return start <= moment < end if start < end else moment >= start or moment < end

@@ -149,4 +149,4 @@ def why_closed(
 
 
 class ClosedError(Exception):
-    """The service would be reachable from other hosts without TLS or accounts."""
+    """Error raised if the service would be reachable from other hosts without TLS or accounts."""

@@ -82,7 +82,8 @@ def require_alarm_fit(
 ) -> None:
     """Raise `MisfitError` if there are alarm limits of a quantity that the unit does not measure.
 
-    The id `plant` is also refused, since it is reserved for alarms of the whole plant.
+    The id `plant` is also refused, since it is reserved for alarms of the whole plant, and so are
+    phases of reference vectors if `key_phase` is None.
     """
     if unit == PLANT:
         raise MisfitError("is reserved for alarms of the whole plant; choose another id", "id")

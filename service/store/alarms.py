@@ -65,7 +65,8 @@ def insert_alarms(
 ) -> None:
     """Insert new alarm events with their messages and audit entries, and update the alarms.
 
-    `address` returns the outbox messages about an event.
+    `address` returns the outbox messages about an event. Stored events are skipped. The operator
+    command of an `ActedNews` is answered as done in the same transaction.
     """
     for each in news:
         for event in each.events:
@@ -79,7 +80,7 @@ def insert_alarms(
 
 
 def select_alarms(reader: Connection) -> list[Alarm]:
-    """Return the current state of every alarm that has had an event."""
+    """Return the current state of every alarm with events; raise `StoreError` if one is invalid."""
     return [_alarm(row) for row in reader.execute(SELECT_ALARMS)]
 
 
@@ -190,7 +191,9 @@ def _alarm(row: tuple[Any, ...]) -> Alarm:
             raised_at=_point(found),
         )
     except ValueError as error:
-        raise StoreError(f"stored alarm {found['id']} is invalid: {error}") from error
+        raise StoreError(
+            f"stored alarm {found['id']} is invalid: {error}; restore a backup"
+        ) from error
 
 
 def _event(row: tuple[Any, ...]) -> AlarmEvent:
@@ -213,7 +216,7 @@ def _event(row: tuple[Any, ...]) -> AlarmEvent:
         )
     except ValueError as error:
         name = f"stored event {found['number']} of alarm {found['alarm']}"
-        raise StoreError(f"{name} is invalid: {error}") from error
+        raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
 
 
 def _identity(found: dict[str, Any]) -> AlarmIdentity:

@@ -70,8 +70,11 @@ class AuditChain:
     ----------
     head
         Head file, with the number and hash of the newest entry.
-    database
-        Database with the audit trail.
+
+    Attributes
+    ----------
+    head_error
+        Error of the last attempt to write the head file; None if it succeeded.
     """
 
     def __init__(self, head: Path, database: Database) -> None:
@@ -95,7 +98,7 @@ class AuditChain:
                 self._update_head()
 
     def add(self, writer: Connection, actions: Iterable[AuditAction]) -> None:
-        """Append the audit entries of actions.
+        """Append the audit entries of actions within a transaction of `writing`.
 
         If the head file contradicts the chain, an entry that records this is appended first.
         """
@@ -188,7 +191,8 @@ def by_time(
 ) -> Iterator[tuple[str, AuditEntry]]:
     """Merge the entries of several chains by time; yield each with the name of its chain.
 
-    The entries of one chain keep their order, also if the clock was set back between them.
+    Each chain begins with its oldest entry, or with `newest_first` with its newest. Its entries
+    keep their order, also if the clock was set back between them.
     """
     named = [zip(repeat(name), entries) for name, entries in chains]
     return merge(*named, key=lambda pair: pair[1].time_ns, reverse=newest_first)

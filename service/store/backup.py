@@ -32,15 +32,7 @@ class BackupError(Exception):
 
 @dataclass(frozen=True)
 class Content:
-    """Summary of the content of a database.
-
-    Parameters
-    ----------
-    schema
-        Schema number.
-    n_rows
-        Number of rows by table name.
-    """
+    """Summary of the content of a database: schema number, and number of rows by table name."""
 
     schema: int
     n_rows: Mapping[str, int]
@@ -69,10 +61,10 @@ def checked(path: Path, origin: Origin | None = Origin.LIVE) -> Content:
     Raises
     ------
     BackupError
-        If the backup is damaged, is not the database of a live plant, or has a newer schema.
+        If the backup is missing or damaged, has another origin, or has a newer schema.
     """
     if not path.is_file():
-        raise BackupError(f"{path}: the file does not exist")
+        raise BackupError(f"{path}: the backup does not exist; check the path")
     try:
         # immutable: no journal is read or created
         uri = f"{path.absolute().as_uri()}?mode=ro&immutable=1"
@@ -81,13 +73,13 @@ def checked(path: Path, origin: Origin | None = Origin.LIVE) -> Content:
             _require_whole(connection, path)
             return content_of(connection)
     except (sqlite3.Error, UnicodeDecodeError) as error:
-        raise BackupError(f"{path}: {error}") from error
+        raise BackupError(f"{path} cannot be read: {error}; use another backup") from error
 
 
 def _require_ours(connection: sqlite3.Connection, path: Path, origin: Origin | None) -> None:
     if _number(connection, "application_id") != application_id_of(origin):
         what = "padwatch database of a live plant" if origin else "access database of padwatch"
-        raise BackupError(f"{path} is not the {what}")
+        raise BackupError(f"{path} is not the {what}; choose another file")
     schema = _number(connection, "user_version")
     if schema > len(MIGRATIONS):
         raise BackupError(
@@ -99,10 +91,12 @@ def _require_ours(connection: sqlite3.Connection, path: Path, origin: Origin | N
 def _require_whole(connection: sqlite3.Connection, path: Path) -> None:
     damage = list(islice(structure_findings(connection), MAX_FINDINGS))
     if damage:
-        raise BackupError(f"{path} is damaged: " + "; ".join(damage))
+        raise BackupError(f"{path} is damaged, use another backup: " + "; ".join(damage))
     loose = connection.execute("PRAGMA foreign_key_check").fetchone()
     if loose is not None:
-        raise BackupError(f"{path} is damaged: rows of {loose[0]} refer to missing rows")
+        raise BackupError(
+            f"{path} is damaged, use another backup: rows of {loose[0]} refer to missing rows"
+        )
 
 
 def _number(connection: sqlite3.Connection, pragma: str) -> int:
@@ -123,7 +117,7 @@ def alone_in(folder: Path) -> Iterator[None]:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         yield
     except BlockingIOError as error:
-        raise BackupError(f"{folder}: another backup is being written there") from error
+        raise BackupError(f"{folder}: another backup is being written; retry later") from error
     finally:
         os.close(descriptor)
 
@@ -165,7 +159,7 @@ def back_up(
         If the backup, its verification or the removal of older backups fails.
     """
     if not database.is_file():
-        raise BackupError(f"{database}: the database does not exist")
+        raise BackupError(f"{database}: the database does not exist; check the path")
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with alone_in(folder):
@@ -338,15 +332,7 @@ def _unused(database: Path) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class AccessBefore:
-    """Accounts and revoked keys of the database that a backup replaces.
-
-    Parameters
-    ----------
-    accounts
-        Names of the accounts.
-    revoked
-        Identifiers of the revoked API keys.
-    """
+    """Account names and identifiers of revoked API keys in the database that a backup replaces."""
 
     accounts: frozenset[str]
     revoked: frozenset[str]
@@ -358,10 +344,8 @@ class AccessAfter:
 
     Parameters
     ----------
-    accounts
-        Names of the accounts.
-    keys
-        Names and identifiers of the valid API keys.
+    accounts, keys
+        Names of the accounts; names and identifiers of the valid API keys.
     returned
         Names of the accounts that the previous database did not have, such as accounts that were
         removed after the backup.
@@ -391,6 +375,8 @@ def access_before(database: Path) -> AccessBefore | None:
 
 def revoke_again(access: AccessStore, before: AccessBefore | None, now_ns: int) -> AccessAfter:
     """End all sessions of a restored database, and revoke again the API keys revoked before.
+
+    No key is revoked if `before` is None, since the previous database was missing or unreadable.
 
     Raises
     ------

@@ -41,7 +41,7 @@ class StoredStep:
     version
         Version of the baseline; None for `RENEWED`.
     from_ns
-        Time from which readings are used for learning; only for `RENEWED`.
+        Time from which readings are used for learning, for `RENEWED`; None for other steps.
     """
 
     unit: str
@@ -170,7 +170,7 @@ class BaselineTables(AuditedTables):
             return None if found is None else baseline_from_json(found[0])
         except ValueError as error:
             name = f"baseline {version} of unit {unit} bearing {bearing}"
-            raise StoreError(f"{name}: {error}") from error
+            raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
 
     def add_steps(self, steps: Sequence[StoredStep]) -> None:
         """Write baseline steps; writing the same steps again has no effect."""
@@ -201,7 +201,7 @@ class BaselineTables(AuditedTables):
         try:
             return {unit: response_from_json(document) for unit, document in rows}
         except ValueError as error:
-            raise StoreError(f"shaft response: {error}") from error
+            raise StoreError(f"a shaft response is invalid: {error}; restore a backup") from error
 
     def _add_steps(self, writer: Connection, steps: Sequence[StoredStep]) -> None:
         self._audit.add(writer, _actions(writer, steps))

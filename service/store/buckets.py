@@ -31,12 +31,8 @@ class Summaries:
         Times of single readings, or starts of aggregated time spans.
     count : (n, n_names)
         Number of usable readings.
-    mean : (n, n_names)
-        Mean of the usable readings; NaN without usable readings.
-    minimum : (n, n_names)
-        Minimum of the usable readings; NaN without usable readings.
-    maximum : (n, n_names)
-        Maximum of the usable readings; NaN without usable readings.
+    mean, minimum, maximum : (n, n_names)
+        Statistics of the usable readings; NaN without usable readings.
     level : (n, n_names)
         Worst quality level of all readings.
     """
@@ -53,7 +49,7 @@ class Summaries:
     def of(
         cls, names: tuple[str, ...], time_ns: IntArray, value: FloatArray, level: LevelArray
     ) -> "Summaries":
-        """Return the summaries of single readings; an unusable reading has the value NaN."""
+        """Return summaries of n readings: (n, n_names) `value`, NaN if unusable, and `level`."""
         count = np.isfinite(value).astype(np.int64)
         return cls(names, time_ns, count, value, value, value, level)
 
@@ -70,17 +66,17 @@ class Summaries:
         return found.at(np.argsort(found.time_ns, kind="stable"))
 
     def at(self, rows: IntArray | npt.NDArray[np.bool_]) -> "Summaries":
-        """Return the rows selected by a mask, or by indices and in the order of the indices."""
+        """Return the rows selected by a mask (n,), or by indices (m,) in the order of these."""
         return Summaries(self.names, **{name: getattr(self, name)[rows] for name in ROWS})
 
     def only(self, names: tuple[str, ...]) -> "Summaries":
-        """Return the columns with the given names, in the order of the names."""
+        """Return the columns with the given names, which must exist, in the order of the names."""
         columns = [self.names.index(name) for name in names]
         chosen = {name: getattr(self, name)[:, columns] for name in STATISTICS}
         return Summaries(names, self.time_ns, **chosen)
 
     def in_spans(self, width_ns: int) -> "Summaries":
-        """Return the rows, which are sorted by time, aggregated over spans of `width_ns`."""
+        """Return the rows, which are sorted by time, aggregated by multiples of `width_ns`."""
         if self.time_ns.size == 0:
             return self
         number = self.time_ns // width_ns
@@ -88,12 +84,12 @@ class Summaries:
         return self.summed(starts, number[starts] * width_ns)
 
     def summed(self, starts: IntArray, time_ns: IntArray) -> "Summaries":
-        """Return the aggregate of each run of consecutive rows.
+        """Return the aggregate of each run of consecutive rows; `starts` is not empty.
 
         Parameters
         ----------
         starts : (m,)
-            Index of the first row of each run.
+            Index of the first row of each run, ascending from 0; a run ends where the next begins.
         time_ns : (m,)
             Time of each aggregated row.
         """
@@ -152,7 +148,10 @@ def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int 
 
 
 def single_points(readings: Summaries, hole_ns: int) -> Trend:
-    """Return the trend of single readings, with an empty point in intervals over `hole_ns`."""
+    """Return the trend of single readings, which are sorted by time and may be none.
+
+    If the next reading is more than `hole_ns` later, a point without values is inserted between.
+    """
     holes = np.flatnonzero(np.diff(readings.time_ns) > hole_ns) + 1
     time_ns = np.insert(readings.time_ns, holes, readings.time_ns[holes - 1] + hole_ns // 2)
     series = {}
@@ -165,7 +164,10 @@ def single_points(readings: Summaries, hole_ns: int) -> Trend:
 
 
 def page(readings: Summaries, max_points: int, hole_ns: int) -> Trend:
-    """Return the trend of the first ``max_points`` readings, with the start of the next page."""
+    """Return the trend of the first ``max_points`` readings, with holes as in `single_points`.
+
+    `Trend.next_ns` is the time of the first omitted reading; None if no reading is omitted.
+    """
     if readings.time_ns.size <= max_points:
         return single_points(readings, hole_ns)
     shown = single_points(readings.at(np.arange(max_points)), hole_ns)

@@ -93,7 +93,10 @@ class Database(Protocol):
         ...
 
     def reading(self, unreadable: Unreadable = "strict") -> AbstractContextManager[Connection]:
-        """Open a read-only transaction on one consistent state, and yield its connection."""
+        """Open a read-only transaction on one consistent state, and yield its connection.
+
+        `unreadable` is the handling of text that is not UTF-8.
+        """
         ...
 
     def ever_had(self, connection: Connection, table: str) -> bool:
@@ -119,14 +122,10 @@ class Database(Protocol):
 
 
 class Tables:
-    """Base class of stores; a store reads and writes some of the tables of a database.
+    """Base class of stores of some of the tables of a database.
 
-    Parameters
-    ----------
-    writing
-        Function that opens a write transaction.
-    reading
-        Function that opens a read-only transaction.
+    `writing` and `reading` open a transaction. All methods of a store raise `StoreError` if the
+    database cannot be used.
     """
 
     def __init__(self, writing: Connect, reading: Reading) -> None:

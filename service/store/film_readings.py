@@ -63,22 +63,16 @@ class FilmHistory:
     ----------
     state : (n,)
         Numbers of `OperatingState`.
-    is_settled : (n,)
-        Whether the operating condition was settled.
-    is_simulated : (n,)
-        Whether the reading is simulated.
-    verdict : (2, n)
-        Numbers of `Verdict`.
-    level : (2, n)
-        Numbers of `AlarmLevel`, 0 for no alarm.
-    change : (2, n)
-        Most significant mean deviation of ln(stiffness) from the baseline; NaN if unknown.
-    change_std : (2, n)
-        Standard uncertainty of `change`; NaN if unknown.
-    deviation : (2, n)
-        Deviation of ln(stiffness) of the reading from the baseline; NaN if unknown.
-    deviation_std : (2, n)
-        Standard uncertainty of `deviation`; NaN if unknown.
+    is_settled, is_simulated : (n,)
+        Whether the operating condition was settled, and whether the reading is simulated.
+    verdict, level : (2, n)
+        Numbers of `Verdict`; numbers of `AlarmLevel`, 0 for no alarm.
+    change, change_std : (2, n)
+        Most significant mean deviation of ln(stiffness) from the baseline, and its standard
+        uncertainty; NaN if unknown.
+    deviation, deviation_std : (2, n)
+        Deviation of the reading's ln(stiffness) from the baseline, and its standard uncertainty;
+        NaN if unknown.
     baseline_version : (n,)
         Version of the baseline, 0 for no baseline.
     """
@@ -101,7 +95,7 @@ class FilmHistory:
 
 @dataclass(frozen=True)
 class StoredDecision:
-    """Decision about one direction of a film, with the estimator and the baseline version."""
+    """Decision on one direction of a film; `baseline_version` is None without a baseline."""
 
     direction: str
     estimator: Estimator
@@ -161,7 +155,7 @@ def insert_film_news(
     news: Iterable[FilmNews],
     provenance: Provenance = Provenance.MEASURED,
 ) -> None:
-    """Insert film readings, and replace the stored decisions on the same films."""
+    """Insert film readings that are not stored yet, and replace the decisions on their films."""
     for each in news:
         reading = each.reading
         series = series_of(writer, reading.unit, reading.bearing)
@@ -231,9 +225,8 @@ def select_decisions(reader: Connection, unit: str, bearing: str) -> list[Stored
             for direction, estimator, version, document in rows
         ]
     except ValueError as error:
-        raise StoreError(
-            f"stored decision of unit {unit} bearing {bearing} is invalid: {error}"
-        ) from error
+        name = f"stored decision of unit {unit} bearing {bearing}"
+        raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
 
 
 def select_film_history(reader: Connection, query: FilmQuery) -> FilmHistory:

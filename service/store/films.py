@@ -64,10 +64,12 @@ class FilmStore(BaselineTables):
         films: FilmHistory,
         values: Mapping[str, FloatArray],
     ) -> None:
-        """Write simulated past data of a bearing: film readings, and results for its trends.
+        """Write simulated past data of a bearing; results that are already stored are kept.
 
         Parameters
         ----------
+        films
+            At least one film reading, in ascending order of time.
         values
             Trend values by column name, shape (n,) for n film readings; NaN for missing values.
         """
@@ -107,7 +109,7 @@ class FilmStore(BaselineTables):
         return None if found[0] is None else int(found[0])
 
     def decisions(self, unit: str, bearing: str) -> list[StoredDecision]:
-        """Return the stored decisions on the film of a bearing, one per direction."""
+        """Return the decisions on the film of a bearing; see `select_decisions` for its errors."""
         with self._reading() as reader:
             return select_decisions(reader, unit, bearing)
 

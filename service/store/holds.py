@@ -226,7 +226,10 @@ def _take(descriptor: int, database: Path) -> None:
 
 
 def take_lock(descriptor: int) -> str | None:
-    """Lock a file and write the process id to it; return None, or the id of the current holder."""
+    """Lock a file and write the process id to it; return None, or the current holder's process id.
+
+    The id is "unknown" if the holder has not written it yet.
+    """
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

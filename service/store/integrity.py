@@ -13,8 +13,6 @@ class Integrity:
 
     Parameters
     ----------
-    chain
-        Audit trail.
     marks
         High-water mark of a SQLite database; None for PostgreSQL.
     damage

@@ -40,7 +40,10 @@ class RetentionLoop:
                 await rest(RETENTION_PERIOD_S, self._clock, pulse)
 
     async def round(self, pulse: Pulse = UNHEARD) -> bool:
-        """Delete some old data of each bearing; return whether any old data were found."""
+        """Delete some old data of each bearing; return whether any were found, False on an error.
+
+        Errors of the store are logged.
+        """
         found = False
         try:
             believed_ns = await asyncio.to_thread(self._store.believed_ns)
@@ -133,7 +136,10 @@ class ScrubLoop:
                 await rest(SCRUB_PERIOD_S, self._clock, pulse)
 
     async def look(self, pulse: Pulse = UNHEARD) -> bool:
-        """Check the next rows and pause; return True when a check of all rows is complete."""
+        """Check the next rows and pause; return True when a check of all rows is complete.
+
+        An error of the store is logged; the result is then False.
+        """
         begun_s = self._clock.monotonic_s()
         try:
             is_around = await asyncio.to_thread(self._integrity.check_some)

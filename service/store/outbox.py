@@ -68,8 +68,6 @@ class StoredMessage:
     ----------
     id
         Number of the message, in the order of queueing.
-    n_attempts
-        Number of delivery attempts.
     answer
         Reply to the last attempt, or its error; empty before the first attempt.
     done_ns
@@ -172,7 +170,10 @@ def insert_messages(
 
 
 class Outbox(Tables):
-    """Store of the outbox messages; changes are on the disk when a method returns."""
+    """Store of the outbox messages; changes are on the disk when a method returns.
+
+    Answers are truncated to `MAX_ANSWER`. Methods raise `StoreError` if the database is unusable.
+    """
 
     def waiting(self, receiver: str, limit: int) -> list[StoredMessage]:
         """Return the oldest waiting messages to a receiver, in the order of queueing."""
@@ -185,12 +186,12 @@ class Outbox(Tables):
             return bool(reader.execute(SELECT_URGENT, (receiver,)).fetchone()[0])
 
     def finish(self, message: int, state: MessageState, answer: str, now_ns: int) -> None:
-        """Set the final state of a waiting message; no effect on other messages."""
+        """Count an attempt and set the final state of a message; no effect unless it is waiting."""
         with self._writing() as writer:
             writer.execute(FINISH, (state.value, answer[:MAX_ANSWER], now_ns, message))
 
     def fail(self, message: int, answer: str) -> None:
-        """Record a failed delivery attempt; the message stays in the queue."""
+        """Count a failed attempt to deliver a waiting message, which stays in the queue."""
         with self._writing() as writer:
             writer.execute(FAIL, (answer[:MAX_ANSWER], message))
 
@@ -204,7 +205,10 @@ class Outbox(Tables):
             return writer.execute(EXPIRE, given).rowcount
 
     def revive(self, receiver: str, now_ns: int) -> int:
-        """Queue refused and expired messages again, in the original order; return their number."""
+        """Queue refused and expired messages again, in the original order; return their number.
+
+        Their age counts from `now_ns`, so that they do not expire at once; attempts stay counted.
+        """
         with self._writing() as writer:
             return writer.execute(REVIVE, (now_ns, receiver)).rowcount
 

@@ -187,7 +187,7 @@ class _References(AuditedTables, ABC, Generic[_Reference]):
 
 
 class GapReferenceStore(_References[GapReference]):
-    """Table of the gap references of all bearings; one reference is in force per bearing."""
+    """Table of the gap references of all bearings; the newest is in force for its bearing."""
 
     action = "gap_reference.set"
     table = "gap_reference"
@@ -213,7 +213,7 @@ class GapReferenceStore(_References[GapReference]):
             return GapReference(unit, bearing, set_ns, author, *gaps, ReferenceSource(source), note)
         except ValueError as error:
             name = f"stored gap reference of unit {unit} bearing {bearing}"
-            raise StoreError(f"{name} is invalid: {error}") from error
+            raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
 
     def _object(self, reference: GapReference) -> str:
         return f"{reference.unit}:{reference.bearing}"
@@ -245,7 +245,7 @@ class VectorReferenceStore(_References[SetVectorReference]):
             reference = VectorReference(unit, bearing, OperatingState(state), found)
         except (ValueError, TypeError) as error:
             name = f"stored 1× reference of unit {unit} bearing {bearing}"
-            raise StoreError(f"{name} is invalid: {error}") from error
+            raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
         return SetVectorReference(reference, set_ns, author, note)
 
     def _object(self, reference: SetVectorReference) -> str:

@@ -225,7 +225,7 @@ class RetentionStore(Tables):
         return found
 
     def prune(self, ages: Ages, now_ns: int) -> bool:
-        """Delete some old data of the whole plant; return whether more data are due."""
+        """Delete some old data of the whole plant; return whether any data were deleted."""
         found = False
         for setting, rule in PLANT_RULES.items():
             if setting in ages:

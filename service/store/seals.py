@@ -17,12 +17,10 @@ MAX_PLACES = 1000
 
 @dataclass(frozen=True)
 class Place:
-    """Table and key of a damaged or missing row.
+    """Table and key, as text, of a damaged or missing row.
 
     Parameters
     ----------
-    key
-        Key of the row as text.
     is_missing
         Whether the row is missing; False if the row is damaged.
     """
@@ -33,13 +31,7 @@ class Place:
 
 
 class DamageLog:
-    """Log of the damaged and missing rows found since the start; thread-safe.
-
-    Parameters
-    ----------
-    most
-        Maximum number of rows that are listed.
-    """
+    """Log of the damaged and missing rows found since the start, `most` at most; thread-safe."""
 
     def __init__(self, most: int = MAX_PLACES) -> None:
         self._most = most
@@ -206,13 +198,7 @@ TABLES = """
 
 
 class Seals:
-    """Row checksums of one database file.
-
-    Parameters
-    ----------
-    damage
-        Log that receives the rows that do not match their checksums.
-    """
+    """Row checksums of one database file; rows that do not match are added to the log `damage`."""
 
     def __init__(self, damage: DamageLog) -> None:
         self._damage = damage

@@ -138,7 +138,7 @@ def _column(readings: Mapping[str, Reading], column: str) -> tuple[float, Qualit
 
 
 def remember_layout(writer: Connection, layout: Layout) -> int:
-    """Return the stored number of a layout; store the layout if it is new."""
+    """Return the stored number of a layout; insert the layout, in the transaction, if it is new."""
     key = layout.dumps()
     writer.execute(
         "INSERT INTO layout (quantities, reasons) VALUES (?, ?) ON CONFLICT DO NOTHING", key

@@ -95,7 +95,11 @@ class UnitStates(Tables):
     """Store of the newest status report on each unit."""
 
     def report(self, process: str, reports: Sequence[UnitRow]) -> None:
-        """Write the status reports of a process in one transaction; keep unchanged states."""
+        """Write the status reports of a process in one transaction.
+
+        A report without a state keeps the stored state; it is ignored if the stored report is of
+        another process or another revision.
+        """
         with self._writing() as writer:
             # in a fixed order, so that two writers cannot deadlock
             for report in sorted(reports, key=lambda report: report.unit):
@@ -142,12 +146,8 @@ class Command:
 
     Parameters
     ----------
-    id
-        Unique identifier.
     unit
         Unit whose process executes the command.
-    kind
-        Kind of command.
     document
         Arguments of the command as JSON.
     actor
@@ -244,24 +244,30 @@ class Commands(Tables):
             writer.execute(INSERT, astuple(command))
 
     def open(self, units: Collection[str]) -> list[OpenCommand]:
-        """Return the commands of the given units that have no final answer, oldest first."""
+        """Return the commands of the given units that have no final answer, oldest first.
+
+        Only the oldest `MAX_OPEN` such commands of all units are considered.
+        """
         with self._reading() as reader:
             rows = reader.execute(SELECT_OPEN, (MAX_OPEN,)).fetchall()
         found = [OpenCommand(Command(*row[:-1]), row[-1]) for row in rows]
         return [each for each in found if each.command.unit in units]
 
     def take(self, id_: str, process: str) -> bool:
-        """Record the process that executes a command; return False if answered or unknown."""
+        """Record the process that executes a command; return False if answered or unknown.
+
+        It replaces a process that took the command before, so the caller checks `taken_by` first.
+        """
         with self._writing() as writer:
             return bool(writer.execute(TAKE, (process, id_)).rowcount == 1)
 
     def answer(self, id_: str, answer: Answer, now_ns: int) -> None:
-        """Write the answer to a command; an answered command keeps its first answer."""
+        """Write the answer to a command, truncated to `MAX_WORDS`; only the first answer counts."""
         with self._writing() as writer:
             answer_command(writer, id_, answer, now_ns)
 
     def withdraw(self, id_: str, words: str, now_ns: int) -> bool:
-        """Withdraw a waiting command; return False if it was taken or answered."""
+        """Withdraw a waiting command with the answer `words`; return False if it is not waiting."""
         with self._writing() as writer:
             return bool(writer.execute(WITHDRAW, (words, now_ns, id_)).rowcount == 1)
 
@@ -273,7 +279,7 @@ class Commands(Tables):
 
 
 def answer_command(writer: Connection, id_: str, answer: Answer, now_ns: int) -> None:
-    """Write the answer to a command within an open transaction."""
+    """Write the answer to a command within an open transaction; see `Commands.answer`."""
     writer.execute(ANSWER, (answer.state.value, answer.words[:MAX_WORDS], now_ns, id_))
 
 
@@ -321,7 +327,10 @@ READ_POSITION = f"SELECT {', '.join(POSITION_COLUMNS)} FROM stream_position WHER
 
 
 def write_positions(writer: Connection, positions: Iterable[StreamPosition]) -> None:
-    """Write the newest stream position of each unit, in the transaction of the unit's results."""
+    """Write stream positions in the transaction of the results; the last of each unit counts.
+
+    A sequence number below the stored number is ignored, unless the stream is another one.
+    """
     newest = {position.unit: position for position in positions}
     # in a fixed order, so that two writers cannot deadlock
     for _, position in sorted(newest.items()):

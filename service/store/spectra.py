@@ -157,7 +157,10 @@ CHECKSUM_BYTES = 8
 
 
 def encode(amplitude_um_pk: FloatArray) -> bytes:
-    """Return (N_CHANNELS, n_lines) amplitudes in µm, NaN if unusable, as 16-bit codes."""
+    """Return amplitudes (N_CHANNELS, n_lines) in µm, NaN if unusable, as logarithmic 16-bit codes.
+
+    Values below `LOWEST_UM` become 0, those above `HIGHEST_UM` that maximum.
+    """
     usable = np.nan_to_num(amplitude_um_pk, nan=LOWEST_UM)
     steps = np.log(np.clip(usable, LOWEST_UM, HIGHEST_UM) / LOWEST_UM) / STEP
     codes = 1 + np.round(steps).astype(np.int64)
@@ -222,7 +225,10 @@ JUDGED = tuple(
 def insert_spectra(
     writer: Connection, assessments: Iterable[Assessment], limits: SpectraLimits
 ) -> None:
-    """Insert the first spectrum of each interval of each tier; delete spectra beyond the limit."""
+    """Insert the first spectrum of each interval of each tier; delete spectra beyond the limit.
+
+    Assessments without a spectrum are skipped.
+    """
     for assessment in assessments:
         spectrum = assessment.spectrum
         if spectrum.frequency_hz.size and spectrum.n_segments.diagonal().any():

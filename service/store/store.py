@@ -75,7 +75,8 @@ SELECT_LAST = """
 class Store:
     """Store of all data of a plant in one database; may be used from several threads.
 
-    Data are on the disk when the method that writes them returns.
+    Data are on the disk when the method that writes them returns. All methods raise `StoreError` if
+    the database cannot be used.
 
     Parameters
     ----------
@@ -86,7 +87,7 @@ class Store:
     address
         Function that returns the outbox messages about an alarm event.
     spectra
-        Limits of stored spectra.
+        Limits of stored spectra; None for the defaults of `SpectraLimits`.
     is_read_only
         Whether another process writes the database; all methods that write then raise `StoreError`.
     """
@@ -178,7 +179,7 @@ class Store:
             return read_trend(reader, query)
 
     def gaps(self, unit: str, start_ns: int, end_ns: int) -> list[Gap]:
-        """Return the gaps in the samples of a unit that end within a time range, oldest first.
+        """Return the gaps of a unit that end from `start_ns` to before `end_ns`, oldest first.
 
         Raises
         ------

@@ -90,6 +90,8 @@ def select_readings(
     ------
     QueryTooLargeError
         If the spans have more than `MAX_ROWS` readings.
+    StoreError
+        If the layout of a row is damaged or missing.
     """
     layouts = select_layouts(reader)
     n_readings, single, summed = 0, [decoded_rows([], layouts, query.quantities)], []
@@ -125,7 +127,7 @@ def too_large() -> QueryTooLargeError:
 
 
 def select_layouts(reader: Connection) -> dict[int, Layout]:
-    """Return all stored layouts by number."""
+    """Return all undamaged layouts by number."""
     return {
         id_: Layout.loads(quantities, reasons)
         for id_, quantities, reasons in reader.execute("SELECT * FROM whole_layout")

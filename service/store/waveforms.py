@@ -47,10 +47,8 @@ class WaveformFile:
         SHA-256 of the manifest, which lists the checksums of the other files; empty if unreadable.
     reason
         Reason for the state; may be empty.
-    changed_ns
-        Time of the last change of state.
-    checked_ns
-        Time of the last complete check.
+    changed_ns, checked_ns
+        Times of the last change of state, and of the last complete check.
     """
 
     place: str

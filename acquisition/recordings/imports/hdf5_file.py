@@ -19,7 +19,10 @@ _MAX_CHUNK_BYTES = 2**26
 
 
 def hdf5_file(path: Path) -> SeriesFile:
-    """Open an HDF5 file; columns are named by dataset path, with units in dataset attributes."""
+    """Open an HDF5 file; columns are named by dataset path, with units in dataset attributes.
+
+    Raises `ConfigError` if h5py is not installed.
+    """
     h5py = library("h5py", "HDF5")
     file = h5py.File(path, "r")
 

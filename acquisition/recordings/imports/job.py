@@ -114,10 +114,6 @@ class CsvLayout:
 
     Parameters
     ----------
-    delimiter
-        Character between columns.
-    decimal
-        Decimal separator.
     header_line
         Number of the line with the headings, counted from 1; earlier lines are skipped.
     """

@@ -20,10 +20,13 @@ _INVALID = 0b11
 
 
 def mdf_file(path: Path, job: ImportJob) -> SeriesFile:
-    """Open an MDF file; columns are named by channel and, if ambiguous, by group name or number."""
+    """Open an MDF file; columns are named by channel and, if ambiguous, by group name or number.
+
+    Raises `ConfigError` if the file is not a finished MDF 4 file, or asammdf is not installed.
+    """
     with path.open("rb") as stream:
         if stream.read(len(_MAGIC)) != _MAGIC:  # asammdf extracts archives to the disk
-            raise ConfigError("not an MDF file of version 4, or an unfinished one")
+            raise ConfigError("not an MDF file of version 4, or an unfinished one; convert it")
     mdf = library("asammdf", "MDF4").MDF(path)
     is_local = bool(mdf.header.time_flags & _LOCAL_TIME)
     offset_s = job.time.utc_offset_s if is_local else 0

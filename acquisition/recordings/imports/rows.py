@@ -85,7 +85,7 @@ class Indexer:
         self._last_ns = 0
 
     def stretches(self, times_ns: TimeArray) -> Iterator[Stretch]:
-        """Yield the ranges without a gap of the next rows; row numbers are positions in `times_ns`.
+        """Yield the ranges without a gap of the next rows; rows are positions in `times_ns` (n,).
 
         Raises
         ------

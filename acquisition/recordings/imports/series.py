@@ -252,7 +252,7 @@ def counts_are_kept(job: ImportJob, per_count: Sequence[float | None]) -> bool:
 def engineering_units(
     values: npt.NDArray[np.generic], channel: ChannelColumn, per_count: float | None
 ) -> SampleArray:
-    """Return the values of a column in the unit of its channel; counts are scaled.
+    """Return the values (n,) of a column in the unit of its channel; counts are scaled.
 
     Parameters
     ----------

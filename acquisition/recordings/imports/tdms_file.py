@@ -26,7 +26,10 @@ _UNFINISHED = 2**64 - 1
 
 
 def tdms_file(path: Path) -> SeriesFile:
-    """Open a TDMS file; columns are named by group and channel, times from waveform properties."""
+    """Open a TDMS file; columns are named by group and channel, times from waveform properties.
+
+    Raises `ConfigError` if the file is incomplete, or npTDMS is not installed.
+    """
     stream = path.open("rb")  # not a path: npTDMS would use an index file beside it
     _require_whole(stream)
     file = library("nptdms", "TDMS").TdmsFile.open(stream, raw_timestamps=True)

@@ -23,7 +23,7 @@ _MICROSECOND = timedelta(microseconds=1)
 
 
 def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None) -> TimeArray:
-    """Convert the numbers of a time column to UTC in nanoseconds.
+    """Convert the numbers (n,) of a time column to UTC in nanoseconds.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def _whole_us(values: npt.NDArray[Any], us_per_unit: float) -> TimeArray:
 
 
 def text_to_ns(texts: Sequence[str], axis: TimeAxis) -> TimeArray:
-    """Convert ISO 8601 texts to UTC in nanoseconds; the default time zone is that of `axis`.
+    """Convert ISO 8601 texts to UTC in ns, (n,); the default time zone is that of `axis`.
 
     Raises
     ------

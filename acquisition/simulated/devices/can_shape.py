@@ -78,7 +78,7 @@ class MessageShape:
         )
 
     def records(self, n_frames: int) -> npt.NDArray[np.void]:
-        """Return records of `n_frames` frames, filled with zeros."""
+        """Return records of `n_frames` frames, (n_frames,), filled with zeros."""
         return np.zeros(n_frames, dtype=self.dtype)
 
 

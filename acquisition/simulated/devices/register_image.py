@@ -141,7 +141,7 @@ class RegisterImage:
 
 
 def encoded(number: float, cell: Cell) -> bytes:
-    """Return a number as the register bytes of a cell, with the type and byte order of the cell."""
+    """Return a number as register bytes of a cell; integers are rounded and limited to the type."""
     dtype = np.dtype(DTYPES[cell.type])
     if cell.type not in FLOATS:
         limits = np.iinfo(dtype)

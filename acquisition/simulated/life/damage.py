@@ -97,7 +97,7 @@ class Alteration:
 
 
 def alteration(damage: tuple[Damage, ...], bearing: str, time_ns: TimeArray) -> Alteration:
-    """Return the effect of all damage on one bearing: losses of a kind add up, gains multiply."""
+    """Return all damage of one bearing at times (n,): losses of a kind add up, gains multiply."""
     lost = {
         kind: sum(
             (d.size * d.extent(time_ns) for d in damage if d.bearing == bearing and d.kind is kind),

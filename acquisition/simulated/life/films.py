@@ -116,7 +116,7 @@ def _pad_clearance_um(
 
 
 def worn_pad(bearing: LifeBearing, centre_um: FloatArray) -> int:
-    """Return the index of the pad nearest to the median shaft position, the pad that wears."""
+    """Return the index of the pad that wears: nearest to the median of `centre_um` (2, n)."""
     x_um, y_um = np.median(centre_um, axis=1)
     angles = bearing.ring.pad_angles_rad
     return int(np.argmax(x_um * np.cos(angles) + y_um * np.sin(angles)))

@@ -52,7 +52,7 @@ class Operation:
 
     @property
     def starts(self) -> npt.NDArray[np.int64]:
-        """Indices of the first row of each run."""
+        """Indices of the first row of each run, (n_runs,)."""
         return np.flatnonzero(np.diff(self.is_turning.astype(np.int8), prepend=np.int8(0)) == 1)
 
 
@@ -106,19 +106,15 @@ def change_rows(
 
 
 def held(levels: FloatArray, which: FloatArray) -> FloatArray:
-    """Return the level at each row, selected from `levels` by the indices `which` (n,)."""
+    """Return the level at each row (n,), selected from `levels` by the indices `which` (n,)."""
     return np.asarray(levels[which.astype(np.int64)])
 
 
 def lagged(target: FloatArray, time_s: FloatArray, step_s: float, initial: float) -> FloatArray:
-    """Return a first-order lag, τ dy/dt = target − y, exact for targets constant in each step.
+    """Return a first-order lag (n,), τ dy/dt = target − y, exact for targets constant in each step.
 
-    Parameters
-    ----------
-    target, time_s : (n,)
-        Target and time constant; each change of the time constant costs computing time.
-    initial
-        Value before the first row.
+    `time_s` (n,) is the time constant τ; each of its changes costs computing time. `initial` is
+    the value before the first row.
     """
     import scipy.signal  # slow import, not needed at start-up
 

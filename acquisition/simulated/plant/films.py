@@ -243,7 +243,7 @@ class Oil:
             )
 
     def density_kg_per_m3(self, temperature_c: FloatArray) -> FloatArray:
-        """Return the density, linear in temperature."""
+        """Return the density, linear in temperature; the result has the shape of the argument."""
         return self.density_20_kg_per_m3 * (1.0 - self.expansion_per_k * (temperature_c - 20.0))
 
     def viscosity_pa_s(self, temperature_c: FloatArray) -> FloatArray:

@@ -82,7 +82,8 @@ class Period:
     version
         Number of the baseline, from 1.
     begin, learned, end
-        The baseline is learned from rows `begin` to `learned`, and compared with rows up to `end`.
+        Row numbers: the baseline is learned from the rows before `learned`, from `begin` on, and
+        compared with the rows from `learned` on, before `end`.
     event
         Machine event at the beginning of the period; empty for the first period.
     """
@@ -97,7 +98,7 @@ class Period:
 def periods_of(
     time_ns: TimeArray, events: Sequence[MachineEvent], learning: Learning
 ) -> list[Period]:
-    """Return the periods of a bearing between its events, except periods without readings."""
+    """Return the periods between events that have readings; `time_ns` (n,) is ascending."""
     ordered = sorted(events, key=lambda event: event.time_ns)
     cuts = [0, *(int(np.searchsorted(time_ns, event.time_ns)) for event in ordered), time_ns.size]
     texts = ["", *(event.text for event in ordered)]

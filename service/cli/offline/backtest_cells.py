@@ -39,7 +39,10 @@ class RowProblems:
         text: str,
         value: Callable[[int], Any] | None = None,
     ) -> None:
-        """Add a problem of rows, by mask or index; `value` returns the value of a row."""
+        """Add a problem of the rows `wrong`: a mask (n_rows,) or indices.
+
+        `value` returns the value of a row for the message; None for a message without values.
+        """
         rows = np.flatnonzero(wrong) if wrong.dtype == np.bool_ else wrong
         self._n_found += rows.size
         lines = self._line[rows]

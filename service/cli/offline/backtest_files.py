@@ -186,12 +186,9 @@ def _side(place: Place, found: FilmHistory, side: int) -> Any:
 
 @contextmanager
 def readings_file(path: Path) -> Iterator[Callable[[Any], None]]:
-    """Create a CSV or Parquet file and yield a function that adds rows; an error removes the file.
+    """Create a file, by its suffix CSV or Parquet; yield a function that adds rows.
 
-    Parameters
-    ----------
-    path
-        Path whose suffix is in `SUFFIXES`.
+    An error in the block removes the file.
 
     Raises
     ------

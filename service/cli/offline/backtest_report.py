@@ -39,7 +39,7 @@ class ChangeReport(_Part):
 
 
 class ConditionReport(_Part):
-    """Operating condition of a bearing."""
+    """Operating condition of a bearing; null for unknown values."""
 
     state: str
     eccentricity_ratio: float | None
@@ -50,7 +50,7 @@ class ConditionReport(_Part):
 
 
 class CauseReport(_Part):
-    """Probable cause of an alarm, with the film's share of the change and its uncertainty."""
+    """Probable cause of an alarm, with the film's share of the change; null if unknown."""
 
     cause: str
     reason: str
@@ -88,7 +88,7 @@ class AlarmReport(_Part):
 
 
 class SupportReport(_Part):
-    """Baseline of one period: learning period, numbers of cells by support, and scatter."""
+    """Baseline of one period: learning period, cells by support, scatter (null if not learned)."""
 
     version: int
     event: str
@@ -132,7 +132,7 @@ class FilmReport(_Part):
 
 
 class RateReport(_Part):
-    """Rate of alarms; on a healthy plant, the rate of false alarms."""
+    """Rate of alarms, null for no time; on a healthy plant, the rate of false alarms."""
 
     unit_years: float
     """From the end of learning to the end of readings, all units together."""

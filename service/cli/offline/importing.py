@@ -172,7 +172,7 @@ def import_recording(
     with closing(read) as found:
         first = next(found, None)
         if first is None:
-            raise ConfigError(f"{path}: the file has no samples of unit {unit.id}")
+            raise ConfigError(f"{path}: no samples of unit {unit.id}; check file and mapping")
         with RecordingWriter(folder, recorded, made_by) as writer:
             for part, done in chain([first], found):
                 whole = _with_all_slow(part, recorded.calibration)

@@ -59,7 +59,7 @@ class RegisterLook:
 
 @dataclass(frozen=True)
 class ValueLook:
-    """Value of a register map with its raw registers.
+    """Value of a register map, None unless finite, with its raw registers.
 
     Parameters
     ----------
@@ -148,15 +148,7 @@ def ring_look(header: RingHeader, slot: Slot) -> RingLook:
 
 
 def looks(data: bytes, address: int) -> list[RegisterLook]:
-    """Return each register, decoded in every type and byte order.
-
-    Parameters
-    ----------
-    data
-        Big-endian words.
-    address
-        Address of the first register.
-    """
+    """Return each register of big-endian words from `address` on, in every type and byte order."""
     return [_look(data[2 * n : 2 * n + 4], address + n) for n in range(len(data) // 2)]
 
 
@@ -270,12 +262,9 @@ async def identify_once(device: ModbusLinkSettings) -> Identification:
 async def measure_in_flight(
     device: ModbusLinkSettings, address: int, function: int, most: int
 ) -> int:
-    """Return how many simultaneous requests a device answers in order, from 1 to `most`.
+    """Return how many simultaneous requests of an existing register a device answers, 1 to `most`.
 
-    Parameters
-    ----------
-    address
-        Address of an existing register.
+    Raises `LinkError` or `ConfigError` if the device does not answer a single request.
     """
     await read_once(device, address, 1, function)
     n_answered = 1

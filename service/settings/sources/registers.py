@@ -232,7 +232,10 @@ class MapDefaults:
             raise MisfitError(words, *at, "address")
 
     def cell(self, settings: CellSettings, *at: int | str) -> Cell:
-        """Return the settings as a `Cell` of the Modbus adapter, completed by the defaults."""
+        """Return the settings, completed by the defaults; raise `MisfitError` if they misfit.
+
+        `at` is the place of the settings in the register map, for the error.
+        """
         cell = Cell(
             address=settings.address,
             function=settings.function or self.function,

@@ -51,8 +51,6 @@ class AuditAction:
         State of the object before and after the action as JSON values; None if not recorded.
     reason
         Reason given for the action; empty if none was given.
-    source
-        Interface through which the action was taken.
     peer
         Network address of the request, or user of the operating system; None if unknown.
     """
@@ -141,7 +139,10 @@ def digest(values: Sequence[object]) -> str:
 
 
 def chained(action: AuditAction, number: int, previous_hash: str) -> AuditEntry:
-    """Return the audit entry of an action, chained to the hash of the previous entry."""
+    """Return the audit entry of an action, chained to the hash of the previous entry.
+
+    Long texts are truncated. Raises `ValueError` for a number that is not finite, as `canonical`.
+    """
     columns = (
         *(number, action.time_ns, storable(action.actor, MAX_NAME), action.source.value),
         None if action.peer is None else storable(action.peer, MAX_NAME),
@@ -217,5 +218,5 @@ def acting_as(who: Acting) -> Iterator[None]:
 
 
 def name_actor(actor: str) -> None:
-    """Set the actor of the following actions of this task or thread."""
+    """Set the actor of the following actions of this task, until an enclosing `acting_as` ends."""
     _ACTING.set(replace(acting(), actor=actor))

@@ -31,7 +31,7 @@ def head_path(database: Path) -> Path:
 
 
 def chain_name(head: Path) -> str:
-    """Return the name of a chain of the audit trail, which is the beginning of its head file."""
+    """Return the name of a chain of the audit trail: its head file's name without the suffix."""
     return head.name.removesuffix(SUFFIX)
 
 
@@ -47,13 +47,13 @@ def read_head(path: Path) -> AuditHead:
         with path.open("rb") as file:
             text = file.read(MAX_BYTES)
     except FileNotFoundError:
-        raise HeadError("the head file does not exist") from None
+        raise HeadError(f"the head file {path.name} does not exist") from None
     except OSError as error:
-        raise HeadError(f"the head file cannot be read: {error.strerror}") from error
+        raise HeadError(f"the head file {path.name} cannot be read: {error.strerror}") from error
     try:
         return _head(json.loads(text))
     except (ValueError, RecursionError):
-        raise HeadError("the head file has no valid number and hash of an entry") from None
+        raise HeadError(f"the head file {path.name} is damaged; restore it from a backup") from None
 
 
 def write_head(path: Path, head: AuditHead) -> None:
@@ -87,15 +87,7 @@ MAX_BEHIND = 64
 
 @dataclass(frozen=True)
 class Finding:
-    """Defect of an audit trail.
-
-    Parameters
-    ----------
-    number
-        Number of the first affected entry; None for a defect of the head file.
-    detail
-        Description of the defect.
-    """
+    """Defect of an audit trail: number of the first affected entry (None for the head file)."""
 
     number: int | None
     detail: str
@@ -213,7 +205,7 @@ def _wrong_head(
 
 
 def place_of(entry: AuditEntry, last: int) -> str:
-    """Return how an entry with a wrong hash was changed: altered, or moved (up to `last`)."""
+    """Return as text whether an entry with a wrong hash was altered, or moved from 1 to `last`."""
     for number in range(1, last + 1):
         if recomputed(replace(entry, number=number)) == entry.hash:
             return f"entry {entry.number} is out of order; its content is that of entry {number}"

@@ -144,10 +144,8 @@ class SessionLimits:
 
     Parameters
     ----------
-    idle_s
-        Maximum time since the last use.
-    absolute_s
-        Maximum time since the login.
+    idle_s, absolute_s
+        Maximum time since the last use, and since the login.
     step_s
         Resolution of the stored time of last use; each update is a write to the disk.
     slack_s
@@ -171,7 +169,7 @@ class SessionLimits:
         return -self.slack_s <= age_s < self.absolute_s and -self.slack_s <= idle_s < self.idle_s
 
     def is_news(self, session: Session, now_ns: int) -> bool:
-        """Return whether the stored time of last use must be updated."""
+        """Return whether the stored time of last use is `step_s` old or older: write a new one."""
         return now_ns - session.seen_ns >= self.step_s * NS_PER_S
 
     def oldest_ns(self, now_ns: int) -> int:
@@ -227,7 +225,7 @@ class ApiKey:
         return KeyState.VALID if now_ns < self.expires_ns else KeyState.EXPIRED
 
     def is_news(self, now_ns: int) -> bool:
-        """Return whether the stored time of last use must be updated."""
+        """Return whether the stored time of last use is missing or one minute old or older."""
         return self.used_ns is None or now_ns - self.used_ns >= SEEN_STEP_NS
 
 

@@ -21,7 +21,7 @@ class AccessRefusedError(Exception):
 
 
 class UnknownAccountError(AccessRefusedError):
-    """The account does not exist."""
+    """Error raised if an account does not exist."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,6 @@ class Account:
         Argon2id hash in the encoded text form, which includes its parameters.
     password_number
         Version number of the password, incremented at each change.
-    password_ns
-        Time at which the password was set.
     must_change
         Whether another person set the password, so that the owner must change it before other use.
     """
@@ -111,18 +109,21 @@ END_OLDEST = """
 
 
 class AccountStore(AuditedTables):
-    """Store of user accounts."""
+    """Store of user accounts; its methods raise `StoreError` if the database cannot be used."""
 
     def add(
         self, name: str, role: Role, password_hash: str, now_ns: int, must_change: bool = False
     ) -> None:
-        """Add an account. Raises `AccessRefusedError` if the name is taken."""
+        """Add an account; a repeated call has no effect.
+
+        Raises `AccessRefusedError` if another account has the name.
+        """
         with self._writing() as writer:
             found = writer.execute(SELECT_ACCOUNTS, {"name": name}).fetchone()
             if found and tuple(found[:3]) == (name, role.value, password_hash):
                 return  # already written by a call whose outcome was unknown: hashes are unique
             if not insert_account(writer, name, role, password_hash, now_ns, must_change):
-                raise AccessRefusedError(f"account {name} already exists")
+                raise AccessRefusedError(f"account {name} already exists; choose another name")
             self._audit.add(writer, [_account_action("added", name, now_ns, after=role)])
 
     def get(self, name: str) -> Account | None:
@@ -189,7 +190,7 @@ class AccountStore(AuditedTables):
 
 
 class SessionStore(AuditedTables):
-    """Store of login sessions."""
+    """Store of login sessions; its methods raise `StoreError` if the database cannot be used."""
 
     def add(self, session: Session, password_number: int, oldest_ns: int) -> bool:
         """Add a session; return False if the password is no longer version `password_number`.
@@ -217,7 +218,7 @@ class SessionStore(AuditedTables):
         return Session(bytes(row[0]), account.name, row[1], row[2]), account
 
     def see(self, digest: bytes, now_ns: int) -> None:
-        """Set the time of last use of a session."""
+        """Set the time of last use of a session; an unknown session is ignored."""
         with self._writing() as writer:
             writer.execute("UPDATE session SET seen_ns = ? WHERE digest = ?", (now_ns, digest))
 
@@ -236,7 +237,7 @@ class SessionStore(AuditedTables):
                 self._audit.add(writer, [_session_action("ended", ended[0], logout_ns)])
 
     def end_all(self) -> None:
-        """End all sessions of all accounts."""
+        """End all sessions of all accounts, without audit entries."""
         with self._writing() as writer:
             writer.execute("DELETE FROM session")
 
@@ -249,7 +250,10 @@ def insert_account(
     now_ns: int,
     must_change: bool = False,
 ) -> bool:
-    """Insert an account; return False if the name is taken."""
+    """Insert an account within an open transaction; return False if the name is taken.
+
+    With `must_change`, the account must change its password at the first login.
+    """
     row = (name, role.value, password_hash, now_ns, now_ns, int(must_change))
     insert = "INSERT INTO account VALUES (?, ?, ?, 1, ?, ?, ?) ON CONFLICT (name) DO NOTHING"
     return writer.execute(insert, row).rowcount == 1
@@ -284,7 +288,7 @@ IS_TAKEABLE = """
 
 
 class KeyStore(AuditedTables):
-    """Store of API keys."""
+    """Store of API keys; its methods raise `StoreError` if the database cannot be used."""
 
     def add(self, key: ApiKey) -> None:
         """Add an API key; adding the same key again has no effect."""
@@ -309,7 +313,7 @@ class KeyStore(AuditedTables):
             return [_key(row) for row in reader.execute(SELECT_KEYS, {"id": None})]
 
     def see(self, id_: str, now_ns: int) -> None:
-        """Set the time of last use of an API key."""
+        """Set the time of last use of an API key; an unknown key is ignored."""
         with self._writing() as writer:
             writer.execute("UPDATE api_key SET used_ns = ? WHERE id = ?", (now_ns, id_))
 
@@ -337,7 +341,7 @@ class SetUpStore(AuditedTables):
             return writer.execute(offer, (digest, expires_ns)).rowcount == 1
 
     def holds(self, digest: bytes, now_ns: int) -> bool:
-        """Return whether a set-up token is stored and not expired, and no account exists."""
+        """Return whether a digest is of the stored set-up token, not expired, without accounts."""
         with self._reading() as reader:
             return bool(reader.execute(IS_TAKEABLE, (digest, now_ns)).fetchone()[0])
 
@@ -381,7 +385,9 @@ class AccessStore:
         self._rolled_back: tuple[str, ...] = ()
 
     def accept(self, now_ns: int) -> str | None:
-        """Accept an older copy of the database, with an audit entry; return how it differs.
+        """Accept an older copy of the database, with audit entries; return how it differs.
+
+        The result is None, and nothing is written, if the database is the newest copy.
 
         Raises
         ------

@@ -51,12 +51,7 @@ class Kind(StrEnum):
 class MarkFinding:
     """Difference between the high-water marks in the file and in the database.
 
-    Parameters
-    ----------
-    n_missing
-        Number of committed transactions that are missing from the database; None if unknown.
-    detail
-        Description of the difference, for messages.
+    `n_missing` is the number of transactions that the database lacks; None if unknown.
     """
 
     kind: Kind
@@ -71,10 +66,8 @@ def compared(mark: Mark | str, database: Mark, host: str) -> list[MarkFinding]:
     ----------
     mark
         Mark in the file, or the reason why it cannot be read. The file must be read first.
-    database
-        Mark in the database.
-    host
-        Identifier of this machine.
+    database, host
+        Mark in the database, and identifier of this machine.
     """
     if isinstance(mark, str):
         return [MarkFinding(Kind.MARK_LOST, None, _lost(mark, database))]
@@ -201,7 +194,7 @@ class CommitMarks:
         """Compare a newly opened database with the mark file, within a transaction.
 
         A database without a mark receives a mark; if the file is missing, that is if `in_file` is
-        None, it is then created.
+        None, it is then created. Raises `OSError` if it cannot be created.
         """
         writer.execute(CREATE)
         mark = select_mark(writer)
@@ -211,7 +204,7 @@ class CommitMarks:
             if in_file is None:
                 self._file.replace(mark)
                 return
-        lost = "the high-water mark does not exist"
+        lost = f"{self._file.path}: the high-water mark does not exist"
         self.found = compared(lost if in_file is None else in_file, mark, self._host)
 
     def count(self, writer: Connection) -> None:
@@ -235,7 +228,9 @@ class CommitMarks:
             return
         try:
             self._file.advance(self._newest)
-        except (OSError, MarkError) as error:
+        except MarkError as error:
+            self.error = str(error)
+        except OSError as error:
             self.error = f"{self._file.path}: {error}"
         else:
             self.error = None

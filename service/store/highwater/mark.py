@@ -98,11 +98,12 @@ class MarkFile:
         """
         try:
             with _opened(self.path, os.O_RDONLY) as descriptor:
-                return _newest(_slots(descriptor))
+                return self._newest(_slots(descriptor))
         except FileNotFoundError:
-            raise NoMarkError("the high-water mark does not exist") from None
+            raise NoMarkError(f"{self.path}: the high-water mark does not exist") from None
         except OSError as error:
-            raise MarkError(f"the high-water mark cannot be read: {error.strerror}") from error
+            why = f"the high-water mark cannot be read: {error.strerror}"
+            raise MarkError(f"{self.path}: {why}") from error
 
     def advance(self, mark: Mark) -> None:
         """Write a mark, durable on return; a mark older than the newest in the file is ignored.
@@ -118,14 +119,15 @@ class MarkFile:
             with _opened(self.path, os.O_RDWR) as descriptor:
                 fcntl.flock(descriptor, fcntl.LOCK_EX)
                 slots = _slots(descriptor)
-                newest = _newest(slots)
+                newest = self._newest(slots)
                 if newest.store != mark.store:
-                    raise MarkError("the high-water mark belongs to another database")
+                    why = "the high-water mark belongs to another database"
+                    raise MarkError(f"{self.path}: {why}")
                 if newest.n_commits < mark.n_commits:
                     os.pwrite(descriptor, encoded(mark), SLOTS[slots.index(newest) - 1])
                     os.fdatasync(descriptor)
         except FileNotFoundError:
-            raise NoMarkError("the high-water mark does not exist") from None
+            raise NoMarkError(f"{self.path}: the high-water mark does not exist") from None
 
     def replace(self, mark: Mark) -> None:
         """Replace the file by a new file with this mark.
@@ -137,16 +139,15 @@ class MarkFile:
         """
         write_private(self.path, encoded(mark).ljust(SLOTS[1], b"\0") + encoded(mark))
 
+    def _newest(self, slots: list[Mark | None]) -> Mark:
+        marks = [mark for mark in slots if mark is not None]
+        if not marks:
+            raise MarkError(f"{self.path}: the high-water mark is damaged")
+        return max(marks, key=lambda mark: mark.n_commits)
+
 
 def _slots(descriptor: int) -> list[Mark | None]:
     return [decoded(os.pread(descriptor, SLOT_BYTES, place)) for place in SLOTS]
-
-
-def _newest(slots: list[Mark | None]) -> Mark:
-    marks = [mark for mark in slots if mark is not None]
-    if not marks:
-        raise MarkError("the high-water mark is damaged")
-    return max(marks, key=lambda mark: mark.n_commits)
 
 
 @contextmanager

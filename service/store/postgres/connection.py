@@ -152,7 +152,15 @@ class PostgresConnection:
 
 
 def connected(address: PostgresAddress, purpose: str, settings: str) -> Session:
-    """Return a new session with the settings `SESSION` and additional SET statements."""
+    """Return a new session with the settings `SESSION` and additional SET statements.
+
+    Raises
+    ------
+    StoreError
+        If the password file is unusable.
+    psycopg.Error
+        If the server cannot be reached or rejects the connection.
+    """
     session = psycopg.connect(address.full(purpose), autocommit=True, context=_Context)
     try:
         session.execute((SESSION + settings).encode())
@@ -287,7 +295,7 @@ UNREACHABLE = "check that PostgreSQL runs and can be reached; padwatch retries"
 
 
 def sentence(where: str, error: psycopg.Error) -> str:
-    """Return a one-line message about a PostgreSQL error, with advice on the remedy."""
+    """Return a one-line message about an error of the database `where`, with advice if known."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     said = (error.diag.message_primary or (lines[0] if lines else type(error).__name__)).rstrip(".")
     advice = _advice(error)
@@ -305,7 +313,10 @@ def _advice(error: psycopg.Error) -> str | None:
 
 @contextmanager
 def renamed(where: str) -> Iterator[None]:
-    """Return a context manager that converts errors to `StoreError` or `RefusedRowError`."""
+    """Return a context manager that converts errors of the database `where` to `StoreError`.
+
+    The error is a `RefusedRowError` if one row or its database page caused it.
+    """
     try:
         yield
     except psycopg.Error as error:

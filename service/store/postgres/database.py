@@ -43,7 +43,10 @@ class Readers:
 
     @contextmanager
     def reading(self) -> Iterator[PostgresConnection]:
-        """Open a read-only transaction in a pooled session, and yield its connection."""
+        """Open a read-only transaction in a pooled session, and yield its connection.
+
+        Raises `StoreError` if the server fails or the HTTP client has disconnected.
+        """
         with renamed(self._address.name):
             session = self._begun()
             try:
@@ -106,15 +109,7 @@ PAUSE_S = 0.2
 
 
 class Writer:
-    """Session for write transactions; only one of these is open at a time among all processes.
-
-    Parameters
-    ----------
-    address
-        Address of the database.
-    session
-        Open session to a suitable server.
-    """
+    """Session for write transactions; only one of these is open at a time among all processes."""
 
     def __init__(self, address: PostgresAddress, session: Session) -> None:
         self._address, self._where = address, address.name
@@ -129,7 +124,10 @@ class Writer:
 
     @contextmanager
     def writing(self) -> Iterator[PostgresConnection]:
-        """Open a write transaction and yield its connection; the end of the block commits it."""
+        """Open a write transaction and yield its connection; the end of the block commits it.
+
+        An error in the block rolls it back. Raises `StoreError` if the server fails.
+        """
         with self._lock, renamed(self._where):
             number = self._begin()
             try:
@@ -242,13 +240,6 @@ class PostgresHold:
     The lock ends with the session: when the process ends, when the server restarts, or at most half
     a minute after the host or the network fails. The holder must therefore check `is_held` before
     every action that only one process may take; a lost lock is never regained.
-
-    Parameters
-    ----------
-    address
-        Address of the database.
-    name
-        Name of the lock.
     """
 
     def __init__(self, address: PostgresAddress, name: str) -> None:
@@ -358,5 +349,5 @@ class PostgresDatabase:
         return True
 
     def hold(self, name: str) -> PostgresHold:
-        """Return a lock on a name, exclusive among all processes that use this database."""
+        """Return an advisory lock on a name; its errors are as for `Database.hold`."""
         return PostgresHold(self.address, name)

@@ -35,7 +35,7 @@ class PostgresStore(Store):
     to
         Function that returns the outbox messages about an alarm event.
     spectra
-        Limits of stored spectra.
+        Limits of stored spectra; None for the defaults of `SpectraLimits`.
 
     Raises
     ------

@@ -33,14 +33,10 @@ class Conditions:
         Operating state, `NO_STATE` if unknown.
     n_readings : (n,)
         Number of aggregated readings, usable or not.
-    eccentricity_low : (n,)
-        Minimum of the eccentricity ratio, NaN if unknown.
-    eccentricity_high : (n,)
-        Maximum of the eccentricity ratio, NaN if unknown.
-    oil_low_c : (n,)
-        Minimum of the oil temperature in °C, NaN if unknown.
-    oil_high_c : (n,)
-        Maximum of the oil temperature in °C, NaN if unknown.
+    eccentricity_low, eccentricity_high : (n,)
+        Minimum and maximum of the eccentricity ratio, NaN if unknown.
+    oil_low_c, oil_high_c : (n,)
+        Minimum and maximum of the oil temperature in °C, NaN if unknown.
     """
 
     state: IntArray
@@ -122,7 +118,7 @@ def together(one: Cells, other: Cells) -> Cells:
 
 
 def bins(value: FloatArray, width: float) -> IntArray:
-    """Return the bin number of each value, `NO_BIN` for NaN; bin edges are multiples of `width`."""
+    """Return the bin numbers of values (n,), `NO_BIN` for NaN; edges are multiples of `width`."""
     known = np.isfinite(value)
     safe = np.clip(np.where(known, value, 0.0), -1e9, 1e9)
     number = np.floor(safe / width).astype(np.int64)
@@ -289,6 +285,8 @@ def select_cells(
 
     Parameters
     ----------
+    span
+        First start time of the cells, and the end, which is excluded, in ns.
     names
         Requested columns.
     asked

@@ -39,7 +39,7 @@ def select_mark(reader: Connection, series: int) -> int:
 
 
 def minutes_of(writer: Connection, series: int, span: Span) -> Cells | None:
-    """Return the single readings of a span aggregated by minute; None if it has no readings."""
+    """Return the readings of a half-open span aggregated by minute; None if it has no readings."""
     rows = writer.execute(SELECT_WHOLE, (series, *span)).fetchall()
     if not rows:
         return None
@@ -79,7 +79,7 @@ def _cell_rows(
 
 
 def forget_width(writer: Connection, series: int, width_ns: int, span: Span) -> None:
-    """Delete the roll-ups of one width of a bearing in a time span."""
+    """Delete the roll-ups of one width of a bearing that start in a half-open time span."""
     layouts = [row[0] for row in writer.execute("SELECT id FROM layout").fetchall()]
     its = (series, width_ns // NS_PER_S)
     writer.execute(

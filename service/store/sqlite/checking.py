@@ -23,15 +23,7 @@ NULL_FINDING = "NULL value in "
 
 @dataclass(frozen=True)
 class Finding:
-    """Defect of a database.
-
-    Parameters
-    ----------
-    kind
-        "structure", "altered" (row), "missing" (row) or "high_water".
-    detail
-        Description of the defect.
-    """
+    """Defect of a database, of kind "structure", "altered" or "missing" (row), or "high_water"."""
 
     kind: str
     detail: str
@@ -51,7 +43,7 @@ def findings(path: Path, progress: Callable[[float], None] = lambda _: None) -> 
         If the file does not exist.
     """
     if not path.exists():
-        raise StoreError(f"{path.absolute()}: the database does not exist")
+        raise StoreError(f"{path.absolute()}: the database does not exist; check data_folder")
     in_file = _mark_beside(path)  # read before the database, which may be ahead of it
     log = DamageLog(EVERY)
     seals = Seals(log)
@@ -142,10 +134,7 @@ REMEMBER = """
 class Scrubber:
     """Cyclic checksum check of all rows, resumed after a restart; used by one thread at a time.
 
-    Parameters
-    ----------
-    damage
-        Log that receives altered and missing rows.
+    Altered and missing rows are added to the log `damage`.
     """
 
     def __init__(self, database: Database, seals: Seals, damage: DamageLog) -> None:

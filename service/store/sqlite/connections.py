@@ -50,7 +50,10 @@ class Readers:
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
-        """Open a read-only transaction on a pooled connection, and yield the connection."""
+        """Open a read-only transaction on a pooled connection, and yield the connection.
+
+        Raises `sqlite3.Error`, and the error of `require`.
+        """
         reader = self._taken()
         try:
             reader.set_progress_handler(self._should_end(), LOOK_AFTER_STEPS)
@@ -125,10 +128,6 @@ class Writer:
 
     Parameters
     ----------
-    connection
-        Open connection.
-    marks
-        High-water mark of the database.
     prepare
         Function that prepares a connection for writing, within a transaction.
     """
@@ -152,7 +151,10 @@ class Writer:
 
     @contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
-        """Open a write transaction and yield its connection; the end of the block commits it."""
+        """Open a write transaction and yield its connection; the end of the block commits it.
+
+        An error in the block rolls it back. Raises `sqlite3.Error`, also if the commit fails.
+        """
         if self._is_in_doubt:
             self._reopen()
         try:

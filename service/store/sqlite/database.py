@@ -57,7 +57,9 @@ class SqliteReading:
     def __init__(self, path: Path) -> None:
         self._begin(path)
         if not path.exists():
-            raise StoreError(f"{path}: there is no such database")
+            raise StoreError(
+                f"{path}: the database does not exist; start padwatch, which creates it"
+            )
         self.file.remember()
         uri = f"{path.absolute().as_uri()}?mode=ro"
         with self._store_errors(), closing(sqlite3.connect(uri, uri=True)) as reader:
@@ -80,7 +82,7 @@ class SqliteReading:
 
     @contextmanager
     def reading(self, unreadable: Unreadable = "strict") -> Iterator[sqlite3.Connection]:
-        """Open a read-only transaction on one consistent state, and yield its connection."""
+        """Open a read-only transaction on one consistent state; see `Database.reading`."""
         with self._store_errors(), self._readers.reading() as reader:
             if unreadable == "strict":
                 yield reader
@@ -94,7 +96,7 @@ class SqliteReading:
         return connection.execute(EVER_HAD, (table,)).fetchone() is not None
 
     def hold(self, name: str) -> FileHold:
-        """Return an exclusive lock on a name, implemented by a lock file beside the database."""
+        """Return a lock on a name, which is a lock file; its errors are as for `Database.hold`."""
         return held(self._path, name)
 
     @contextmanager
@@ -160,7 +162,15 @@ class SqliteDatabase(SqliteReading):
 
     @contextmanager
     def writing(self) -> Iterator[sqlite3.Connection]:
-        """Open a write transaction and yield its connection; count the commit after the block."""
+        """Open a write transaction and yield its connection; the end of the block commits it.
+
+        The commit also increments the commit counter, which is then written to the high-water mark.
+
+        Raises
+        ------
+        StoreError
+            If the transaction fails or the file was replaced; not if the mark cannot be written.
+        """
         with self.writer.lock, self._store_errors():
             self.file.require()
             with self.writer.transaction() as writer:

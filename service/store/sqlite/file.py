@@ -17,13 +17,7 @@ Identity = tuple[int, int]
 
 
 class OpenedFile:
-    """Identity of the database file that was opened.
-
-    Parameters
-    ----------
-    path
-        Path of the file.
-    """
+    """Identity of the database file that was opened."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -56,7 +50,7 @@ class OpenedFile:
             )
 
     def keep_logs_apart(self) -> None:
-        """Rename the WAL files of a database file that was replaced; call after `close`.
+        """Rename the WAL files of a database file that was replaced, after closing the connections.
 
         At the next start SQLite would apply these WAL files to the new database and damage it.
         """
@@ -212,6 +206,6 @@ class FileHold:
 
 
 def held(database: Path, name: str) -> FileHold:
-    """Return an exclusive lock on a name, implemented by a lock file beside the database."""
+    """Return a lock on a name, which is a lock file; its errors are as for `Database.hold`."""
     safe = re.sub(r"[^A-Za-z0-9_-]", lambda found: f"%{ord(found[0]):x}", name)
     return FileHold(database.with_name(f"{database.name}.{safe}.lock"), name)

@@ -14,7 +14,7 @@ ACCESS_ID = 0x5057_4143
 
 
 def application_id_of(origin: Origin | None) -> int:
-    """Return the ``PRAGMA application_id`` of a file; the access file has no origin."""
+    """Return the ``PRAGMA application_id`` of a file; the origin is None for the access file."""
     return ACCESS_ID if origin is None else APPLICATION_IDS[origin]
 
 

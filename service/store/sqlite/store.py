@@ -34,7 +34,7 @@ class SqliteStore(Store):
     address
         Function that returns the outbox messages about an alarm event.
     spectra
-        Limits of stored spectra.
+        Limits of stored spectra; None for the defaults of `SpectraLimits`.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def file_trail(database: Path) -> Trail:
 @contextmanager
 def _opened(database: Path) -> Iterator[sqlite3.Connection]:
     if not database.exists():
-        raise StoreError(f"{database.absolute()}: the database does not exist")
+        raise StoreError(f"{database.absolute()}: the database does not exist; check data_folder")
     uri = f"{database.absolute().as_uri()}?mode=ro"
     try:
         with closing(sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S)) as reader:

@@ -62,7 +62,7 @@ def test_a_store_to_serve_leaves_out_damaged_rows(path, execute):
 
 
 def test_a_store_to_serve_needs_a_database_and_notices_when_it_is_removed(path):
-    with pytest.raises(StoreError, match="there is no such database"):
+    with pytest.raises(StoreError, match="the database does not exist; start padwatch"):
         SqliteReader(path)
     with closing(SqliteStore(path)), closing(SqliteReader(path)) as reader:
         path.unlink()

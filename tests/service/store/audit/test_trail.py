@@ -162,7 +162,7 @@ def test_a_cut_trail_stays_noticed_after_the_service_has_gone_on(
     assert told.reason == (
         "the head file names entry 4, but the trail ends at 2"
         if with_head
-        else "the head file does not exist"
+        else f"the head file {head_path(path).name} does not exist"
     )
 
 

@@ -214,7 +214,7 @@ SPOILT: dict[str, tuple[Callable[[Path], None], str]] = {
     "damaged": (damage, "damaged|malformed"),
     "cut short": (lambda copy: os.truncate(copy, copy.stat().st_size // 2), "damaged|malformed"),
     "no database": (lambda copy: copy.write_text("x" * 9000) and None, "not a database"),
-    "gone": (lambda copy: copy.unlink(), "the file does not exist"),
+    "gone": (lambda copy: copy.unlink(), "the backup does not exist"),
 }
 
 
