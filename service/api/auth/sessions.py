@@ -82,7 +82,6 @@ class SetUpModel(RequestModel):
 
 LOGIN_PROBLEMS = problem_responses(
     403,
-    422,
     own={
         401: "The name or the password is wrong",
         429: "Too many failed logins; Retry-After gives the wait",
