@@ -11,7 +11,6 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri, stdtrit
 
 from core.arrays import FloatArray
 from core.quality import Quality, Reading
@@ -132,6 +131,8 @@ def coverage_factor(lines: Sequence[BudgetLine], confidence: float = CONFIDENCE)
 
 def _coverage_factor(parts: Sequence[tuple[float, float]], confidence: float, root: float) -> float:
     """Return the coverage factor for contributions with their degrees of freedom and root sum."""
+    from scipy.special import ndtri, stdtrit  # slow import, not needed at start
+
     fourth = sum(part**4 / freedoms for part, freedoms in parts)
     freedoms = root**4 / fourth if fourth > 0.0 else math.inf
     quantile = 0.5 + confidence / 2.0

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
-from scipy import fft
 
 from core.arrays import ComplexArray, FloatArray
 from core.checks.sensor_checks import SensorLimits
@@ -88,6 +87,8 @@ def bin_phasors(tapered_samples: FloatArray, n_lines: int) -> ComplexArray:
 
     `tapered_samples` (n_channels, n_samples) are multiplied by `taper_weights`; line 0 is bin 1.
     """
+    from scipy import fft  # slow import, not needed by a process without spectra
+
     phasors: ComplexArray = fft.rfft(tapered_samples, axis=1)[:, 1 : n_lines + 1]
     return phasors
 

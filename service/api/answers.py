@@ -206,7 +206,7 @@ class AnswerHeaders:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request; complete its answer."""
-        if scope["type"] != "http" or not scope["path"].startswith("/api/"):
+        if not scope["path"].startswith("/api/"):
             await self._app(scope, receive, send)
             return
         head: Message | None = None

@@ -1,21 +1,20 @@
 """HTTP application of the service: routers, middleware, and the OpenAPI document."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from threading import Lock
 from typing import Any
 
-from fastapi import Depends, FastAPI, Request, Response
+from fastapi import APIRouter, Depends, FastAPI, Request, Response
 
 from service.api.answers import AnswerHeaders, Answers
 from service.api.auth.accounts import account_router, key_router
-from service.api.auth.authenticator import Authenticator
 from service.api.auth.declared import Declared, declared
 from service.api.auth.gate import Gate, require_declared
 from service.api.auth.refusals import AuditTrail
 from service.api.auth.sessions import session_router
 from service.api.context import Context
-from service.api.health import health_router, metrics_router
+from service.api.health import health_router
 from service.api.openapi import describe_access, describe_answers, operation_id
 from service.api.problems import (
     EVERY_OPERATION,
@@ -54,17 +53,14 @@ class GuardedApi(FastAPI):
 
     def __init__(self, answers: Answers, **options: Any) -> None:
         super().__init__(dependencies=[Depends(require_declared)], **options)
-        self._declared: Mapping[str, Declared] = {}
+        self.declared: Mapping[str, Declared] = {}
+        """Operations with their required permissions, by method and path such as ``GET /livez``."""
         self._answers, self._describing = answers, Lock()
 
     def setup(self) -> None:
         """Add the route of the OpenAPI document, which is rendered once, not for each request."""
         if self.openapi_url:
             self.add_route(self.openapi_url, self._published, include_in_schema=False)
-
-    def add_gate(self, authenticator: Authenticator) -> None:
-        """Add the middleware `Gate`; middleware that is added later runs before it."""
-        self.add_middleware(Gate, declared=lambda: self.declared, authenticator=authenticator)
 
     def require_declarations(self) -> None:
         """Collect the declared permissions of all routes; call this after adding the last route.
@@ -74,12 +70,7 @@ class GuardedApi(FastAPI):
         UndeclaredRouteError
             If a route has no declaration.
         """
-        self._declared = declared(self)
-
-    @property
-    def declared(self) -> Mapping[str, Declared]:
-        """Operations with their required permissions, by method and path such as ``GET /livez``."""
-        return self._declared
+        self.declared = declared(self)
 
     def openapi(self) -> dict[str, Any]:
         """Return the OpenAPI document, built at the first call, after all routes were added.
@@ -105,8 +96,8 @@ Times are UTC, RFC 3339. Errors are problem documents (RFC 9457).
 """
 
 
-def create_app(context: Context) -> GuardedApi:
-    """Return the application with all routes except those of dashboard and evidence reports."""
+def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi:
+    """Return the application of the API; `others` are routers of other packages."""
     app = GuardedApi(
         context.answers,
         title="padwatch",
@@ -119,10 +110,12 @@ def create_app(context: Context) -> GuardedApi:
         generate_unique_id_function=operation_id,
     )
     app.state.clock = context.clock
+    authenticator, requests = context.access, RequestMetrics()
+    # the last one runs first
     app.add_middleware(AnswerHeaders, clock=context.clock)
-    authenticator = context.access
-    app.add_gate(authenticator)
+    app.add_middleware(Gate, declared=lambda: app.declared, authenticator=authenticator)
     app.add_middleware(AuditTrail, refusals=authenticator.refusals, clock=context.clock)
+    app.add_middleware(TimedRequests, metrics=requests)
     install_problem_handlers(app)
     for router in (
         # routes are tried in this order: first those that every open page polls
@@ -131,7 +124,7 @@ def create_app(context: Context) -> GuardedApi:
         alarm_router(context),
         bearing_router(context),
         trend_router(context),
-        health_router(context),
+        health_router(context, requests),
         plant_router(context),
         channel_router(context),
         spectra_router(context),
@@ -149,10 +142,8 @@ def create_app(context: Context) -> GuardedApi:
         session_router(authenticator),
         account_router(authenticator),
         key_router(context, authenticator),
+        *others,
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
-    if context.metrics is not None:
-        own = RequestMetrics()
-        app.include_router(metrics_router(context.metrics, own))
-        app.add_middleware(TimedRequests, metrics=own)
+    app.require_declarations()
     return app

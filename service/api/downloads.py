@@ -1,8 +1,10 @@
 """Streamed downloads with limits on concurrent downloads and on concurrent work in threads."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Generator
-from typing import TypeVar
+from collections.abc import AsyncIterator, Callable, Generator, Iterator
+from typing import Any, TypeVar
+
+from fastapi.responses import StreamingResponse
 
 SLOTS = 2
 """Maximum number of evidence reports and download pieces that are produced concurrently."""
@@ -68,3 +70,20 @@ class Downloads:
         finally:
             self._n -= 1
             pieces.close()
+
+
+def attachment(
+    pieces: AsyncIterator[bytes] | Iterator[bytes], media_type: str, name: str, **headers: str
+) -> StreamingResponse:
+    """Return a response that browsers save as a file with a name, with further headers."""
+    saved = {"Content-Disposition": f'attachment; filename="{name}"'}
+    nosniff = {"X-Content-Type-Options": "nosniff"}
+    return StreamingResponse(pieces, media_type=media_type, headers=saved | nosniff | headers)
+
+
+def file_content(
+    media_type: str, description: str, schema: Any = None, **more: Any
+) -> dict[int | str, dict[str, Any]]:
+    """Return the OpenAPI entry of a file as answer; without a `schema`, the file is binary."""
+    content = {"schema": schema or {"type": "string", "format": "binary"}, **more}
+    return {200: {"description": description, "content": {media_type: content}}}

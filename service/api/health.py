@@ -1,6 +1,5 @@
 """Routes for liveness, readiness and metrics of the service."""
 
-from collections.abc import Awaitable, Callable
 from typing import Literal
 
 from fastapi import APIRouter, Response
@@ -23,11 +22,29 @@ class HealthModel(ApiModel):
     """Result of each check in words, by name of the check."""
 
 
-def health_router(context: Context) -> APIRouter:
-    """Return the router for liveness and readiness."""
-    router = APIRouter(tags=["health"], dependencies=[OPEN])
+EXAMPLE = """\
+# HELP padwatch_link_connected This is 1 while the device of the unit is connected.
+# TYPE padwatch_link_connected gauge
+padwatch_link_connected{unit="U1"} 1.0
+"""
 
-    @router.get("/livez", summary="Liveness")
+ANSWER = {
+    "description": "Metrics in the Prometheus text format",
+    "content": {"text/plain": {"schema": {"type": "string"}, "example": EXAMPLE}},
+}
+
+
+def health_router(context: Context, requests: RequestMetrics) -> APIRouter:
+    """Return the router for liveness, readiness, and with `Context.metrics` metrics.
+
+    Parameters
+    ----------
+    requests
+        Metrics of this process, which are appended to those of measuring.
+    """
+    router = APIRouter(tags=["health"])
+
+    @router.get("/livez", summary="Liveness", dependencies=[OPEN])
     async def livez() -> HealthModel:
         """Answer 200 while the event loop runs, independent of data acquisition and disk."""
         return HealthModel(status="ok", checks={"event_loop": "turning"})
@@ -35,6 +52,7 @@ def health_router(context: Context) -> APIRouter:
     @router.get(
         "/readyz",
         summary="Readiness",
+        dependencies=[OPEN],
         responses={503: {"model": HealthModel, "description": "At least one check fails"}},
     )
     async def readyz(response: Response) -> HealthModel:
@@ -53,42 +71,20 @@ def health_router(context: Context) -> APIRouter:
         response.status_code = 200 if ready else 503
         return HealthModel(status="ok" if ready else "not ready", checks=checks)
 
-    return router
-
-
-EXAMPLE = """\
-# HELP padwatch_link_connected This is 1 while the device of the unit is connected.
-# TYPE padwatch_link_connected gauge
-padwatch_link_connected{unit="U1"} 1.0
-"""
-
-ANSWER = {
-    "description": "Metrics in the Prometheus text format",
-    "content": {"text/plain": {"schema": {"type": "string"}, "example": EXAMPLE}},
-}
-
-
-def metrics_router(look: Callable[[], Awaitable[bytes]], own: RequestMetrics) -> APIRouter:
-    """Return the router for Prometheus metrics.
-
-    Parameters
-    ----------
-    look
-        Function that returns the metrics of measuring in the Prometheus text format.
-    own
-        Metrics of this process, which are appended.
-    """
-    router = APIRouter(tags=["health"], dependencies=[needs(Permission.READ)])
+    look = context.metrics
+    if look is None:
+        return router
 
     @router.get(
         "/metrics",
         summary="Metrics for Prometheus",
+        dependencies=[needs(Permission.READ)],
         response_class=Response,
         responses={200: ANSWER},
     )
     async def metrics() -> Response:
         """Return metrics of samples, links, results, films, alarms, store, deliveries, requests."""
         headers = {"content-type": TEXT, "cache-control": "no-store"}
-        return Response(await look() + own.text, headers=headers)
+        return Response(await look() + requests.text, headers=headers)
 
     return router

@@ -8,7 +8,7 @@ from fastapi.routing import APIRoute
 from service.api.answers import EDITION_HEADER, ORIGIN_HEADER, TIME_HEADER
 from service.api.auth.authenticator import COOKIE
 from service.api.auth.declared import Declared
-from service.api.problems import problem_schemas
+from service.api.problems import WORDS, problem_schemas
 
 JSON = "application/json"
 
@@ -120,24 +120,17 @@ SCHEMES = {
 NEEDED = "x-padwatch-needs"
 """OpenAPI extension with the permission that an operation requires; null if it is open."""
 
-REFUSALS = {
-    401: "Not authenticated",
-    403: "Not allowed, or requested by a page of another site",
-}
-
 
 def describe_access(document: dict[str, Any], operations: Mapping[str, Declared]) -> None:
-    """Add security schemes and required permissions to an OpenAPI document, in place."""
+    """Add security schemes, required permissions and refusals to an OpenAPI document, in place."""
     document.setdefault("components", {})["securitySchemes"] = SCHEMES
     for path, methods in document["paths"].items():
         for method, operation in methods.items():
             one = operations[f"{method.upper()} {path}"]
             operation[NEEDED] = one.needs.permission
             operation["security"] = [] if one.is_open else [{"session": []}, {"key": []}]
-            if not one.is_open:
-                _add_refusals(operation["responses"])
-
-
-def _add_refusals(responses: dict[str, Any]) -> None:
-    for status, text in REFUSALS.items():
-        responses.setdefault(str(status), {**responses["default"], "description": text})
+            statuses = () if one.is_open else (401, 403, 503)
+            responses = operation["responses"]
+            for status in (*statuses, *((404,) if "{unit}" in path else ())):
+                words = {"description": WORDS[status]}
+                responses.setdefault(str(status), {**responses["default"], **words})

@@ -31,6 +31,7 @@ SCHEMAS = "#/components/schemas/"
 STORE_FAILS = "the store cannot be read now; try again, or see the log of the service"
 
 WORDS = {
+    401: "Not authenticated",
     403: "Not allowed, or requested by a page of another site",
     404: "Unknown unit or bearing",
     409: "Conflict with the present state",
@@ -118,6 +119,8 @@ def problem_responses(
     *statuses: int, own: Mapping[int, str] | None = None
 ) -> dict[int | str, dict[str, Any]]:
     """Return OpenAPI entries for the problems that an operation may return, by status.
+
+    `describe_access` adds 401, 403, 503, and 404 below a unit; `EVERY_OPERATION` has 422.
 
     Parameters
     ----------

@@ -48,9 +48,6 @@ class TimedRequests:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request and measure the time until its answer was sent."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
         began_s, status = self._now_s(), 0
 
         async def noting(message: Message) -> None:

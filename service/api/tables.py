@@ -14,6 +14,7 @@ from fastapi import Depends, Query, Request
 from fastapi.responses import StreamingResponse
 
 from service.api.audit_csv import harmless
+from service.api.downloads import attachment
 from service.runtime.times import rfc3339
 
 FormatName = Literal["json", "csv", "parquet"]
@@ -122,14 +123,8 @@ def table_response(
         Value of the header `CURSOR_HEADER`; None omits the header.
     """
     pieces = csv_pieces(columns) if wanted == "csv" else iter([parquet_file(columns)])
-    headers = {
-        "Content-Disposition": f'attachment; filename="{name}.{wanted}"',
-        "X-Content-Type-Options": "nosniff",
-        "Vary": "Accept",
-    }
-    if next_cursor is not None:
-        headers[CURSOR_HEADER] = next_cursor
-    return StreamingResponse(pieces, media_type=TYPE_OF[wanted], headers=headers)
+    cursor = {} if next_cursor is None else {CURSOR_HEADER: next_cursor}
+    return attachment(pieces, TYPE_OF[wanted], f"{name}.{wanted}", Vary="Accept", **cursor)
 
 
 def csv_pieces(columns: Sequence[Column]) -> Iterator[bytes]:

@@ -13,7 +13,7 @@ from core.monitor.monitor import UnitMonitor
 from service.app.health_page import Health, HealthServer
 from service.app.measuring_process import Analysis, ProcessContext, analysis_on, reporting_loops
 from service.app.notifications import router_of
-from service.app.process import Supervision, run_until_stopped, start_loops
+from service.app.process import Supervision
 from service.app.service_health import recording_error
 from service.app.storage import database_path, open_store
 from service.cluster.consumer import Consumer, add_consumer
@@ -69,23 +69,17 @@ async def run_acquire(
     publisher = Publisher(plant, settings, identities, clock)
     acquirer = Acquirer(units, live, clock, publisher.publish, publisher.publish_link, beats)
     supervision = Supervision(manager, beats, live, units, clock)
-    acquiring: list[asyncio.Task[None]] = []
 
-    def begin(tasks: asyncio.TaskGroup, _: asyncio.Event) -> list[asyncio.Task[None]]:
-        acquiring.append(tasks.create_task(acquirer.run(), name="acquire"))
-        loops = {"publish": publisher.run, "health": health.run}
-        return [*acquiring, *start_loops(loops, beats, tasks)]
-
-    async def drain() -> None:
-        for task in acquiring:
-            task.cancel()
+    async def drain(acquiring: asyncio.Task[None]) -> None:
+        acquiring.cancel()
         with suppress(TimeoutError):  # the rings of the devices may still contain the samples
             await asyncio.wait_for(publisher.waiting.drained(), DRAIN_S)
 
     health = HealthServer(_health(publisher, live, beats, list(units)), listener)
     supervision.ready()
     announce(url_of(listener))
-    await run_until_stopped(supervision, begin, drain)
+    loops = {"publish": publisher.run, "health": health.run}
+    await supervision.run_until_stopped(loops, acquirer.run, drain)
 
 
 def _health(publisher: Publisher, live: LiveView, beats: Heartbeats, units: list[str]) -> Health:
@@ -148,15 +142,10 @@ async def run_analyse(
         analysing = Analysing(plant, partition, settings, monitors, process, alarm_context)
         health = HealthServer(analysing.health(), listener)
         supervision = Supervision(manager, process.beats, live, monitors, clock)
-
-        def begin(tasks: asyncio.TaskGroup, _: asyncio.Event) -> list[asyncio.Task[None]]:
-            analyse = tasks.create_task(analysing.run(), name="analyse")
-            return [analyse, *start_loops({"health": health.run}, process.beats, tasks)]
-
         supervision.ready()
         announce(url_of(listener))
         try:
-            await run_until_stopped(supervision, begin)
+            await supervision.run_until_stopped({"health": health.run}, analysing.run)
         finally:
             await analysing.close()
 
@@ -236,12 +225,7 @@ class Analysing:
             service = [PLANT] if self._share.leads else []
             return [*self._monitors, *service, *([SHARED] if silent.is_watching else [])]
 
-        async def deliver(pulse: Pulse) -> None:
-            pulse.rest()  # each sender has its own heartbeat
-            await analysis.deliveries.run(process.beats)
-            await asyncio.Event().wait()  # without receivers the loop only waits
-
-        shared = {**analysis.shared_loops, "deliver": deliver, "silent units": silent.run}
+        shared = {**analysis.shared_loops, "silent units": silent.run}
         leadership = Leadership(store.hold, shared, process.beats, clock)
         loops = {
             "lead": leadership.run,
@@ -249,10 +233,10 @@ class Analysing:
             "stream": consumer.run,
             "watch": watch,
             **reporting_loops(analysis, held),
+            **analysis.own_loops,
         }
         async with asyncio.TaskGroup() as tasks:
-            analysis.start(tasks)
-            start_loops(loops, process.beats, tasks)
+            process.beats.start(loops, tasks)
 
     def _trouble(self) -> str | None:
         """Return the reason why the stream delivers no blocks; None while it delivers blocks."""

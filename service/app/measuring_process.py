@@ -18,7 +18,6 @@ from service.app.kept_files import (
     waveform_keeper,
 )
 from service.app.notifications import receivers_of
-from service.app.process import start_loops
 from service.app.service_health import Pressure, health_of
 from service.cluster.measuring_side import CommandWorker, Reporter, process_name
 from service.live.references import ReferencesInForce
@@ -41,7 +40,7 @@ from service.recordings.continuous_recorder import ContinuousRecorder
 from service.recordings.keeper import RecordingIndexer
 from service.reports.collector import EvidenceCollector
 from service.runtime.disk import SpaceWatch
-from service.runtime.heartbeats import Heartbeats, Loop
+from service.runtime.heartbeats import Heartbeats, Loop, Pulse
 from service.runtime.polls import TimedSource
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
@@ -75,7 +74,6 @@ class Analysis:
     """Parts of the analysis; the caller passes blocks to `analyser` and runs `recorder`."""
 
     process: ProcessContext
-    part: PlantPart
     analyser: Analyser
     recorder: Recorder
     deliveries: Deliveries
@@ -90,15 +88,6 @@ class Analysis:
     retaining: RetentionLoop
     space: SpaceWatch
     soundness: IntegrityMonitor
-
-    def start(self, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
-        """Start the background loops; they run until they are cancelled."""
-        beats, loops = self.process.beats, self.own_loops
-        if self.part != WHOLE:
-            return start_loops(loops, beats, tasks)
-        # the only process of the plant
-        begun = start_loops(loops | self.shared_loops, beats, tasks)
-        return [*begun, tasks.create_task(self.deliveries.run(beats), name="deliver")]
 
     @property
     def own_loops(self) -> dict[str, Loop]:
@@ -118,12 +107,17 @@ class Analysis:
 
     @property
     def shared_loops(self) -> dict[str, Loop]:
-        """Plant-wide loops, which only one process runs; without the delivery of messages."""
-        loops: dict[str, Loop] = {"gather": self.rolling.run}
+        """Plant-wide loops, which only one process runs."""
+        loops: dict[str, Loop] = {"gather": self.rolling.run, "deliver": self._deliver}
         if self.process.origin is Origin.LIVE:
             loops["retain"] = self.retaining.run
             loops["scrub"] = ScrubLoop(self.process.store.integrity, self.process.clock).run
         return loops
+
+    async def _deliver(self, pulse: Pulse) -> None:
+        pulse.rest()  # each sender has its own heartbeat
+        await self.deliveries.run(self.process.beats)
+        await asyncio.Event().wait()  # without receivers the loop only waits
 
     async def close(self) -> None:
         """Write all pending data; also called after an unexpected exception."""
@@ -215,7 +209,6 @@ async def analysis_on(
     await references.look()  # before the first result
     return Analysis(
         process=process,
-        part=part,
         analyser=Analyser(monitors, live, recorder, alarms, films),
         recorder=recorder,
         deliveries=deliveries,

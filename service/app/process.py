@@ -1,7 +1,7 @@
 """Supervision of the background loops of a process, and its run until a signal."""
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping
 from typing import Protocol
 
 import structlog
@@ -11,14 +11,6 @@ from service.live.status import LinkState, UnitStatus
 from service.runtime.heartbeats import Heartbeats, Loop
 from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import ServiceManager
-
-
-def start_loops(
-    loops: Mapping[str, Loop], beats: Heartbeats, tasks: asyncio.TaskGroup
-) -> list[asyncio.Task[None]]:
-    """Start each loop as a named task with a heartbeat."""
-    return [tasks.create_task(beats.tend(name, loop), name=name) for name, loop in loops.items()]
-
 
 log = structlog.get_logger()
 
@@ -31,6 +23,10 @@ class Links(Protocol):
     def status(self, unit: str) -> UnitStatus:
         """Return the link status of a unit."""
         ...
+
+
+async def _no_job() -> None:
+    """Do nothing."""
 
 
 class Supervision:
@@ -86,36 +82,36 @@ class Supervision:
         states = [self._live.status(unit).state for unit in self._units]
         return f"{states.count(LinkState.CONNECTED)} of {len(states)} units connected"
 
+    async def run_until_stopped(
+        self,
+        loops: Mapping[str, Loop],
+        job: Callable[[], Coroutine[None, None, None]] = _no_job,
+        drain: Callable[[asyncio.Task[None]], Awaitable[None]] | None = None,
+        *,
+        ends: bool = False,
+    ) -> None:
+        """Run the loops and the job of a process until SIGINT or SIGTERM.
 
-Begin = Callable[[asyncio.TaskGroup, asyncio.Event], list[asyncio.Task[None]]]
-"""Function that starts the tasks of a process; setting the event stops the process."""
-
-
-async def _nothing() -> None:
-    """Do nothing."""
-
-
-async def run_until_stopped(
-    supervision: Supervision,
-    begin: Begin,
-    drain: Callable[[], Awaitable[None]] = _nothing,
-) -> None:
-    """Run the tasks of a process until SIGINT or SIGTERM.
-
-    Parameters
-    ----------
-    begin
-        Function that starts the tasks of the process, which are cancelled at its end.
-    drain
-        Coroutine function that is called before the tasks are cancelled.
-    """
-    stopped = stop_on_signals()
-    async with asyncio.TaskGroup() as tasks:
-        begun = begin(tasks, stopped)
-        supervising = tasks.create_task(supervision.run(), name="supervise")
-        await stopped.wait()
-        supervision.stopping()
-        supervising.cancel()
-        await drain()
-        for task in begun:
-            task.cancel()
+        Parameters
+        ----------
+        job
+            Coroutine function without a heartbeat of its own; it may end before the process.
+        drain
+            Coroutine function that is called with the task of the job before all are cancelled.
+        ends
+            Whether the process stops when the job has ended.
+        """
+        stopped = stop_on_signals()
+        async with asyncio.TaskGroup() as tasks:
+            working = tasks.create_task(job(), name="run")
+            if ends:
+                working.add_done_callback(lambda _: stopped.set())
+            begun = [working, *self._beats.start(loops, tasks)]
+            supervising = tasks.create_task(self.run(), name="supervise")
+            await stopped.wait()
+            self.stopping()
+            supervising.cancel()
+            if drain is not None:
+                await drain(working)
+            for task in begun:
+                task.cancel()

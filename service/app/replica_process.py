@@ -4,15 +4,16 @@ import asyncio
 import socket
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import replace
 
 from acquisition.clock import Clock
 from service.api.auth.authenticator import Authenticator
 from service.api.context import Context
 from service.app.listener import require_protected
 from service.app.notifications import receivers_of
-from service.app.process import Supervision, run_until_stopped, start_loops
+from service.app.process import Supervision
 from service.app.service_audit import ServiceTrail
-from service.app.serving_process import references_of, serve_requests
+from service.app.serving_process import context_of, references_of, serve_requests
 from service.app.storage import open_access, open_store
 from service.app.web import access_desk
 from service.cluster.replica_metrics import replica_metrics
@@ -20,7 +21,6 @@ from service.cluster.serving_side import DatabaseOperators, Feed, ReplicaDeliver
 from service.live.client import LiveClient
 from service.runtime.heartbeats import Heartbeats, Pulse
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
-from service.settings.core_values import refresh_s
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.store import Store
@@ -59,32 +59,22 @@ class Replica:
         return said if self.live.units.is_alive(unit) else f"silent: {said}"
 
     async def _metrics(self) -> bytes:
-        bearings = {unit.id: [bearing.id for bearing in unit.bearing] for unit in self._plant.unit}
-        live, kind = self.live, self._store.kind
-        seen = (live.units, live.alarms, live.films, self.deliveries, self._clock)
-        return await replica_metrics(bearings, *seen, kind)
+        kind = self._store.kind
+        return await replica_metrics(self._plant, self.live, self.deliveries, self._clock, kind)
 
     def context(self, desk: Authenticator, beats: Heartbeats) -> Context:
         """Return the API context of this process."""
-        plant, store, live = self._plant, self._store, self.live
-        return Context(
-            plant_name=plant.plant.name,
-            units={unit.id: unit for unit in plant.unit},
-            live=live.units,
-            alarms=live.alarms,
-            films=live.films,
-            plant=lambda: live.plant,
-            operators=DatabaseOperators(store, live.alarms, self._clock),
-            references=self.references,
-            store=store,
-            clock=self._clock,
-            refresh_s=refresh_s(plant),
+        store, live = self._store, self.live
+        context = context_of(
+            *(self._plant, store, live, DatabaseOperators(store, live.alarms, self._clock)),
+            *(self.references, desk, self._clock),
+        )
+        return replace(
+            context,
             receivers=self.deliveries.look,
-            max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
             metrics=self._metrics,
             loops=beats.look,
             checks=self.checks,
-            access=desk,
         )
 
 
@@ -119,7 +109,7 @@ async def run_serve(
         context = replica.context(desk, beats)
         units = [unit.id for unit in plant.unit]
         supervision = Supervision(manager, beats, replica.live.units, units, clock)
-        ended = asyncio.Event()
+        ended, served = asyncio.Event(), asyncio.Event()
 
         async def ready(url: str, token: str | None) -> None:
             supervision.ready()
@@ -131,19 +121,14 @@ async def run_serve(
             pulse.rest()
             loops = {"feed": replica.feed.run, "references": replica.references.run}
             await serve_requests(context, plant, listener, desk, loops, ended, ready)
+            served.set()
 
-        serving: list[asyncio.Task[None]] = []
-
-        def begin(tasks: asyncio.TaskGroup, _: asyncio.Event) -> list[asyncio.Task[None]]:
-            serving.extend(start_loops({"serve": serve}, beats, tasks))
-            return serving
-
-        async def drain() -> None:
+        async def drain(_: asyncio.Task[None]) -> None:
             ended.set()
-            await asyncio.wait(serving)
+            await served.wait()
 
         try:
-            await run_until_stopped(supervision, begin, drain)
+            await supervision.run_until_stopped({"serve": serve}, drain=drain)
         finally:
             await desk.close()
             await audit.end()

@@ -1,6 +1,5 @@
 """`padwatch run` and `replay`: the measuring process, with the serving process as its child."""
 
-import asyncio
 import socket
 from collections.abc import Callable, Mapping
 from contextlib import closing
@@ -20,7 +19,7 @@ from service.app.measuring_process import (
 )
 from service.app.metrics import measuring_metrics
 from service.app.notifications import router_of
-from service.app.process import Supervision, run_until_stopped, start_loops
+from service.app.process import Supervision
 from service.app.service_audit import ServiceTrail
 from service.app.storage import database_path, open_access, open_store
 from service.app.supervisor import ServingChild, Start
@@ -136,17 +135,13 @@ async def run_service(
             if service_run.at_end is not None:
                 service_run.at_end(live)
 
-        def begin(tasks: asyncio.TaskGroup, stopped: asyncio.Event) -> list[asyncio.Task[None]]:
-            running = tasks.create_task(run(), name="run")
-            if service_run.ends:
-                running.add_done_callback(lambda _: stopped.set())
-            loops: dict[str, Loop] = {"clock": audit.watch_clock, "serve": serving.run}
-            if plant.store.postgresql is not None and origin is Origin.LIVE:  # may have replicas
-                loops |= reporting_loops(analysis, lambda: held)
-            return [running, *analysis.start(tasks), *start_loops(loops, beats, tasks)]
-
+        loops: dict[str, Loop] = {"clock": audit.watch_clock, "serve": serving.run}
+        loops |= analysis.own_loops | analysis.shared_loops
+        if plant.store.postgresql is not None and origin is Origin.LIVE:  # may have replicas
+            loops |= reporting_loops(analysis, lambda: held)
+        ends = service_run.ends
         try:
-            await run_until_stopped(supervision, begin, serving.stop)
+            await supervision.run_until_stopped(loops, run, lambda _: serving.stop(), ends=ends)
         finally:
             await analysis.close()
             await audit.end()

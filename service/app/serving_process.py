@@ -7,6 +7,7 @@ import socket
 import sys
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import closing, suppress
+from dataclasses import replace
 from functools import partial
 
 import structlog
@@ -29,6 +30,7 @@ from service.app.web import access_desk, application, server_of
 from service.dashboard.assets import compress_all
 from service.live.client import LiveClient, SocketOperators
 from service.live.exchange import MeasuringGoneError, ServingEnd, VersionError
+from service.live.operators import Operators
 from service.live.receivers import receiver_views
 from service.live.references import ReferencesInForce, UnitDescription
 from service.live.snapshot import Report
@@ -39,7 +41,6 @@ from service.runtime.listening import url_of
 from service.runtime.process import leave, run_to_its_end, set_up_logging, stop_on_signals
 from service.settings.core_values import machine_of, refresh_s
 from service.settings.plant import PlantFile
-from service.settings.storage import Origin
 from service.store.access.tables import AccessStore
 from service.store.store import Store
 
@@ -81,12 +82,8 @@ async def serve_requests(
     server = server_of(app, plant, context.origin)
     beats = Heartbeats(context.clock)
     async with asyncio.TaskGroup() as tasks:
-        running = [
-            tasks.create_task(beats.tend(name, loop), name=name) for name, loop in loops.items()
-        ]
-        serving = tasks.create_task(
-            beats.tend("serve", partial(server.run_on, listener)), name="serve"
-        )
+        running = beats.start(loops, tasks)
+        [serving] = beats.start({"serve": partial(server.run_on, listener)}, tasks)
         while not server.started:
             await asyncio.sleep(0.01)
         token = await desk.offer_set_up()
@@ -103,21 +100,12 @@ def context_of(
     plant: PlantFile,
     store: Store,
     live: LiveClient,
-    operators: SocketOperators,
+    operators: Operators,
     references: ReferencesInForce,
     desk: Authenticator,
     clock: Clock,
-    origin: Origin,
 ) -> Context:
-    """Return the API context of a serving process that a measuring process has started."""
-
-    async def metrics() -> bytes:
-        try:
-            found: bytes = await operators.exchange.ask("metrics", "[]")
-        except MeasuringGoneError as error:
-            raise ProblemError(503, "No answer", str(error)) from error
-        return found
-
+    """Return the API context that every serving process has."""
     return Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},
@@ -131,12 +119,8 @@ def context_of(
         clock=clock,
         refresh_s=refresh_s(plant),
         receivers=lambda: asyncio.to_thread(receiver_views, live.plant.receivers, store.outbox),
-        origin=origin,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
-        configuration=built_configuration(plant),
-        metrics=metrics,
         access=desk,
-        recordings=(evidence_folders(plant).captures, recordings_folder(plant)),
     )
 
 
@@ -200,7 +184,21 @@ async def serve_beside(
         references = references_of(plant, store, clock)
         await references.look()
         desk = access_desk(plant, access, clock, start.is_demo)
-        context = context_of(plant, store, live, operators, references, desk, clock, start.origin)
+
+        async def metrics() -> bytes:
+            try:
+                found: bytes = await exchange.ask("metrics", "[]")
+            except MeasuringGoneError as error:
+                raise ProblemError(503, "No answer", str(error)) from error
+            return found
+
+        context = replace(
+            context_of(plant, store, live, operators, references, desk, clock),
+            origin=start.origin,
+            configuration=built_configuration(plant),
+            metrics=metrics,
+            recordings=(evidence_folders(plant).captures, recordings_folder(plant)),
+        )
         evidence = evidence_of(plant, store, live, clock, context.downloads)
         await asyncio.wait(
             [listening, waiting := asyncio.ensure_future(informed.wait())],

@@ -6,6 +6,7 @@ import os
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import AsyncExitStack, suppress
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 
@@ -19,17 +20,16 @@ from acquisition.simulated.devices.modbus_server import ModbusServer
 from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from acquisition.simulated.devices.server import DaqServer
 from acquisition.simulated.feed import SampleFeed
-from core.machine.unit import Unit
-from core.samples.calibration import UnitCalibration
 from service.runtime.process import stop_on_signals
 from service.settings.can_values import can_daq_of
-from service.settings.core_values import calibration_of, machine_of
+from service.settings.core_values import calibration_of
 from service.settings.plant import PlantFile
 from service.settings.sources.can import CanSettings
 from service.settings.sources.devices import (
     ModbusFifoSettings,
     ModbusPolledSettings,
     ModbusRingSettings,
+    ModbusSettings,
     ModbusVectorSettings,
     SimulatedSettings,
     SourceSettings,
@@ -138,62 +138,47 @@ VECTOR_WINDOW_S = 10.0
 """Analysis window of a simulated rack, s: fifteen revolutions of a slow machine."""
 
 
-def polled_device(
-    source: ModbusPolledSettings,
-    unit: Unit,
-    calibration: UnitCalibration,
-    feed: SampleFeed,
-    *,
-    on_demand: bool,
-) -> MapDevice:
-    """Return a device whose registers contain the newest sample of a feed."""
-    rows = [channel.id for channel in unit.channels]
-    device = MapDevice(feed, source.registers, rows, calibration, unit.id)
-    device.on_demand = on_demand
-    return device
-
-
-def vector_device(
-    source: ModbusVectorSettings,
-    unit: Unit,
-    calibration: UnitCalibration,
-    feed: SampleFeed,
-    *,
-    on_demand: bool,
-) -> VectorDevice:
-    """Return a rack that computes vectors from the samples of a feed at each poll.
+def modbus_device(unit: UnitSettings, source: ModbusSettings, feed: SampleFeed) -> ModbusDevice:
+    """Return the simulated device of a Modbus source of a unit, with the samples of a feed.
 
     Raises
     ------
+    ConfigError
+        If the unit exceeds the limits of such a device.
     LookupError
-        If the unit has no speed channel.
+        If the unit of a rack has no speed channel.
     """
+    ids = [channel.id for channel in unit.channel]
+    match source:
+        case ModbusRingSettings():
+            return RingDevice(feed, unit.id, _ring_shape(unit, source))
+        case ModbusFifoSettings():
+            return FifoDevice(feed, source.fifo_layout(len(ids)), unit.id)
+        case ModbusPolledSettings():
+            return MapDevice(feed, source.registers, ids, calibration_of(unit), unit.id)
+        case ModbusVectorSettings():
+            return _rack(unit, source, feed, ids)
+
+
+def _rack(
+    unit: UnitSettings, source: ModbusVectorSettings, feed: SampleFeed, ids: list[str]
+) -> VectorDevice:
+    """Return a rack that computes vectors from the samples of a feed at each poll."""
     if unit.speed_channel is None:
         raise LookupError(f"a simulated rack of unit {unit.id} requires speed_channel")
+    calibration = calibration_of(unit)
     step_samples = max(1, round(min(source.poll_period_s, 1.0) * calibration.rate_hz))
-    window_samples = max(1, round(VECTOR_WINDOW_S * calibration.rate_hz))
-    device = VectorDevice(
+    return VectorDevice(
         feed,
         source.registers,
         source.rows,
         calibration,
-        channels=[channel.id for channel in unit.channels],
+        channels=ids,
         speed_channel=unit.speed_channel,
         unit=unit.id,
         step_samples=step_samples,
-        window_samples=max(window_samples, step_samples),
+        window_samples=max(round(VECTOR_WINDOW_S * calibration.rate_hz), step_samples),
     )
-    device.on_demand = on_demand
-    return device
-
-
-def fifo_device(
-    source: ModbusFifoSettings, unit: Unit, feed: SampleFeed, *, on_demand: bool
-) -> FifoDevice:
-    """Return a device with the samples of a feed in a FIFO queue."""
-    device = FifoDevice(feed, source.fifo_layout(len(unit.channels)), unit.id)
-    device.on_demand = on_demand
-    return device
 
 
 def modbus_server(
@@ -208,6 +193,7 @@ def modbus_server(
     patient
         Whether the clock of the device starts with the first request.
     """
+    device.on_demand = clock is None
     if source.host is not None:
         return ModbusTcpServer(device, clock, source.host, source.port, patient=patient)
     line = None if source.device in (None, "pty") else Path(source.device)
@@ -233,41 +219,26 @@ def daq_of(
     LookupError
         If the source of the unit has no device.
     """
-    source, machine = unit.source, machine_of(unit)
-    on_demand = clock is None
-    match source:
-        case ModbusRingSettings():
-            device = RingDevice(feed, unit.id, _ring_shape(unit, source))
-            device.on_demand, device.patient = on_demand, recorded
-            return modbus_server(device, source, clock, patient=recorded)
-        case ModbusFifoSettings():
-            queue = fifo_device(source, machine, feed, on_demand=on_demand)
-            return modbus_server(queue, source, clock, patient=recorded)
-        case ModbusPolledSettings():
-            registers = polled_device(
-                source, machine, calibration_of(unit), feed, on_demand=on_demand
-            )
-            return modbus_server(registers, source, clock, patient=recorded)
-        case ModbusVectorSettings():
-            rack = vector_device(source, machine, calibration_of(unit), feed, on_demand=on_demand)
-            return modbus_server(rack, source, clock, patient=recorded)
-        case CanSettings():
+    match unit.source:
+        case CanSettings() as source:
             return can_daq_of(unit, source, feed, clock, patient=recorded)
         case SimulatedSettings():
             raise LookupError(f'unit {unit.id} has source kind "simulated", which needs no DAQ')
+        case source:
+            device = modbus_device(unit, source, feed)
+            if isinstance(device, RingDevice):
+                device.patient = recorded
+            return modbus_server(device, source, clock, patient=recorded)
 
 
 def _ring_shape(unit: UnitSettings, source: ModbusRingSettings) -> RingDeviceSettings:
     """Return the ring settings of the unit's simulation; default: one block per slot."""
-    if unit.simulation is None:
-        return RingDeviceSettings(
-            base_address=source.base_address, samples_per_slot=unit.block_samples
-        )
-    return RingDeviceSettings(
-        base_address=source.base_address,
-        samples_per_slot=unit.simulation.samples_per_slot,
-        n_slots=unit.simulation.n_slots,
+    shape = RingDeviceSettings(
+        base_address=source.base_address, samples_per_slot=unit.block_samples
     )
+    if (own := unit.simulation) is None:
+        return shape
+    return replace(shape, samples_per_slot=own.samples_per_slot, n_slots=own.n_slots)
 
 
 _LOOPBACK = "127.0.0.1"

@@ -3,7 +3,6 @@
 from urllib.parse import urlsplit
 
 import structlog
-from fastapi import Depends
 from starlette.types import ASGIApp
 
 from acquisition.clock import Clock
@@ -13,7 +12,6 @@ from service.api.auth.authenticator import Authenticator
 from service.api.context import Context
 from service.api.http.middleware import TrustedProxy
 from service.api.http.server import HttpServer, http_server
-from service.api.problems import refuse_unknown_parameters
 from service.app.listener import tls_of
 from service.dashboard.assets import StaticFiles, edition
 from service.reports.routes import EvidenceService, evidence_router
@@ -76,9 +74,6 @@ def application(context: Context, evidence: EvidenceService | None = None) -> Gu
     evidence
         Service for downloads of alarm evidence; None if no evidence is stored.
     """
-    app = create_app(context)
-    guarded = [Depends(refuse_unknown_parameters)]
-    app.include_router(evidence_router(context, evidence), dependencies=guarded)
+    app = create_app(context, [evidence_router(context, evidence)])
     app.add_middleware(StaticFiles)
-    app.require_declarations()
     return app

@@ -111,10 +111,7 @@ class Leadership:
         self.is_leading = True
         try:
             async with asyncio.TaskGroup() as tasks:
-                begun = [
-                    tasks.create_task(self._beats.tend(name, loop), name=name)
-                    for name, loop in self._loops.items()
-                ]
+                begun = self._beats.start(self._loops, tasks)
                 while await asyncio.to_thread(lambda: hold.is_held):
                     pulse.beat(LOOK_EVERY_S)
                     await self._clock.sleep(LOOK_EVERY_S)

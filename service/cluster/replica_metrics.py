@@ -4,10 +4,11 @@ from prometheus_client.process_collector import ProcessCollector
 
 from acquisition.clock import Clock
 from service.cluster.serving_side import ReplicaDeliveries
-from service.live.current_state import LiveAlarms, LiveFilms, LiveUnits
-from service.live.metrics import Bearings, add_alarms, add_films, add_units
+from service.live.client import LiveClient
+from service.live.metrics import add_alarms, add_films, add_units
 from service.notifications.metrics import add_deliveries
 from service.runtime.metrics import Families
+from service.settings.plant import PlantFile
 from service.store.port import StoreError
 
 REPORTS = {
@@ -19,10 +20,8 @@ REPORTS = {
 
 
 async def replica_metrics(
-    bearings: Bearings,
-    live: LiveUnits,
-    alarms: LiveAlarms,
-    films: LiveFilms,
+    plant: PlantFile,
+    live: LiveClient,
     deliveries: ReplicaDeliveries,
     clock: Clock,
     store_kind: str,
@@ -32,16 +31,17 @@ async def replica_metrics(
         receivers = await deliveries.look()
     except StoreError:
         receivers = None
-    families = Families()
+    bearings = {unit.id: [bearing.id for bearing in unit.bearing] for unit in plant.unit}
+    families, units = Families(), live.units
     families.add_program(store_kind)
     families.declare(REPORTS)
-    families.add("reports_readable", live.read_error is None)
+    families.add("reports_readable", units.read_error is None)
     for unit in bearings:
-        families.add("unit_analysed", live.is_alive(unit), unit=unit)
-        families.add("unit_silence_seconds", live.silence_s(unit), unit=unit)
-    add_units(families, live, bearings)
-    add_films(families, live, films.newest, bearings)
-    add_alarms(families, alarms, list(bearings))
+        families.add("unit_analysed", units.is_alive(unit), unit=unit)
+        families.add("unit_silence_seconds", units.silence_s(unit), unit=unit)
+    add_units(families, units, bearings)
+    add_films(families, units, live.films.newest, bearings)
+    add_alarms(families, live.alarms, list(bearings))
     add_deliveries(families, receivers, clock.now_ns())
     families.include(ProcessCollector(registry=None))
     return families.text

@@ -153,11 +153,10 @@ class Acquirer:
 
     async def run(self) -> None:
         """Read until all sources have ended; an unexpected exception in one task ends all."""
+        units = self._units.items()
+        loops = {f"acquire {unit}": partial(self._acquire, unit, its) for unit, its in units}
         async with asyncio.TaskGroup() as sources:
-            for unit, watched in self._units.items():
-                name = f"acquire {unit}"
-                acquire = partial(self._acquire, unit, watched)
-                sources.create_task(self._beats.tend(name, acquire), name=name)
+            self._beats.start(loops, sources)
 
     async def _acquire(self, unit: str, watched: WatchedUnit, pulse: Pulse) -> None:
         """Read one unit and reconnect after each lost link, until its recording ends."""

@@ -25,15 +25,12 @@ from service.settings.sources.devices import (
     ModbusFifoSettings,
     ModbusPolledSettings,
     ModbusRingSettings,
+    ModbusSettings,
     ModbusVectorSettings,
     SimulatedSettings,
     SourceSettings,
 )
 from service.settings.units import UnitSettings
-
-ModbusSettings = (
-    ModbusRingSettings | ModbusFifoSettings | ModbusPolledSettings | ModbusVectorSettings
-)
 
 
 def polled_settings(device: MappedDeviceSettings) -> PolledSettings:

@@ -4,7 +4,7 @@ import asyncio
 import re
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 from urllib.parse import quote
 
 import structlog
@@ -16,7 +16,7 @@ from acquisition.clock import Clock
 from service.api.auth.declared import needs
 from service.api.auth.gate import identity_of
 from service.api.context import Context
-from service.api.downloads import Downloads, TooManyDownloadsError
+from service.api.downloads import Downloads, TooManyDownloadsError, attachment, file_content
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.alarms import AlarmId
 from service.api.values import ApiModel, Time
@@ -178,9 +178,8 @@ ID = re.compile(r"([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([A-Za-z0-9][A-Za-z0-9_.-]{0
 
 Number = Annotated[int, Path(ge=1, le=10**12, description="Occurrence number.", examples=[3])]
 
-LIST_PROBLEMS = problem_responses(422, 503, own={404: "Unknown alarm"})
+LIST_PROBLEMS = problem_responses(own={404: "Unknown alarm"})
 PROBLEMS = problem_responses(
-    422,
     own={
         404: "Unknown alarm or occurrence, or no evidence of it: the detail gives the reason",
         503: "The store cannot be read, or too many concurrent downloads",
@@ -254,7 +253,7 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
         "/{occurrence}/bundle.zip",
         summary="Evidence bundle as a ZIP file",
         response_class=StreamingResponse,
-        responses={**PROBLEMS, 200: _zip_content()},
+        responses=PROBLEMS | file_content("application/zip", "A ZIP file"),
     )
     async def bundle(request: Request, alarm: AlarmId, occurrence: Number) -> StreamingResponse:
         """Return a ZIP file with document, tables, report, and the samples once they are complete.
@@ -270,8 +269,7 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
         except (DamagedEvidenceError, TableError, OSError) as error:
             raise _damaged(error) from error
         name = quote(f"padwatch-{alarm.replace(':', '-')}-{occurrence}.zip")
-        headers = {"Content-Disposition": f'attachment; filename="{name}"', **SAFE}
-        return StreamingResponse(pieces, media_type="application/zip", headers=headers)
+        return attachment(pieces, "application/zip", name, **SAFE)
 
     return router
 
@@ -325,8 +323,3 @@ def _occurrence_model(found: Found) -> OccurrenceModel:
 def _damaged(error: Exception) -> ProblemError:
     log.error("evidence cannot be read", reason=str(error))
     return ProblemError(500, "Damaged", f"the evidence on the disk cannot be read: {error}")
-
-
-def _zip_content() -> dict[str, Any]:
-    schema = {"type": "string", "format": "binary"}
-    return {"description": "A ZIP file", "content": {"application/zip": {"schema": schema}}}

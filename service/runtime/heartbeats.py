@@ -1,7 +1,8 @@
 """Heartbeats of background loops, for the detection of loops that have ended or are stuck."""
 
+import asyncio
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 
 from acquisition.clock import Clock
 
@@ -73,6 +74,12 @@ class Heartbeats:
             await run(pulse)
         finally:
             pulse.end()
+
+    def start(
+        self, loops: Mapping[str, Loop], tasks: asyncio.TaskGroup
+    ) -> list[asyncio.Task[None]]:
+        """Start each loop as a named task and record its heartbeats."""
+        return [tasks.create_task(self.tend(name, loop), name=name) for name, loop in loops.items()]
 
     def release(self, *names: str) -> None:
         """Remove the loops with these names, which have finished as planned, from the record."""

@@ -169,9 +169,7 @@ AccountName = Annotated[
 ]
 
 CHANGE_PROBLEMS = problem_responses(
-    403,
     409,
-    503,
     own={
         404: "Unknown account or key",
         422: "A wrong parameter, or a name or password that is not accepted",
@@ -192,7 +190,7 @@ def account_router(authenticator: Authenticator) -> APIRouter:
             raise ProblemError(404, "Unknown account", "the account does not exist")
         return account_model(found)
 
-    @router.get("", summary="Accounts", responses=problem_responses(503))
+    @router.get("", summary="Accounts")
     async def accounts() -> list[AccountModel]:
         """List all accounts, sorted by name."""
         return [account_model(account) for account in await authenticator.work.run(stored.all)]
@@ -260,7 +258,7 @@ def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
     router = subject_router("/keys", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
     router.dependencies.append(Depends(name_caller))
 
-    @router.get("", summary="Keys", responses=problem_responses(503))
+    @router.get("", summary="Keys")
     async def keys() -> list[KeyModel]:
         """List all API keys, also expired and revoked keys, oldest first, without their secrets."""
         keys, now_ns = await authenticator.work.run(stored.all), clock.now_ns()

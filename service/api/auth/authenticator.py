@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum, auto
 from typing import TypeVar
 
 from starlette.datastructures import Headers
@@ -26,32 +25,20 @@ PLAIN_COOKIE = "padwatch"
 BEARER = "bearer"
 
 
-class Kind(Enum):
-    """Kind of the credentials in a request."""
-
-    NOTHING = auto()
-    SESSION = auto()
-    KEY = auto()
-
-    WRONG = auto()
-    """Ambiguous credentials, such as two cookies."""
-
-
 @dataclass(frozen=True)
 class Credentials:
-    """Credentials of a request: session token or API key, not yet checked.
+    """Credentials of a request, not yet checked.
 
     Parameters
     ----------
+    means
+        Session or API key; None without credentials.
     secret
-        Session token or API key; empty for other kinds.
+        Session token or API key; empty if it is ambiguous, as with two cookies.
     """
 
-    kind: Kind
+    means: Means | None = None
     secret: str = field(default="", repr=False)
-
-
-NOTHING, WRONG = Credentials(Kind.NOTHING), Credentials(Kind.WRONG)
 
 
 def credentials_of(scope: Scope) -> Credentials:
@@ -63,13 +50,13 @@ def credentials_of(scope: Scope) -> Credentials:
     pairs = [value.partition(" ") for value in headers.getlist("authorization")]
     keys = [key.strip() for scheme, _, key in pairs if scheme.lower() == BEARER]
     if keys:
-        return Credentials(Kind.KEY, keys[0]) if len(keys) == 1 else WRONG
+        return Credentials(Means.KEY, keys[0] if len(keys) == 1 else "")
     cookies = _cookies(headers, COOKIE)
     if not cookies and scope["scheme"] == "http":
         cookies = _cookies(headers, PLAIN_COOKIE)
-    if len(cookies) > 1:
-        return WRONG
-    return Credentials(Kind.SESSION, cookies[0]) if cookies else NOTHING
+    if not cookies:
+        return Credentials()
+    return Credentials(Means.SESSION, cookies[0] if len(cookies) == 1 else "")
 
 
 def _cookies(headers: Headers, wanted: str) -> list[str]:
@@ -190,8 +177,7 @@ class Authenticator:
         local_role = self.local_role if is_from_here(scope) else None
         shown = credentials_of(scope)
         identity = await self._proven(shown)
-        is_anonymous = identity is None and shown.kind in (Kind.NOTHING, Kind.SESSION)
-        if is_anonymous and local_role is not None:
+        if identity is None and local_role is not None and shown.means is not Means.KEY:
             identity = Identity(LOCAL, local_role, Means.LOCAL)
         return Caller(identity, shown, must_log_in=local_role is None)
 
@@ -267,11 +253,11 @@ class Authenticator:
         self.work.close()
 
     async def _proven(self, shown: Credentials) -> Identity | None:
-        if shown.kind not in (Kind.SESSION, Kind.KEY):
+        if not shown.secret:
             return None
         if (cached := self._cache.get(shown.secret)) is not None:
             return cached
-        check = self.service.machine if shown.kind is Kind.KEY else self.service.person
+        check = self.service.machine if shown.means is Means.KEY else self.service.person
         now_ns, generation = self.clock.now_ns(), self._cache.generation
         identity = await self.work.run(lambda: check(shown.secret, now_ns))
         if identity is not None:

@@ -8,6 +8,8 @@ from threading import Lock
 
 NS_PER_S = 1_000_000_000
 MAX_REMEMBERED = 4096
+"""Maximum number of accounts, and of addresses, whose failures are stored."""
+
 IPV6_NETWORK_BITS = 64
 """Length of the IPv6 address prefix that counts as one client, bits."""
 
@@ -50,26 +52,13 @@ class Backoff:
 
     If an account has logged in from an address since the service started, failures at other
     addresses do not delay its next login from this address.
-
-    Parameters
-    ----------
-    of_account, of_peer
-        Rules for the failures of an account, and of a client address.
-    max_remembered
-        Maximum number of accounts, and of addresses, whose failures are stored.
     """
 
-    def __init__(
-        self,
-        of_account: WaitRule = ACCOUNT_RULE,
-        of_peer: WaitRule = PEER_RULE,
-        max_remembered: int = MAX_REMEMBERED,
-    ) -> None:
+    def __init__(self) -> None:
         self._lock = Lock()
-        self._accounts = FailureCounts(of_account, max_remembered)
-        self._peers = FailureCounts(of_peer, max_remembered)
+        self._accounts = FailureCounts(ACCOUNT_RULE, MAX_REMEMBERED)
+        self._peers = FailureCounts(PEER_RULE, MAX_REMEMBERED)
         self._known: OrderedDict[tuple[str, str], None] = OrderedDict()
-        self._max_remembered = max_remembered
 
     def attempt(self, name: str, peer: str, now_ns: int) -> float:
         """Return the time until a login may be attempted, s; if it is 0, count the attempt.
@@ -106,7 +95,7 @@ class Backoff:
             self._peers.subtract(place)
             self._known[name, place] = None
             self._known.move_to_end((name, place))
-            if len(self._known) > self._max_remembered:
+            if len(self._known) > MAX_REMEMBERED:
                 self._known.popitem(last=False)
 
 

@@ -108,10 +108,14 @@ def declared(app: FastAPI) -> Mapping[str, Declared]:
         If a route has no declaration, or an operation occurs twice.
     """
     found: dict[str, Declared] = {}
-    for one in _all(app):
-        if one.operation in found:
-            raise UndeclaredRouteError(f"{one.operation}: the operation occurs twice; remove one")
-        found[one.operation] = one
+    for context in iter_route_contexts(app.routes):
+        route, path = context.original_route, str(context.path)
+        for method in sorted(context.methods or ()) or ("?",):
+            one = Declared(method, path, route, _needs_of(app, f"{method} {path}", context))
+            if one.operation in found:
+                detail = "the operation occurs twice; remove one"
+                raise UndeclaredRouteError(f"{one.operation}: {detail}")
+            found[one.operation] = one
     return found
 
 
@@ -126,24 +130,14 @@ def allowed_methods(operations: Iterable[Declared], path: str) -> list[str]:
     return sorted({each.method for each in fitting if each.path.count("{") == n_parameters})
 
 
-def _all(app: FastAPI) -> Iterator[Declared]:
-    for context in iter_route_contexts(app.routes):
-        route = context.original_route
-        path = str(context.path)
-        for method in sorted(context.methods or ()) or ("?",):
-            yield Declared(method, path, route, _needs_of(app, method, path, context, route))
-
-
-def _needs_of(app: FastAPI, method: str, path: str, context: Any, route: BaseRoute) -> Needs:
-    if isinstance(route, Route) and not isinstance(route, APIRoute) and path == app.openapi_url:
+def _needs_of(app: FastAPI, operation: str, context: Any) -> Needs:
+    if isinstance(context.original_route, APIRoute):
+        found = [each.dependency for each in context.dependencies]
+        if declarations := [each for each in found if isinstance(each, Needs)]:
+            return declarations[-1]
+    elif isinstance(context.original_route, Route) and context.path == app.openapi_url:
         return Needs(None, Reach.NO_UNIT)
-    dependencies = context.dependencies if isinstance(route, APIRoute) else []
-    found = [each.dependency for each in dependencies if isinstance(each.dependency, Needs)]
-    if not found:
-        raise UndeclaredRouteError(
-            f"{method} {path}: route without declaration; add needs(...) or OPEN"
-        )
-    return found[-1]
+    raise UndeclaredRouteError(f"{operation}: route without declaration; add needs(...) or OPEN")
 
 
 def _query_names(dependant: Dependant) -> Iterator[str]:

@@ -7,12 +7,12 @@ from fastapi import Request
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from service.api.auth.authenticator import Authenticator, Caller, Kind
+from service.api.auth.authenticator import Authenticator, Caller
 from service.api.auth.declared import Declared, Reach
 from service.api.auth.refusals import SAFE
 from service.api.problems import STORE_FAILS, ProblemError, problem_answer
 from service.store.access.audit_entries import acting, name_actor
-from service.store.access.identities import LOCAL, Identity
+from service.store.access.identities import LOCAL, Identity, Means
 from service.store.port import StoreError
 
 OWN_SITES = ("same-origin", "none")
@@ -89,9 +89,6 @@ class Gate:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request with its caller in the state; answer 401, 403 or 503 if refused."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
         try:
             await self._admit(scope)
         except ProblemError as error:
@@ -120,9 +117,9 @@ class Gate:
 
 def _require_own_page(scope: Scope, caller: Caller) -> None:
     """Raise a problem of status 403 if a page of another origin requests a change."""
-    if scope["method"] in SAFE or caller.shown.kind is Kind.KEY:
+    if scope["method"] in SAFE or caller.shown.means is Means.KEY:
         return
-    if is_foreign(scope, requires_origin=caller.shown.kind is not Kind.NOTHING):
+    if is_foreign(scope, requires_origin=caller.shown.means is not None):
         detail = "requests from pages of other sites are rejected"
         raise ProblemError(403, "Cross-site request", detail)
 

@@ -52,23 +52,22 @@ class Refusals:
             return
         n_before, self.n_more = self.n_more, 0
         after = {"status": status} | ({"n_refused_more": n_before} if n_before else {})
-        entry = AuditAction(**{**vars(deed), "after": after})
-        try:
-            await asyncio.to_thread(self._audit.record, [entry])
-        except StoreError as error:
+        if not await self._record(AuditAction(**{**vars(deed), "after": after})):
             self.n_more += n_before + 1
-            log.error("refused request not recorded; the next entry counts it", reason=str(error))
 
     async def close(self) -> None:
         """Record the number of refused requests without an entry, if any; log a StoreError."""
-        if not self.n_more:
-            return
-        now_ns, after = self._clock.now_ns(), {"n_refused_more": self.n_more}
-        entry = AuditAction(now_ns, "padwatch", REQUEST_REFUSED, "", after=after)
+        if self.n_more:
+            now_ns, after = self._clock.now_ns(), {"n_refused_more": self.n_more}
+            await self._record(AuditAction(now_ns, "padwatch", REQUEST_REFUSED, "", after=after))
+
+    async def _record(self, entry: AuditAction) -> bool:
         try:
             await asyncio.to_thread(self._audit.record, [entry])
         except StoreError as error:
-            log.error("the last refused requests are not in the audit trail", reason=str(error))
+            log.error("refused request not recorded; the next entry counts it", reason=str(error))
+            return False
+        return True
 
 
 REFUSED = (401, 403, 409, 413, 422, 429)
@@ -82,9 +81,6 @@ class AuditTrail:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request; record it if it would change state and is refused."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
         client, status = scope.get("client"), 0
         state = scope.setdefault("state", {})
 

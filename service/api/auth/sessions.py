@@ -12,7 +12,6 @@ from service.api.auth.authenticator import (
     PLAIN_COOKIE,
     Authenticator,
     Caller,
-    Kind,
 )
 from service.api.auth.declared import OPEN, Reach, needs
 from service.api.auth.gate import BEARER_ONLY, caller_of, identity_of
@@ -82,7 +81,6 @@ class SetUpModel(RequestModel):
 
 LOGIN_PROBLEMS = problem_responses(
     403,
-    422,
     own={
         401: "The name or the password is wrong",
         429: "Too many failed logins; Retry-After gives the wait",
@@ -122,7 +120,7 @@ def session_router(authenticator: Authenticator) -> APIRouter:
         with refusals_as_problems():
             found = await authenticator.log_in(asked.name, asked.password, _peer(request))
         logged_in, shown = _logged_in(found), caller_of(request).shown
-        if shown.kind is Kind.SESSION:
+        if shown.means is Means.SESSION:
             await authenticator.log_out(shown.secret, is_replaced=True)
         return await _begun(authenticator, request, response, logged_in)
 
@@ -130,7 +128,7 @@ def session_router(authenticator: Authenticator) -> APIRouter:
     async def log_out(request: Request, response: Response) -> None:
         """Log out: end the session of the browser, if any, and delete the session cookie."""
         shown = caller_of(request).shown
-        if shown.kind is Kind.SESSION:
+        if shown.means is Means.SESSION:
             await authenticator.log_out(shown.secret)
         response.delete_cookie(COOKIE, secure=True, httponly=True, samesite="strict")
         response.delete_cookie(PLAIN_COOKIE, httponly=True, samesite="strict")

@@ -59,9 +59,8 @@ class TrustedProxy:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request with the client and scheme reported by the proxy."""
-        if scope["type"] == "http":
-            scope["client"] = _client(_last(scope, FOR))
-            scope["scheme"] = "https" if _last(scope, PROTO).lower() == "https" else "http"
+        scope["client"] = _client(_last(scope, FOR))
+        scope["scheme"] = "https" if _last(scope, PROTO).lower() == "https" else "http"
         await self._app(scope, receive, send)
 
 

@@ -158,7 +158,7 @@ def alarm_rate_router(context: Context) -> APIRouter:
     router = subject_router("/alarms", "alarms", reach=Reach.ASKED)
     engine, films = context.alarms, context.films
 
-    @router.get("/rates", summary="Alarm rates", responses=problem_responses(404, 422, 503))
+    @router.get("/rates", summary="Alarm rates", responses=problem_responses(404))
     async def rates(
         unit: OnlyUnit = None,
         start: Annotated[Moment | None, time_query(*START)] = None,

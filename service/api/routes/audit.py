@@ -11,7 +11,6 @@ from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import Context
 from service.api.parameters import OptionalTimeRange, only
-from service.api.problems import problem_responses
 from service.api.tables import Column, Format, table_content, table_response
 from service.api.values import ApiModel, Time
 from service.store.access.audit_entries import MAX_NAME, AuditEntry
@@ -149,7 +148,7 @@ def audit_router(context: Context) -> APIRouter:
         "",
         summary="Audit trail",
         response_model=AuditModel,
-        responses={**problem_responses(422, 503), **table_content("Audit trail")},
+        responses=table_content("Audit trail"),
     )
     async def audit(
         query: Annotated[AuditQuery, Depends(audit_query)],

@@ -1,7 +1,7 @@
 """Routes for the stiffness baselines of a bearing, and for changes of baselines by engineers."""
 
 import asyncio
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from fastapi import APIRouter, Path, Response
@@ -13,6 +13,7 @@ from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.auth.gate import actor_or
 from service.api.context import BearingId, Context, UnitId
+from service.api.downloads import file_content
 from service.api.parameters import ns_from_datetime
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.baseline_models import (
@@ -144,12 +145,7 @@ def _bounds(
 
 Version = Annotated[int, Path(ge=1, le=10**15, description="Version of a baseline.", examples=[3])]
 
-READING_PROBLEMS = problem_responses(404, 422, 503)
-
 ACTION_PROBLEMS = problem_responses(
-    403,
-    422,
-    503,
     own={
         404: "Unknown unit, bearing or version",
         409: "Conflict with the present baselines, or the film is not monitored",
@@ -158,40 +154,25 @@ ACTION_PROBLEMS = problem_responses(
 
 PATH = "/units/{unit}/bearings/{bearing}/baselines"
 
-EXPORTED: dict[int | str, dict[str, Any]] = {
-    200: {
-        "description": "The baseline as a document.",
-        "content": {
-            "application/json": {
-                "schema": {"type": "object"},
-                "example": {"format": BASELINE, "format_version": FORMAT_VERSION, "content": {}},
-            }
-        },
-    }
-}
+EXPORTED = file_content(
+    "application/json",
+    "The baseline as a document.",
+    {"type": "object"},
+    example={"format": BASELINE, "format_version": FORMAT_VERSION, "content": {}},
+)
 
 
 def baseline_router(context: Context) -> APIRouter:
     """Return the router that reads baselines."""
     router = subject_router(PATH, "baselines")
 
-    @router.get(
-        "",
-        summary="Baselines of a bearing",
-        response_model=BaselinesModel,
-        responses=problem_responses(404, 503),
-    )
+    @router.get("", summary="Baselines of a bearing", response_model=BaselinesModel)
     async def baselines(unit: UnitId, bearing: BearingId) -> Response:
         """Return all baseline versions of a bearing, their history, and progress of learning."""
         context.bearing(unit, bearing)
         return await rendered(lambda: _baselines(context, unit, bearing))
 
-    @router.get(
-        "/{version}",
-        summary="One baseline",
-        response_model=BaselineModel,
-        responses=READING_PROBLEMS,
-    )
+    @router.get("/{version}", summary="One baseline", response_model=BaselineModel)
     async def one_baseline(unit: UnitId, bearing: BearingId, version: Version) -> Response:
         """Return the cells of a baseline with their bounds, stiffness and scatter."""
         context.bearing(unit, bearing)
@@ -200,7 +181,7 @@ def baseline_router(context: Context) -> APIRouter:
     @router.get(
         "/{version}/export",
         summary="A baseline as a document",
-        responses={**READING_PROBLEMS, **EXPORTED},
+        responses=EXPORTED,
         response_class=Response,
     )
     async def export(unit: UnitId, bearing: BearingId, version: Version) -> Response:

@@ -313,7 +313,7 @@ def channel_router(context: Context) -> APIRouter:
     """Return the router for channels."""
     router = subject_router("/units/{unit}", "plant")
 
-    @router.get("/channels", summary="Channels", responses=problem_responses(404))
+    @router.get("/channels", summary="Channels")
     async def channels(unit: UnitId) -> ChannelsModel:
         """List settings and state of every waveform channel and slow channel of a unit.
 
@@ -324,7 +324,7 @@ def channel_router(context: Context) -> APIRouter:
     @router.get(
         "/waveform",
         summary="Waveform",
-        responses=problem_responses(404, 422, own=NO_SAMPLES),
+        responses=problem_responses(own=NO_SAMPLES),
         response_model=WaveformModel,
     )
     async def waveform(

@@ -242,7 +242,7 @@ MAX_READ = 120_000
 """Maximum number of readings that one request reads: two years of readings every ten minutes."""
 
 
-READING_PROBLEMS = problem_responses(404, 422, 503, own={409: "The film is not watched"})
+READING_PROBLEMS = problem_responses(own={409: "The film is not watched"})
 
 
 def film_history_router(context: Context) -> APIRouter:

@@ -217,7 +217,6 @@ MAX_SECONDS = 600.0
 
 RECORDING_PROBLEMS = problem_responses(
     410,
-    422,
     own={
         404: "Unknown recording or bearing",
         409: "The recording has no samples of the bearing, or none at that time",
@@ -233,7 +232,7 @@ def motion_router(context: Context) -> APIRouter:
         "/{bearing}/orbit",
         summary="Orbit",
         response_model=OrbitModel,
-        responses=problem_responses(404, 409),
+        responses=problem_responses(409),
     )
     async def orbit(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the orbit of the shaft relative to the bearing in the newest turns."""
@@ -251,7 +250,7 @@ def motion_router(context: Context) -> APIRouter:
     @router.get(
         "/{bearing}/motion",
         summary="Motion of the shaft",
-        responses=problem_responses(404, 422, own=NO_SAMPLES),
+        responses=problem_responses(own=NO_SAMPLES),
         response_model=MotionModel,
     )
     async def motion(

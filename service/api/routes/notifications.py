@@ -8,7 +8,6 @@ from pydantic import Field
 from service.api.answers import rendered
 from service.api.auth.declared import Reach, subject_router
 from service.api.context import Context
-from service.api.problems import problem_responses
 from service.api.values import ApiModel, Time
 from service.live.receivers import ReceiverView, SenderStatus
 from service.settings.notifications import ChannelKind
@@ -104,12 +103,7 @@ def delivery_router(context: Context) -> APIRouter:
     """Return the router for the delivery of alarm messages."""
     router = subject_router("", "alarms", reach=Reach.NO_UNIT)
 
-    @router.get(
-        "/delivery",
-        summary="Receivers of alarm messages",
-        response_model=DeliveryModel,
-        responses=problem_responses(503),
-    )
+    @router.get("/delivery", summary="Receivers of alarm messages", response_model=DeliveryModel)
     async def delivery() -> Response:
         """List the receivers of alarm messages with their waiting and failed messages."""
         receivers = [_receiver(view) for view in await context.receivers()]

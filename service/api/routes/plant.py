@@ -12,6 +12,7 @@ from core.samples.gaps import Gap
 from core.units import ns_from_s
 from service.api.auth.declared import Reach, needs, subject_router
 from service.api.context import Context, UnitId
+from service.api.downloads import file_content
 from service.api.parameters import TimeRange
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, Time
@@ -231,6 +232,8 @@ SCHEMA = "/api/v1/configuration/schema"
 
 SCHEMA_TYPE = "application/schema+json"
 
+SCHEMA_OF_SCHEMA = {"type": "object", "examples": [{"title": "PlantFile", "type": "object"}]}
+
 
 def plant_router(context: Context) -> APIRouter:
     """Return the router for units, sources, gaps, quantities and the configuration."""
@@ -241,7 +244,7 @@ def plant_router(context: Context) -> APIRouter:
         """List all units with the state of their sources."""
         return [_unit(context, unit) for unit in context.units]
 
-    @router.get("/units/{unit}", summary="One unit", responses=problem_responses(404))
+    @router.get("/units/{unit}", summary="One unit")
     async def one_unit(unit: UnitId) -> UnitModel:
         """Return a unit with the state of its source."""
         return _unit(context, context.unit(unit).id)
@@ -260,7 +263,7 @@ def plant_router(context: Context) -> APIRouter:
         """List sources with link state, failed connections, counts of samples, and device clock."""
         return [_health(context, unit) for unit in context.units.values()]
 
-    @router.get("/units/{unit}/gaps", summary="Gaps", responses=problem_responses(404, 422, 503))
+    @router.get("/units/{unit}/gaps", summary="Gaps")
     async def gaps(unit: UnitId, times: TimeRange) -> list[GapModel]:
         """List gaps that end in the time range, oldest first, including stops of the service."""
         found = await asyncio.to_thread(context.store.gaps, context.unit(unit).id, *times)
@@ -294,7 +297,7 @@ def plant_router(context: Context) -> APIRouter:
         dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
         summary="JSON schema of plant files",
         response_class=Response,
-        responses={200: _schema_content()},
+        responses=file_content(SCHEMA_TYPE, "A JSON schema", SCHEMA_OF_SCHEMA),
     )
     async def schema() -> Response:
         """Return meaning, limits and default of every key of a plant file as a JSON schema."""
@@ -330,8 +333,3 @@ def _gap_model(gap: Gap, rate_hz: float) -> GapModel:
     if start_ns is None:
         start_ns = gap.stop_ns - ns_from_s(gap.n_samples / rate_hz)
     return GapModel.of(gap, start=start_ns, end=gap.stop_ns)
-
-
-def _schema_content() -> dict[str, Any]:
-    schema = {"type": "object", "examples": [{"title": "PlantFile", "type": "object"}]}
-    return {"description": "A JSON schema", "content": {SCHEMA_TYPE: {"schema": schema}}}

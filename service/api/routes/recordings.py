@@ -1,7 +1,7 @@
 """Routes for recordings of samples: list, description and download of recordings."""
 
 from collections.abc import Callable, Generator
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import structlog
 from fastapi import APIRouter, Path, Query, Response
@@ -12,7 +12,7 @@ from acquisition.errors import ConfigError
 from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import Context
-from service.api.downloads import TooManyDownloadsError
+from service.api.downloads import TooManyDownloadsError, attachment, file_content
 from service.api.parameters import only
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.channels import UNITS, ChannelUnit
@@ -219,10 +219,10 @@ RecordingId = Annotated[
     ),
 ]
 
-LIST_PROBLEMS = problem_responses(422, own={404: "This process has no recordings"})
+LIST_PROBLEMS = problem_responses(own={404: "This process has no recordings"})
 
 PROBLEMS = problem_responses(
-    410, 422, own={404: "Unknown recording", 503: "Too many concurrent downloads"}
+    410, own={404: "Unknown recording", 503: "Too many concurrent downloads"}
 )
 
 Pieces = Generator[bytes, None, None]
@@ -274,7 +274,7 @@ def recording_router(context: Context) -> APIRouter:
         "/{recording}/files.zip",
         summary="The files of a recording",
         response_class=StreamingResponse,
-        responses={**PROBLEMS, 200: _content("application/zip", "A ZIP file")},
+        responses=PROBLEMS | file_content("application/zip", "A ZIP file"),
     )
     async def files(recording: RecordingId) -> StreamingResponse:
         """Return the files of a recording as a ZIP file.
@@ -289,7 +289,7 @@ def recording_router(context: Context) -> APIRouter:
         "/{recording}/samples.csv",
         summary="The samples of a recording",
         response_class=StreamingResponse,
-        responses={**PROBLEMS, 200: _content("text/csv", "A CSV file")},
+        responses=PROBLEMS | file_content("text/csv", "A CSV file"),
     )
     async def samples(recording: RecordingId) -> StreamingResponse:
         """Return the samples as CSV, one row per sample, in the engineering units of the headings.
@@ -313,11 +313,7 @@ async def _download(
         raise ProblemError(503, "Busy", f"{error}; try again later") from error
     except (ConfigError, OSError) as error:
         raise damaged_recording(recording, error) from error
-    headers = {
-        "Content-Disposition": f'attachment; filename="{recording}.{suffix}"',
-        "X-Content-Type-Options": "nosniff",
-    }
-    return StreamingResponse(pieces, media_type=media_type, headers=headers)
+    return attachment(pieces, media_type, f"{recording}.{suffix}")
 
 
 def library_of(context: Context) -> RecordingLibrary:
@@ -343,8 +339,3 @@ def damaged_recording(recording: str, error: Exception) -> ProblemError:
     log.error("a recording cannot be read", recording=recording, reason=str(error))
     words = f"recording {recording} is damaged on the disk and cannot be read"
     return ProblemError(410, "Damaged", words)
-
-
-def _content(media_type: str, words: str) -> dict[str, Any]:
-    schema = {"type": "string", "format": "binary"}
-    return {"description": words, "content": {media_type: {"schema": schema}}}

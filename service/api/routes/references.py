@@ -90,17 +90,14 @@ def set_reference_model(reference: GapReference) -> SetReferenceModel:
     return SetReferenceModel.of(reference, note=reference.note or None)
 
 
-TAKE_PROBLEMS = problem_responses(
-    403, 404, 422, 503, own={409: "The present condition does not permit a reference"}
-)
+TAKE_PROBLEMS = problem_responses(own={409: "The present condition does not permit a reference"})
 
 
 def reference_router(context: Context) -> APIRouter:
     """Return the router for gap references and 1× reference vectors."""
     router = subject_router("/units/{unit}/bearings/{bearing}", "bearing")
-    reading = problem_responses(404, 503)
 
-    @router.get("/references", summary="References", responses=reading)
+    @router.get("/references", summary="References")
     async def references(unit: UnitId, bearing: BearingId) -> list[SetReferenceModel]:
         """List the stored gap references of a bearing, newest first, at most 1000.
 
@@ -111,9 +108,7 @@ def reference_router(context: Context) -> APIRouter:
         history = await asyncio.to_thread(context.store.reference_history, unit, bearing)
         return [set_reference_model(reference) for reference in history]
 
-    @router.get(
-        "/order1-references", summary="References of 1×", responses=reading, name="references"
-    )
+    @router.get("/order1-references", summary="References of 1×", name="references")
     async def order1_references(unit: UnitId, bearing: BearingId) -> list[Order1ReferenceModel]:
         """List the stored 1× references of a bearing, newest first, at most 1000.
 

@@ -191,7 +191,7 @@ def spectra_router(context: Context) -> APIRouter:
         "/{bearing}/spectrum",
         summary="Spectra",
         response_model=SpectrumModel,
-        responses=problem_responses(404, 409),
+        responses=problem_responses(409),
     )
     async def spectrum(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the averaged amplitude spectra of the newest result, all as displacement."""
@@ -205,12 +205,7 @@ def spectra_router(context: Context) -> APIRouter:
 
         return await context.answers.of(request, context.live.revision(unit), make)
 
-    @router.get(
-        "/{bearing}/spectra",
-        summary="Spectra over time",
-        response_model=SpectraModel,
-        responses=problem_responses(404, 422, 503),
-    )
+    @router.get("/{bearing}/spectra", summary="Spectra over time", response_model=SpectraModel)
     async def spectra(
         request: Request,
         unit: UnitId,

@@ -300,12 +300,10 @@ class SimulatedSettings(Settings):
     """Kind of the source, always "simulated"."""
 
 
+ModbusSettings = (
+    ModbusRingSettings | ModbusFifoSettings | ModbusPolledSettings | ModbusVectorSettings
+)
+
 SourceSettings = Annotated[
-    ModbusRingSettings
-    | ModbusFifoSettings
-    | ModbusPolledSettings
-    | ModbusVectorSettings
-    | CanSettings
-    | SimulatedSettings,
-    Field(discriminator="kind"),
+    ModbusSettings | CanSettings | SimulatedSettings, Field(discriminator="kind")
 ]

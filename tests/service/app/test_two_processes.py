@@ -12,7 +12,7 @@ MEASURING = [
 ]
 SERVING = ["service.app.serving_process", "service.app.replica_process"]
 HTTP = ["fastapi", "starlette", "uvicorn", "jinja2", "matplotlib", "service.api"]
-ANALYSIS = ["service.measuring", "core.monitor.monitor", "core.stiffness.dynamic"]
+ANALYSIS = ["service.measuring", "core.monitor.monitor", "core.stiffness.dynamic", "scipy"]
 
 
 @pytest.mark.parametrize(

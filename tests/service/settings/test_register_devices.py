@@ -15,7 +15,7 @@ from core.machine.unit import Unit
 from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
-from service.app.simulated_daq import fifo_device, modbus_server, polled_device, vector_device
+from service.app.simulated_daq import modbus_device, modbus_server
 from service.cli.offline.probing import link_settings_of
 from service.measuring.simulated_sources import simulated_feed
 from service.measuring.sources import (
@@ -85,7 +85,7 @@ async def test_a_rack_agrees_with_the_waveforms(settings, unit, stepped_clock):
     given |= {"n_polls": 60, "hop_polls": 60, "timeout_s": 5.0, "host": "127.0.0.1"}
     plan = ModbusVectorSettings.model_validate(given)
     feed = simulated_feed(settings, stepped_clock)
-    device = vector_device(plan, unit, calibration_of(settings), feed, on_demand=True)
+    device = modbus_device(settings, plan, feed)
     device.produce(12)
     found = {}
     async with served(device) as endpoint:
@@ -111,7 +111,7 @@ async def test_queues_bring_the_very_counts(settings, unit, stepped_clock):
     plan = ModbusFifoSettings(kind="modbus_fifo", host="127.0.0.1", addresses=(7,), timeout_s=5.0)
     feed = simulated_feed(settings, stepped_clock)
     blocks: list[SampleBlock] = []
-    async with served(fifo_device(plan, unit, feed, on_demand=True)) as endpoint:
+    async with served(modbus_device(settings, plan, feed)) as endpoint:
         source = modbus_source(
             plan.model_copy(update=endpoint), unit, calibration_of(settings), stepped_clock
         )
@@ -131,7 +131,7 @@ async def test_polled_registers_show_the_newest_sample(settings, unit, stepped_c
     plan = ModbusPolledSettings.model_validate(given | {"map": {"value": values}})
     clock, calibration = stepped_clock, calibration_of(settings)
     feed = simulated_feed(settings, clock)
-    device = polled_device(plan, unit, calibration, feed, on_demand=True)
+    device = modbus_device(settings, plan, feed)
     async with served(device) as endpoint:
         source = modbus_source(plan.model_copy(update=endpoint), unit, calibration, clock)
         async with source.connect() as stream:

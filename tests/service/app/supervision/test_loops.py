@@ -171,7 +171,6 @@ NOT_LOOPS = {
     "announce",  # ends by itself once the server answers
     "supervise",  # whoever listens to all others; the watchdog listens to it
     "the service",
-    "deliver",  # one loop for each receiver, of which this plant has none
 }
 
 
