@@ -206,7 +206,10 @@ class RetentionStore(Tables):
         return found
 
     def delete(self, series: int, ages: Ages, now_ns: int) -> bool:
-        """Delete some old data of a bearing; return whether any data were deleted.
+        """Delete a limited part of the old data of a bearing; return whether any were deleted.
+
+        Data are old if they exceed their maximum age in `ages` at the time `now_ns`. Roll-ups that
+        disagree with wider ones are kept and reported by `trouble`.
 
         Raises
         ------
@@ -225,7 +228,7 @@ class RetentionStore(Tables):
         return found
 
     def prune(self, ages: Ages, now_ns: int) -> bool:
-        """Delete some old data of the whole plant; return whether any data were deleted."""
+        """Delete a limited part of the old data of the whole plant; otherwise as `delete`."""
         found = False
         for setting, rule in PLANT_RULES.items():
             if setting in ages:

@@ -229,7 +229,7 @@ def test_a_damaged_copy_of_the_accounts_leaves_both_databases(plant_path, tmp_pa
     said = padwatch("restore", plant_path, made[0]["backup"])
 
     assert said.exit_code == 1
-    assert said.output.endswith("is not the access database of padwatch\n")
+    assert said.output.endswith("is not the access database of padwatch; choose another file\n")
     assert {path.name for path in data.iterdir()} == before
 
 
