@@ -88,6 +88,8 @@ class Analysis:
     retaining: RetentionLoop
     space: SpaceWatch
     soundness: IntegrityMonitor
+    executor: CommandExecutor
+    snapshots: SnapshotBuilder
 
     @property
     def own_loops(self) -> dict[str, Loop]:
@@ -205,7 +207,10 @@ async def analysis_on(
     alarm_context.watch_films(films.newest)
     evidence = evidence_of(plant, origin, live, films, store, captures, clock)
     watch(evidence, alarms, captures, origin)
-    references = ReferencesInForce(monitors, store, clock)
+    references = ReferencesInForce(
+        *(machines.values(), store, clock),
+        on_change=lambda unit: monitors[unit.id].replace_description(unit),
+    )
     await references.look()  # before the first result
     return Analysis(
         process=process,
@@ -223,21 +228,9 @@ async def analysis_on(
         retaining=RetentionLoop(store.retention, ages_of(plant.retention), clock),
         space=space,
         soundness=soundness,
+        executor=CommandExecutor(alarms, films, live, recorder, store, clock),
+        snapshots=SnapshotBuilder(plant.unit, live, alarms, films, clock),
     )
-
-
-def executor_of(analysis: Analysis) -> CommandExecutor:
-    """Return the executor of operators' commands in this process."""
-    process = analysis.process
-    parts = (analysis.alarms, analysis.films, process.live, analysis.recorder, process.store)
-    return CommandExecutor(*parts, process.clock)
-
-
-def builder_of(analysis: Analysis) -> SnapshotBuilder:
-    """Return the builder of the snapshots of all units of this process."""
-    process = analysis.process
-    parts = (process.live, analysis.alarms, analysis.films)
-    return SnapshotBuilder(process.plant.unit, *parts, process.clock)
 
 
 def plant_snapshot(analysis: Analysis, sources: Mapping[str, TimedSource]) -> PlantSnapshot:
@@ -281,6 +274,6 @@ def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> 
     """
     process, name = analysis.process, process_name()
     store, clock = process.store, process.clock
-    reporter = Reporter(name, held, builder_of(analysis), store.unit_states, clock)
-    carrying_out = CommandWorker(name, held, executor_of(analysis), store, clock)
+    reporter = Reporter(name, held, analysis.snapshots, store.unit_states, clock)
+    carrying_out = CommandWorker(name, held, analysis.executor, store, clock)
     return {"report": reporter.run, "commands": carrying_out.run}

@@ -12,8 +12,6 @@ from service.app.listener import require_protected
 from service.app.measuring_process import (
     ProcessContext,
     analysis_on,
-    builder_of,
-    executor_of,
     plant_snapshot,
     reporting_loops,
 )
@@ -108,8 +106,7 @@ async def run_service(
         bus = Bus(BUS_CAPACITY, clock)
         monitors = {unit: watched.monitor for unit, watched in units.items()}
         analysis = await analysis_on(process, monitors, bus, alarm_context)
-        parts = (analysis.alarms, analysis.films, bus, beats)
-        runner = Runner(units, live, analysis.recorder, clock, *parts)
+        runner = Runner(units, live, analysis.analyser, analysis.recorder, bus, beats, clock)
         audit = ServiceTrail(plant, origin, store.audit, clock)
         await audit.begin()
         sources, held = timed_sources(units), [*(unit.id for unit in plant.unit), PLANT]
@@ -122,9 +119,9 @@ async def run_service(
                 announce(f"token to create the first account, valid once within one hour: {token}")
 
         now = partial(plant_snapshot, analysis, sources)
-        reports = SocketReports([*held, SHARED], builder_of(analysis), now, clock)
+        reports = SocketReports([*held, SHARED], analysis.snapshots, now, clock)
         metrics = partial(measuring_metrics, analysis, bus, sources)
-        questions = Questions(executor_of(analysis), live, analysis.soundness, metrics)
+        questions = Questions(analysis.executor, live, analysis.soundness, metrics)
         start = Start(plant, origin, service_run.is_demo)
         serving = ServingChild(
             *(start, listener, reports.report, questions.answer, ready, clock, service_run.child)

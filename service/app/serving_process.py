@@ -32,7 +32,7 @@ from service.live.client import LiveClient, SocketOperators
 from service.live.exchange import MeasuringGoneError, ServingEnd, VersionError
 from service.live.operators import Operators
 from service.live.receivers import receiver_views
-from service.live.references import ReferencesInForce, UnitDescription
+from service.live.references import ReferencesInForce
 from service.live.snapshot import Report
 from service.reports.archive import EvidenceArchive
 from service.reports.routes import EvidenceService
@@ -125,9 +125,8 @@ def context_of(
 
 
 def references_of(plant: PlantFile, store: Store, clock: Clock) -> ReferencesInForce:
-    """Return the gap references in force, for a process without monitors."""
-    machines = {unit.id: UnitDescription(machine_of(unit)) for unit in plant.unit}
-    return ReferencesInForce(machines, store, clock)
+    """Return the gap references in force of a process without monitors."""
+    return ReferencesInForce(map(machine_of, plant.unit), store, clock)
 
 
 def evidence_of(

@@ -170,30 +170,29 @@ class TakeReference:
 
 OperatorCommand: TypeAlias = AlarmCommand | BaselineCommand | TakeReference
 
-_ALARM_ACTIONS = {
-    kind.__name__: TypeAdapter[Any](tuple[str, kind])  # type: ignore[valid-type]
-    for kind in (
-        *(operation.Acknowledge, operation.Shelve, operation.Unshelve),
-        *(operation.TakeOutOfService, operation.ReturnToService),
-        *(operation.Reset, operation.Comment),
-    )
+_ALARM_ACTIONS = (
+    *(operation.Acknowledge, operation.Shelve, operation.Unshelve, operation.TakeOutOfService),
+    *(operation.ReturnToService, operation.Reset, operation.Comment),
+)
+
+_KINDS: dict[str, tuple[type[OperatorCommand], TypeAdapter[Any]]] = {
+    **{
+        kind.__name__: (AlarmCommand, TypeAdapter(tuple[str, kind]))  # type: ignore[valid-type]
+        for kind in _ALARM_ACTIONS
+    },
+    **{
+        kind.__name__: (BaselineCommand, TypeAdapter(tuple[FilmPlace, kind, str, str]))  # type: ignore[valid-type]
+        for kind in (Accept, Reject, Freeze, Thaw, Renew)
+    },
+    TakeReference.__name__: (TakeReference, TypeAdapter(tuple[str, str, str, str])),
 }
-_BASELINE_ACTIONS = {
-    kind.__name__: TypeAdapter[Any](tuple[FilmPlace, kind, str, str])  # type: ignore[valid-type]
-    for kind in (Accept, Reject, Freeze, Thaw, Renew)
-}
-_REFERENCE = TypeAdapter(TakeReference)
+"""Class of the command, and adapter of its fields in their order, by kind."""
 
 
 def encoded(command: OperatorCommand) -> tuple[str, str]:
     """Return the kind of a command (the name of its class or action) and its JSON document."""
-    if isinstance(command, TakeReference):
-        return TakeReference.__name__, _REFERENCE.dump_json(command).decode()
-    kind = type(command.action).__name__
-    if isinstance(command, AlarmCommand):
-        return kind, _ALARM_ACTIONS[kind].dump_json((command.alarm, command.action)).decode()
-    whole = (command.place, command.action, command.actor, command.reason)
-    return kind, _BASELINE_ACTIONS[kind].dump_json(whole).decode()
+    kind = type(getattr(command, "action", command)).__name__
+    return kind, _KINDS[kind][1].dump_json(tuple(vars(command).values())).decode()
 
 
 def decoded(kind: str, document: str) -> OperatorCommand:
@@ -204,16 +203,13 @@ def decoded(kind: str, document: str) -> OperatorCommand:
     UnreadableCommandError
         If the document is from another version of the program, or damaged.
     """
+    if kind not in _KINDS:
+        raise UnreadableCommandError(f"unknown command {kind}; update all processes to one version")
+    made, adapter = _KINDS[kind]
     try:
-        if kind in _ALARM_ACTIONS:
-            return AlarmCommand(*_ALARM_ACTIONS[kind].validate_json(document))
-        if kind in _BASELINE_ACTIONS:
-            return BaselineCommand(*_BASELINE_ACTIONS[kind].validate_json(document))
-        if kind == TakeReference.__name__:
-            return _REFERENCE.validate_json(document)
+        return made(*adapter.validate_json(document))
     except ValidationError as error:
         raise UnreadableCommandError(f"command {kind} cannot be read: {error}") from error
-    raise UnreadableCommandError(f"unknown command {kind}; update all processes to one version")
 
 
 class NotAvailableError(Exception):

@@ -1,9 +1,8 @@
 """Gap references in force for each bearing."""
 
 import asyncio
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from typing import Protocol
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import structlog
 
@@ -44,31 +43,30 @@ def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
     )
 
 
-class HasUnit(Protocol):
-    """Protocol of objects with a replaceable unit description, such as a monitor."""
-
-    unit: Unit
-
-    def replace_description(self, unit: Unit) -> None:
-        """Replace the description of the unit."""
-        ...
-
-
 class ReferencesInForce:
     """Gap references in force: the newest stored reference of a bearing, or its plant-file gaps.
 
     Parameters
     ----------
-    monitors
-        Monitors by unit, built from the plant file; their descriptions receive new references.
+    units
+        Descriptions of the units, with the gap references of the plant file.
+    on_change
+        Function that receives the description of a unit with a new gap reference in force.
     """
 
-    def __init__(self, monitors: Mapping[str, HasUnit], store: Store, clock: Clock) -> None:
-        self._monitors, self._store, self._clock = monitors, store, clock
+    def __init__(
+        self,
+        units: Iterable[Unit],
+        store: Store,
+        clock: Clock,
+        on_change: Callable[[Unit], None] = lambda _: None,
+    ) -> None:
+        self._units = {unit.id: unit for unit in units}
+        self._store, self._clock, self._on_change = store, clock, on_change
         self._bearings: dict[Key, Bearing] = {
-            (unit, bearing.id): bearing
-            for unit, monitor in monitors.items()
-            for bearing in monitor.unit.bearings
+            (unit.id, bearing.id): bearing
+            for unit in self._units.values()
+            for bearing in unit.bearings
         }
         self._in_force: dict[Key, GapReference] = {}
         self._unknown: set[Key] = set()
@@ -105,8 +103,7 @@ class ReferencesInForce:
         news = {(r.unit, r.bearing): r for r in found if self._is_news(r)}
         self._in_force |= news
         for unit in {unit for unit, _ in news}:
-            monitor = self._monitors[unit]
-            monitor.replace_description(self._described(monitor.unit))
+            self._on_change(self._described(self._units[unit]))
         for (unit, bearing), reference in news.items():
             log.info(
                 "reference in force",
@@ -127,14 +124,3 @@ class ReferencesInForce:
 
     def _described(self, unit: Unit) -> Unit:
         return replace(unit, bearings=tuple(self.bearing(unit.id, b.id) for b in unit.bearings))
-
-
-@dataclass
-class UnitDescription:
-    """Holder of the description of a unit, for a process without a monitor of the unit."""
-
-    unit: Unit
-
-    def replace_description(self, unit: Unit) -> None:
-        """Replace the description by a new description of the same unit."""
-        self.unit = unit

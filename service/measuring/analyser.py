@@ -199,29 +199,21 @@ class Runner:
         self,
         units: Mapping[str, WatchedUnit],
         live: LiveView,
+        analyser: Analyser,
         recorder: Recorder,
+        bus: Bus,
+        beats: Heartbeats,
         clock: Clock,
-        alarms: AlarmEngine,
-        films: FilmMonitor,
-        bus: Bus | None = None,
-        beats: Heartbeats | None = None,
     ) -> None:
-        monitors = {unit: watched.monitor for unit, watched in units.items()}
-        self._recorder, self._clock = recorder, clock
-        self._bus = bus or Bus(BUS_CAPACITY, clock)
-        self._beats = beats or Heartbeats(clock)
-        self._analyser = Analyser(monitors, live, recorder, alarms, films)
-        self._acquirer = Acquirer(
-            units, live, clock, self._bus.publish, self._analyser.note_link, self._beats
-        )
+        self._analyser, self._recorder, self._clock = analyser, recorder, clock
+        self._bus, self._beats = bus, beats
+        self._acquirer = Acquirer(units, live, clock, bus.publish, analyser.note_link, beats)
 
     async def run(self) -> None:
         """Run until all sources have ended and their results are stored, or the store fails."""
         async with asyncio.TaskGroup() as tasks:
-            recording = tasks.create_task(
-                self._beats.tend("record", self._recorder.run), name="record"
-            )
-            analysis = tasks.create_task(self._beats.tend("analyse", self._analyse), name="analyse")
+            loops = {"record": self._recorder.run, "analyse": self._analyse}
+            recording, analysis = self._beats.start(loops, tasks)
             await self._acquirer.run()
             await self._bus.drained()
             analysis.cancel()

@@ -31,6 +31,8 @@ class IntegrityMonitor:
 
     Attributes
     ----------
+    stored
+        Checks of the stored data, and their results.
     rolled_back
         Description of how the database differs from that of the last run; None if it does not.
     access_trouble
@@ -38,26 +40,17 @@ class IntegrityMonitor:
     """
 
     def __init__(self, store: Store, clock: Clock, live: LiveView) -> None:
-        self._store, self._clock, self._live = store, clock, live
+        self.stored, self._audit = store.integrity, store.audit
+        self._clock, self._live = clock, live
         self._reported: set[Place] = set()
         self._no_file: str | None = None
         self.rolled_back: str | None = None
         self.access_trouble: str | None = None
 
     @property
-    def n_damaged(self) -> int:
-        """Number of damaged and missing rows found since the start; queries omit damaged rows."""
-        return self._store.integrity.n_damaged
-
-    @property
-    def mark_error(self) -> str | None:
-        """Reason why the high-water mark could not be written; None if it was written."""
-        return self._store.integrity.mark_error
-
-    @property
     def trouble(self) -> str | None:
         """Description of all integrity faults in one line; None without faults."""
-        mark, n_damaged = self.mark_error, self.n_damaged
+        mark, n_damaged = self.stored.mark_error, self.stored.n_damaged
         faults = [
             self._no_file,
             self.rolled_back,
@@ -88,7 +81,7 @@ class IntegrityMonitor:
         """Return whether the database file exists and is the file that this process has open."""
         before = self._no_file
         try:
-            await asyncio.to_thread(self._store.integrity.require_file)
+            await asyncio.to_thread(self.stored.require_file)
         except StoreError as error:
             self._no_file = self._live.store_error = str(error)
             if before is None:
@@ -102,14 +95,14 @@ class IntegrityMonitor:
         return True
 
     def _look(self) -> None:
-        found = self._store.integrity.adopt(self._clock.now_ns())
+        found = self.stored.adopt(self._clock.now_ns())
         if found:
             self.rolled_back = "; ".join(finding.detail for finding in found)
             log.error("the database is not that of the last run", reason=self.rolled_back)
-        news = [place for place in self._store.integrity.damaged if place not in self._reported]
+        news = [place for place in self.stored.damaged if place not in self._reported]
         news = news[: max(0, MAX_REPORTED - len(self._reported))]
         if news:
-            self._store.audit.record([self._deed(place) for place in news])
+            self._audit.record([self._deed(place) for place in news])
             self._reported.update(news)
             first = f"{news[0].table}: {news[0].key}"
             log.error("stored rows are damaged or missing", n_rows=len(news), first=first)

@@ -117,9 +117,9 @@ INTEGRITY = {
 def add_integrity(families: Families, found: IntegrityMonitor) -> None:
     """Add the results of the integrity checks."""
     families.declare(INTEGRITY)
-    families.add("store_damaged_rows", found.n_damaged)
+    families.add("store_damaged_rows", found.stored.n_damaged)
     families.add("store_rolled_back", found.rolled_back is not None)
-    families.add("store_mark_failing", found.mark_error is not None)
+    families.add("store_mark_failing", found.stored.mark_error is not None)
 
 
 DISKS = {

@@ -10,14 +10,13 @@ from pydantic import Field
 from acquisition.errors import ConfigError
 from core.arrays import FloatArray
 from core.machine.unit import Bearing
-from core.monitor.assessment import OrbitTrace
+from core.monitor.assessment import Assessment
 from core.samples.blocks import SampleBlock
-from service.api.answers import in_thread, rendered
+from service.api.answers import rendered
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import duration
 from service.api.problems import ProblemError, problem_responses
-from service.api.routes.bearings import no_result
 from service.api.routes.channels import NEWEST, NO_SAMPLES, held_blocks, require_samples
 from service.api.routes.recordings import (
     RecordingId,
@@ -25,6 +24,7 @@ from service.api.routes.recordings import (
     entry_of,
     library_of,
 )
+from service.api.routes.spectra import newest_answer
 from service.api.values import ApiModel, BearingAnswer, SampleRange, Time, listed
 from service.live.samples import newest_blocks, sample_window
 from service.live.status import HELD_S
@@ -199,8 +199,9 @@ def _rounded(values_um: FloatArray) -> list[float | None]:
     return listed(np.round(values_um, DECIMALS))
 
 
-def orbit_model(orbit: OrbitTrace) -> OrbitModel:
-    """Return the API model of an orbit."""
+def _orbit(assessment: Assessment) -> OrbitModel | None:
+    if (orbit := assessment.orbit) is None:
+        return None
     return OrbitModel.of(
         orbit,
         time=orbit.start_ns,
@@ -236,16 +237,7 @@ def motion_router(context: Context) -> APIRouter:
     )
     async def orbit(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the orbit of the shaft relative to the bearing in the newest turns."""
-        context.bearing(unit, bearing)
-
-        async def make() -> OrbitModel:
-            assessment = await context.live.assessment(unit, bearing)
-            orbit = None if assessment is None else assessment.orbit
-            if orbit is None:
-                raise no_result(unit, bearing)
-            return await in_thread(lambda: orbit_model(orbit))
-
-        return await context.answers.of(request, context.live.revision(unit), make)
+        return await newest_answer(context, request, unit, bearing, _orbit)
 
     @router.get(
         "/{bearing}/motion",

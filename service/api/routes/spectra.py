@@ -1,6 +1,6 @@
 """Routes for the amplitude spectra of a bearing: newest spectra, and stored spectra over time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Annotated, Literal
 
@@ -195,15 +195,7 @@ def spectra_router(context: Context) -> APIRouter:
     )
     async def spectrum(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the averaged amplitude spectra of the newest result, all as displacement."""
-        context.bearing(unit, bearing)
-
-        async def make() -> SpectrumModel:
-            assessment = await context.live.assessment(unit, bearing)
-            if assessment is None:
-                raise no_result(unit, bearing)
-            return await in_thread(lambda: spectrum_model(assessment))
-
-        return await context.answers.of(request, context.live.revision(unit), make)
+        return await newest_answer(context, request, unit, bearing, spectrum_model)
 
     @router.get("/{bearing}/spectra", summary="Spectra over time", response_model=SpectraModel)
     async def spectra(
@@ -244,6 +236,26 @@ def spectra_router(context: Context) -> APIRouter:
         return await context.answers.of(request, revision, make)
 
     return router
+
+
+async def newest_answer(
+    context: Context,
+    request: Request,
+    unit: str,
+    bearing: str,
+    make: Callable[[Assessment], ApiModel | None],
+) -> Response:
+    """Return the answer that `make` builds from the newest result; a problem (409) for None."""
+    context.bearing(unit, bearing)
+
+    async def answer() -> ApiModel:
+        found = await context.live.assessment(unit, bearing)
+        model = None if found is None else await in_thread(lambda: make(found))
+        if model is None:
+            raise no_result(unit, bearing)
+        return model
+
+    return await context.answers.of(request, context.live.revision(unit), answer)
 
 
 def _read(

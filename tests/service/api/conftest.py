@@ -179,7 +179,7 @@ async def build(plant: PlantFile, store: SqliteStore, access: AccessStore, folde
     live = LiveView([unit.id for unit in plant.unit], clock, STALE_AFTER_S)
     analysis = analysis_of(plant.analysis)
     monitors = {unit.id: UnitMonitor(machine_of(unit), analysis) for unit in plant.unit}
-    references = ReferencesInForce(monitors, store, clock)
+    references = ReferencesInForce([monitor.unit for monitor in monitors.values()], store, clock)
     recorder = Recorder(store, live, clock, ParkedRows(folder / FILE))
     origin = Origin.LIVE
     alarms = await alarm_engine(plant, origin, store, recorder.put, clock)

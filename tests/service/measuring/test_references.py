@@ -37,7 +37,7 @@ def monitor() -> UnitMonitor:
 
 @pytest.fixture
 def in_force(monitor: UnitMonitor, store: SqliteStore, stepped_clock: Clock) -> ReferencesInForce:
-    return ReferencesInForce({"U1": monitor}, store, stepped_clock)
+    return ReferencesInForce([monitor.unit], store, stepped_clock, monitor.replace_description)
 
 
 @pytest.fixture

@@ -23,14 +23,16 @@ from core.monitor.monitor import UnitMonitor
 from core.quality import GOOD
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import Reach
+from service.measuring.acquirer import Bus
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.analyser import Runner
+from service.measuring.analyser import BUS_CAPACITY, Analyser, Runner
 from service.measuring.films import FilmMonitor
 from service.measuring.live_view import LiveView
 from service.measuring.recorder import FILE, ParkedRows, Recorder
 from service.measuring.sources import WatchedUnit
 from service.recordings.around_alarms import Captures, CaptureSettings
 from service.recordings.segment import MakeWriter
+from service.runtime.heartbeats import Heartbeats
 from service.settings.films import FilmAlarmSettings
 from service.store.sqlite import SqliteStore
 
@@ -191,7 +193,10 @@ class Plant:
         }
         for unit in watched.values():
             unit.monitor.go_on(reach)
-        return Runner(watched, self.live, self.recorder, self.clock, self.alarms, self.films)
+        monitors = {name: unit.monitor for name, unit in watched.items()}
+        analyser = Analyser(monitors, self.live, self.recorder, self.alarms, self.films)
+        bus, beats = Bus(BUS_CAPACITY, self.clock), Heartbeats(self.clock)
+        return Runner(watched, self.live, analyser, self.recorder, bus, beats, self.clock)
 
 
 @pytest.fixture
