@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState
-from core.alarms.kinds import FILM_KINDS
+from core.alarms.kinds import FILM_STIFFNESS
 from core.change.film_judge import FilmNews
 from core.condition.cells import CellGrid, OperatingPoint
 from service.api.values import (
@@ -57,6 +57,8 @@ AlarmChangeName = Literal[
 ConditionName = Literal["active", "within_limits", "unknown"]
 
 OriginName = Literal["live", "replay"]
+
+Directions = Annotated[Literal["", "x", "y", "xy"], Field(examples=["xy"])]
 
 AlarmIdText = Annotated[str, Field(examples=["U1:ujb_shaft_x:channel_not_ok"])]
 
@@ -157,6 +159,9 @@ class AlarmModel(ApiModel):
     value_unit: Annotated[str | None, Field(examples=["µm 0-pk"])]
     """Unit of value and limit; null for an alarm without a unit."""
 
+    directions: Directions
+    """Directions in which the limit is exceeded; empty for an alarm without directions."""
+
     film: FilmConditionModel | None
     """Operating condition at the newest film reading, for alarms of film stiffness; null for other
     alarms, and before the first reading."""
@@ -254,6 +259,9 @@ class AlarmEventModel(ApiModel):
     value_unit: str | None
     """Unit of value and limit; null for an alarm without a unit."""
 
+    directions: Directions
+    """Directions in which the limit was exceeded; empty for an alarm without directions."""
+
     actor: str
     """Person or key that caused the event; empty for an automatic change."""
 
@@ -328,7 +336,7 @@ def _film(films: LiveFilms, identity: AlarmIdentity) -> FilmConditionModel | Non
 
 
 def _film_news(films: LiveFilms, identity: AlarmIdentity) -> FilmNews | None:
-    is_film = identity.kind in FILM_KINDS
+    is_film = identity.kind == FILM_STIFFNESS
     return films.newest(identity.unit, identity.subject) if is_film else None
 
 

@@ -155,7 +155,7 @@ def alarm_router(context: Context) -> APIRouter:
         request: Request,
         unit: OnlyUnit = None,
         subject: Annotated[str | None, only("bearing or other subject", "LJB", 64)] = None,
-        kind: Annotated[AlarmKindName | None, only("kind", "stiffness_x")] = None,
+        kind: Annotated[AlarmKindName | None, only("kind", "film_stiffness")] = None,
         level: Annotated[Literal["alert", "danger"] | None, only("level", "danger")] = None,
         acknowledged: Annotated[
             bool | None,
