@@ -4,6 +4,7 @@ No function reads a clock. With sample times, a replay of the same samples produ
 at any speed.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmRule, changed
@@ -89,6 +90,20 @@ def restored(alarm: Alarm) -> Alarm:
     level = None if alarm.is_latched else alarm.level
     alert, danger = (ON if (level or 0) >= each else INACTIVE for each in AlarmLevel)
     return replace(alarm, timers=(alert, danger))
+
+
+def next_level(held: AlarmLevel | None, timers: Iterable[Timers]) -> AlarmLevel | None:
+    """Return the level after the delays that are running, if the conditions last; else `held`.
+
+    `timers` are those of the alarm, or of the directions of a film.
+    """
+    pairs = [pair for each in timers for pair in zip(AlarmLevel, each, strict=True)]
+    rising = [level for level, timer in pairs if timer.is_changing and not timer.is_on]
+    if max(rising, default=0) > (held or 0):
+        return max(rising)
+    if not any(timer.is_changing and timer.is_on for _, timer in pairs):
+        return held
+    return max((level for level, timer in pairs if timer == ON), default=None)
 
 
 def standing_level(timers: Timers) -> AlarmLevel | None:

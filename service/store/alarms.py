@@ -48,7 +48,9 @@ SELECT_EVENTS = f"""
     WHERE id < :before
     AND (CAST(:alarm AS TEXT) IS NULL OR alarm = :alarm)
     AND (CAST(:unit AS TEXT) IS NULL OR unit = :unit)
+    AND (CAST(:subject AS TEXT) IS NULL OR subject = :subject)
     AND (CAST(:kind AS TEXT) IS NULL OR kind = :kind)
+    AND (CAST(:level AS INTEGER) IS NULL OR level = :level)
     AND time_ns >= :start_ns AND time_ns < :end_ns
     AND {IN_STATES}
     AND {BETWEEN_BOUNDS}
@@ -117,7 +119,7 @@ def _actions(event: AlarmEvent, news: AlarmNews) -> list[AuditAction]:
 
 
 def _arguments(query: AlarmQuery) -> dict[str, object]:
-    names = ("before", "limit", "alarm", "unit", "kind", "start_ns", "end_ns")
+    names = ("before", "limit", "alarm", "unit", "subject", "kind", "level", "start_ns", "end_ns")
     asked = {name: getattr(query, name) for name in names}
     return (
         asked
