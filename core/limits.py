@@ -35,6 +35,8 @@ class Judgement:
         Reason why the alarm is suppressed by design; None if it is not suppressed.
     point
         Operating point at which a limit was exceeded; None if unknown or not exceeded.
+    directions
+        Directions in which the limit is exceeded, "x", "y" or "xy"; empty if the alarm has none.
     """
 
     level: AlarmLevel | None = None
@@ -44,6 +46,7 @@ class Judgement:
     reason: str = "ok"
     suppressed_by: str | None = None
     point: OperatingPoint | None = None
+    directions: str = ""
 
 
 WITHIN = Judgement()
@@ -196,6 +199,11 @@ class DelayTimer:
     is_on: bool = False
     opposed_ns: int = 0
     last_ns: int | None = None
+
+    @property
+    def is_changing(self) -> bool:
+        """Whether the condition differs from `is_on`, and its delay has not elapsed."""
+        return self not in (INACTIVE, ON)
 
     def step(
         self,

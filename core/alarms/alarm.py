@@ -201,8 +201,8 @@ class AlarmEvent:
         Time of the samples that caused the event; host time for actions and link events.
     occurrence, raised_at
         Number and operating point of the newest occurrence, as in `Alarm`.
-    value, limit
-        Numbers of the judgement at the time of the event; None if it had none.
+    value, limit, directions
+        Numbers and directions of the judgement at the time of the event, as in `Judgement`.
     actor
         Person who performed the action; empty for automatic events.
     reason
@@ -222,6 +222,7 @@ class AlarmEvent:
     actor: str = ""
     reason: str = ""
     raised_at: OperatingPoint | None = None
+    directions: str = ""
 
 
 @dataclass(frozen=True)
@@ -259,5 +260,6 @@ def changed(
         actor=actor,
         reason=reason,
         raised_at=after.raised_at,
+        directions=after.condition.directions,
     )
     return after, event

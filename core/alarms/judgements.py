@@ -70,6 +70,26 @@ def fault_after_segment(
     return Reason.POLARITY if has_wrong_sign and fault is None else fault
 
 
+def film_judgement(found: Mapping[str, Judgement], held: Judgement) -> Judgement:
+    """Return the judgement of a film from those of its directions x and y.
+
+    The direction with the highest level and the largest change gives value, limit and reason. The
+    film is within limits only if all directions are known, or at least all directions of the
+    alarm. `held` is the last judgement of the film.
+    """
+    known = {axis: each for axis, each in found.items() if each.is_known}
+    unjudged = [each for axis, each in found.items() if axis not in known]
+    open_axes = [axis for axis in held.directions if axis not in known]
+    over = [axis for axis in known if known[axis].level is not None]
+    if not over and unjudged and (open_axes or held.level is None):
+        return unjudged[0]
+    worst = max(known.values(), key=lambda each: (each.level or 0, abs(each.value or 0.0)))
+    if not over:
+        return worst
+    levels = filter(None, (worst.level, held.level if open_axes else None))
+    return replace(worst, level=max(levels), directions="".join(sorted({*over, *open_axes})))
+
+
 def offset_reading(clock: DeviceClock | None) -> Reading:
     """Return the absolute offset, in s, of the device clock from host time; bad if unknown."""
     if clock is None or clock.offset_s is None:

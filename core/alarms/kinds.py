@@ -15,6 +15,9 @@ from core.quality import Reading
 CHANNEL_NOT_OK, LINK_LOST = "channel_not_ok", "link_lost"
 """Names of alarm kinds that other modules refer to."""
 
+FILM_STIFFNESS = "film_stiffness"
+"""Name of the kind of alarms of a film, one alarm for both directions."""
+
 OIL_TEMPERATURE, TIME_STAMPS = "oil_temperature", "time_stamps"
 """Names of alarm kinds that are also the names of their rules."""
 
@@ -123,7 +126,7 @@ ALARM_KINDS = kind_table(
         "oil_temperature_c",
         OIL_TEMPERATURE,
     ),
-    *_pair("films", "1", "stiffness_{}", "Film stiffness changed, {}"),
+    AlarmKind(FILM_STIFFNESS, "Film stiffness changed", "1", BEARING, "films"),
     AlarmKind(
         "clock_offset",
         "Device clock off",
@@ -158,9 +161,6 @@ ALARM_KINDS = kind_table(
     ),
 )
 """All alarm kinds of a unit. The alarms of a bearing are judged in this order."""
-
-FILM_KINDS = tuple(kind.name for kind in ALARM_KINDS.values() if kind.rule == "films")
-"""Names of the two film-stiffness alarm kinds: for direction x, then for direction y."""
 
 FAST = ("shaft_order1", "shaft_overall", "bearing_overall")
 """Rules judged on every recent segment, because vibration can change within seconds. Vibration

@@ -4,12 +4,18 @@ No function reads a clock. With sample times, a replay of the same samples produ
 at any speed.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmRule, changed
 from core.limits import INACTIVE, ON, AlarmLevel, DelayTimer, Judgement
+from core.units import NS_PER_S
 
 Timers = tuple[DelayTimer, DelayTimer]
+
+SAME_EVENT_NS = 3600 * NS_PER_S
+"""Time within which a further direction belongs to an unacknowledged occurrence. A sudden change of
+a film passes its limit in x and in y within the hour over which a change must last."""
 
 
 def update(
@@ -18,7 +24,9 @@ def update(
     """Update an alarm with the judgement at the time `now_ns`; return it and its new events.
 
     While the condition is unknown, the level does not change and the delays are paused. Level,
-    value and limit of an unknown condition are the last known ones.
+    value, limit and directions of an unknown condition are the last known ones. A direction that
+    exceeds the limit later is a new occurrence, except within `SAME_EVENT_NS` of an occurrence
+    that nobody has acknowledged yet.
     """
     events: list[AlarmEvent] = []
 
@@ -27,12 +35,13 @@ def update(
         events.append(event)
         return after
 
-    last, why = alarm.condition, condition.suppressed_by
+    last, n_before, why = alarm.condition, alarm.occurrence, condition.suppressed_by
     if why is not None and why != alarm.suppressed_by:
         after = replace(alarm, suppressed_by=why)
         alarm = after if alarm.suppressed_by else note(after, AlarmChange.SUPPRESSED, why)
     if not condition.is_known:
-        condition = replace(condition, level=last.level, value=last.value, limit=last.limit)
+        kept = {name: getattr(last, name) for name in ("level", "value", "limit", "directions")}
+        condition = replace(condition, **kept)
     if condition != last:
         is_shown = alarm.level is not None and alarm.suppressed_by is None
         known, lost = AlarmChange.CONDITION_KNOWN, AlarmChange.CONDITION_UNKNOWN
@@ -45,6 +54,8 @@ def update(
     before, now, held = standing_level(alarm.timers), standing_level(timers), alarm.level
     if timers != alarm.timers:
         alarm = replace(alarm, timers=timers)
+    joins = bool(set(condition.directions) - set(last.directions))
+    joins &= alarm.is_acknowledged or now_ns - (alarm.raised_ns or now_ns) > SAME_EVENT_NS
     if now is not None and now > (before or 0) and (alarm.is_latched or now > (held or 0)):
         rises = held is not None and not alarm.is_latched
         change = AlarmChange.ESCALATED if rises else AlarmChange.RAISED
@@ -55,6 +66,8 @@ def update(
         else:
             change = AlarmChange.RETURNED if now is None else AlarmChange.EASED
             alarm = note(replace(alarm, level=now), change, condition.reason)
+    if joins and now is not None and alarm.occurrence == n_before:
+        alarm = note(_raised(alarm, now, now_ns), AlarmChange.RAISED, condition.reason)
 
     if why is None and alarm.suppressed_by is not None:
         shown = shown_again(replace(alarm, suppressed_by=None))
@@ -77,6 +90,20 @@ def restored(alarm: Alarm) -> Alarm:
     level = None if alarm.is_latched else alarm.level
     alert, danger = (ON if (level or 0) >= each else INACTIVE for each in AlarmLevel)
     return replace(alarm, timers=(alert, danger))
+
+
+def next_level(held: AlarmLevel | None, timers: Iterable[Timers]) -> AlarmLevel | None:
+    """Return the level after the delays that are running, if the conditions last; else `held`.
+
+    `timers` are those of the alarm, or of the directions of a film.
+    """
+    pairs = [pair for each in timers for pair in zip(AlarmLevel, each, strict=True)]
+    rising = [level for level, timer in pairs if timer.is_changing and not timer.is_on]
+    if max(rising, default=0) > (held or 0):
+        return max(rising)
+    if not any(timer.is_changing and timer.is_on for _, timer in pairs):
+        return held
+    return max((level for level, timer in pairs if timer == ON), default=None)
 
 
 def standing_level(timers: Timers) -> AlarmLevel | None:

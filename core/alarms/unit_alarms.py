@@ -13,6 +13,7 @@ from core.alarms.judgements import (
     channel_judgement,
     fault_after_segment,
     fault_judgement,
+    film_judgement,
     vector_judgement,
 )
 from core.alarms.kinds import (
@@ -129,8 +130,12 @@ class UnitAlarms(AlarmBoard):
             self._update(watch, fault_judgement(block.stamp_fault), host_ns)
         return self.drain_news()
 
-    def films(self, conditions: Mapping[str, Judgement], now_ns: int) -> list[AlarmNews]:
-        """Update film alarms with judgements by alarm id, at a sample time; return changed alarms.
+    def films(
+        self, conditions: Mapping[str, Mapping[str, Judgement]], now_ns: int
+    ) -> list[AlarmNews]:
+        """Update film alarms at a sample time; return the changed alarms.
+
+        `conditions` are the judgements of each direction, "x" and "y", by alarm id.
 
         Raises
         ------
@@ -138,7 +143,8 @@ class UnitAlarms(AlarmBoard):
             If the unit has no film-stiffness alarm with such an id.
         """
         films = {watch.id: watch for watch in self._of_rule["films"]}
-        for id_, condition in conditions.items():
+        for id_, found in conditions.items():
+            condition = film_judgement(found, self.alarm(id_).condition)
             point = self._recent_point(films[id_].source, now_ns)
             self.record(id_, _at(point, condition), now_ns)
         return self.drain_news()

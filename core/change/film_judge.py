@@ -60,7 +60,7 @@ ALARM_REASONS = {
 
 
 def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Judgement:
-    """Return the judgement for a film-stiffness alarm; unknown if the reading was not judged."""
+    """Return the judgement of a film in one direction; unknown if the reading was not judged."""
     if finding.verdict not in JUDGED:
         return unknown(finding.verdict.name.lower())
     limit = limits.danger_change if finding.level is AlarmLevel.DANGER else limits.alert_change
@@ -101,6 +101,12 @@ class FilmNews:
     reading: FilmReading
     findings: tuple[FilmFinding, FilmFinding]
     decisions: tuple[Decision, Decision]
+
+    @property
+    def worst(self) -> int:
+        """Index of the finding with the highest level, then with the largest change."""
+        sizes = [(each.level or 0, abs(each.change or 0.0)) for each in self.findings]
+        return sizes.index(max(sizes))
 
 
 MAX_RECENT = 4 * MEAN_READINGS

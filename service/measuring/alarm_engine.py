@@ -154,7 +154,7 @@ class AlarmEngine:
         self,
         block: SampleBlock,
         assessments: Sequence[Assessment],
-        films: Mapping[str, Judgement] = MappingProxyType({}),
+        films: Mapping[str, Mapping[str, Judgement]] = MappingProxyType({}),
     ) -> list[AlarmNews]:
         """Update the alarms of a unit from a block and its results; return the changes of alarms.
 

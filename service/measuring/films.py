@@ -8,8 +8,9 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import AlarmIdentity
-from core.alarms.kinds import FILM_KINDS
+from core.alarms.kinds import FILM_STIFFNESS
 from core.baseline.baseline import BearingBaseline
+from core.baseline.history import DIRECTIONS
 from core.change.film_judge import FilmJudge, FilmMemory, FilmNews, alarm_condition
 from core.change.film_watch import FilmWatch
 from core.change.settings import FilmRules
@@ -132,14 +133,14 @@ class FilmMonitor:
         films.newest.update({each.reading.bearing: each for each in news})
         return seen, news
 
-    def conditions(self, news: Sequence[FilmNews]) -> dict[str, Judgement]:
-        """Return the judged conditions of the film alarms after new readings, by alarm id."""
+    def conditions(self, news: Sequence[FilmNews]) -> dict[str, dict[str, Judgement]]:
+        """Return the judgement of each direction after new readings, by film alarm id."""
         return {
-            AlarmIdentity(each.reading.unit, each.reading.bearing, kind).id: alarm_condition(
-                finding, self._films[each.reading.unit].rules.change
-            )
+            AlarmIdentity(each.reading.unit, each.reading.bearing, FILM_STIFFNESS).id: {
+                axis: alarm_condition(finding, self._films[each.reading.unit].rules.change)
+                for axis, finding in zip(DIRECTIONS, each.findings, strict=True)
+            }
             for each in news
-            for kind, finding in zip(FILM_KINDS, each.findings, strict=True)
         }
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:

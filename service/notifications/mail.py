@@ -40,7 +40,7 @@ def subject(message: Message) -> str:
     if message["type"] == "test":
         return printable(f"[padwatch] {message['plant']}: test message")
     priority = (message["priority"] or "").upper() if message["is_active"] else "over"
-    words = f"{_place(message)} {kind_words(message['kind'])} {change_words(message)}"
+    words = f"{_place(message)} {_what(message)} {change_words(message)}"
     return printable(f"[padwatch] {message['plant']}: {priority}, {words}")
 
 
@@ -79,7 +79,7 @@ def _change(value: float, limit: float | None, std: float | None) -> str:
 
 def _alarm(message: Message) -> Iterator[str]:
     rows = [
-        ("What", f"{kind_words(message['kind'])}: {change_words(message)}"),
+        ("What", f"{_what(message)}: {change_words(message)}"),
         ("Priority", message["priority"]),
         ("Where", f"{message['plant']}, {_place(message)}{_unit_name(message)}"),
         ("When", message["time"]),
@@ -111,6 +111,10 @@ def _foot(message: Message) -> Iterator[str]:
         yield f"Dashboard: {message['url']}"
     yield f"Event: {message['id']}"
     yield DISCLAIMER
+
+
+def _what(message: Message) -> str:
+    return kind_words(message["kind"], message["directions"])
 
 
 def _place(message: Message) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 from uuid import uuid4
 
 from core.alarms.alarm import Alarm, AlarmEvent, AlarmIdentity
-from core.alarms.kinds import ALARM_KINDS, FILM_KINDS
+from core.alarms.kinds import ALARM_KINDS, FILM_STIFFNESS
 from core.change.film_judge import FilmNews
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
@@ -86,9 +86,9 @@ class LiveContext:
         )
 
     def _uncertainty(self, identity: AlarmIdentity, assessment: Assessment) -> float | None:
-        if identity.kind in FILM_KINDS:
+        if identity.kind == FILM_STIFFNESS:
             news = self._newest_film(identity.unit, identity.subject)
-            return news.findings[FILM_KINDS.index(identity.kind)].change_std if news else None
+            return news.findings[news.worst].change_std if news else None
         kind = ALARM_KINDS.get(identity.kind)
         measured = assessment.readings.get(kind.reading or "") if kind else None
         return measured.u_random if measured else None
@@ -133,6 +133,7 @@ class Composer:
             "unit": identity.unit,
             "subject": identity.subject,
             "kind": identity.kind,
+            "directions": event.directions,
             "number": event.number,
             "change": event.change.value,
             "priority": None if event.level is None else event.level.name.lower(),
@@ -147,7 +148,7 @@ class Composer:
             "uncertainty": _finite(context.uncertainty),
             "limit": _finite(event.limit),
             "value_unit": value_unit(identity.kind),
-            "value_is": "ln_change" if identity.kind in FILM_KINDS else "reading",
+            "value_is": "ln_change" if identity.kind == FILM_STIFFNESS else "reading",
             "operating_state": context.state,
             "condition": dict(context.condition),
             "unit_name": self._unit_names.get(identity.unit),

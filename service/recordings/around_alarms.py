@@ -10,7 +10,7 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import ANNOUNCED, AlarmEvent, AlarmNews, AlarmState
-from core.alarms.kinds import FILM_KINDS
+from core.alarms.kinds import FILM_STIFFNESS
 from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
 from service.live.samples import BlockHistory
@@ -65,7 +65,7 @@ class CaptureSettings:
 
     def start_ns(self, event: AlarmEvent) -> int:
         """Return the start time, in ns, of the capture of an alarm event."""
-        is_film = event.identity.kind in FILM_KINDS
+        is_film = event.identity.kind == FILM_STIFFNESS
         return event.time_ns - ns_from_s(self.longest_pre_s if is_film else self.pre_s)
 
 

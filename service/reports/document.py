@@ -7,9 +7,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from core.alarms.kinds import FILM_STIFFNESS
 from core.change.settings import FilmRules
 from service.reports.contents import bearing_part
 from service.reports.parts import (
+    AXES,
     BearingPart,
     ComparisonPart,
     Direction,
@@ -34,7 +36,7 @@ VERSION = 1
 class AlarmPart(EvidencePart):
     """Alarm, and the event that began this occurrence of the alarm."""
 
-    id: Annotated[str, Field(examples=["U1:UJB:stiffness_x"])]
+    id: Annotated[str, Field(examples=["U1:UJB:film_stiffness"])]
     """Identifier of the alarm."""
 
     unit: Annotated[str, Field(examples=["U1"])]
@@ -43,8 +45,11 @@ class AlarmPart(EvidencePart):
     subject: Annotated[str, Field(examples=["UJB"])]
     """Bearing, channel or component of the alarm."""
 
-    kind: Annotated[str, Field(examples=["stiffness_x"])]
+    kind: Annotated[str, Field(examples=["film_stiffness"])]
     """Kind of alarm."""
+
+    directions: str
+    """Directions in which the limit was exceeded, as "xy"; empty for an alarm without them."""
 
     occurrence: int
     """Number of the occurrence, which counts how often the alarm was raised or escalated."""
@@ -140,7 +145,7 @@ class Evidence(EvidencePart):
     """Identifier of the bearing of the alarm; null if the alarm concerns no bearing."""
 
     direction: Direction | None
-    """Direction of the alarm; null if the alarm has no direction."""
+    """Direction of the alarm, for a film that of the larger change; null without a direction."""
 
     bearings: list[BearingPart]
     """All bearings of the unit; the bearing of the alarm comes first."""
@@ -232,6 +237,7 @@ def _alarm(snapshot: Snapshot) -> AlarmPart:
         unit=identity.unit,
         subject=identity.subject,
         kind=identity.kind,
+        directions=event.directions,
         occurrence=event.occurrence,
         change=event.change.value,
         level=None if event.level is None else LEVEL_NAMES[event.level],
@@ -260,7 +266,9 @@ def _unit(snapshot: Snapshot, plant: PlantFile) -> UnitPart | None:
 
 
 def _direction(snapshot: Snapshot) -> Direction | None:
-    kind = snapshot.event.identity.kind
+    kind, own = snapshot.event.identity.kind, snapshot.bearings.get(snapshot.bearing or "")
+    if kind == FILM_STIFFNESS and own is not None and own.film is not None:
+        return AXES[own.film.worst]
     if kind.endswith("_x"):
         return "x"
     return "y" if kind.endswith("_y") else None

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 
 from core.alarms.alarm import AlarmChange, AlarmEvent
-from core.alarms.kinds import FILM_KINDS
+from core.alarms.kinds import FILM_STIFFNESS
 from core.stiffness.estimators import ESTIMATORS
 from service.reports.case import Case
 from service.reports.document import Evidence
@@ -107,7 +107,7 @@ def shortened(text: str, longest: int = LONGEST) -> str:
 def headline(evidence: Evidence) -> str:
     """Return the title of the report: unit, subject and kind of the alarm."""
     alarm = evidence.alarm
-    return f"{alarm.unit} {alarm.subject}: {kind_words(alarm.kind)}"
+    return f"{alarm.unit} {alarm.subject}: {kind_words(alarm.kind, alarm.directions)}"
 
 
 def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
@@ -131,7 +131,7 @@ def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
 def value_words(case: Case) -> str:
     """Return value and limit of the alarm; for film alarms in percent with 95 % interval."""
     alarm, found = case.evidence.alarm, finding(case)
-    if alarm.kind in FILM_KINDS and found is not None and found.change is not None:
+    if alarm.kind == FILM_STIFFNESS and found is not None and found.change is not None:
         limit = (
             ""
             if alarm.limit is None
@@ -207,16 +207,21 @@ def finding(case: Case) -> FindingPart | None:
 def story(case: Case) -> str:
     """Return a description of the stiffness change and its cause; empty for other alarms."""
     found = finding(case)
-    if case.evidence.alarm.kind not in FILM_KINDS or found is None or found.change is None:
+    film = None if case.bearing is None else case.bearing.film
+    if case.evidence.alarm.kind != FILM_STIFFNESS or film is None or found is None:
+        return ""
+    moved = [each for each in film.findings if each.level and each.change is not None]
+    if not moved:
         return ""
     hours = (
         ""
         if found.time_scale_h is None
         else f", averaged over {found.time_scale_h:g} running hours"
     )
+    changes = " and ".join(f"in {each.direction} by {change_words(each)}" for each in moved)
     sentence = (
-        f"The stiffness of the film in {case.direction} has changed by {change_words(found)}"
-        f" against the baseline under this condition{hours}."
+        f"The stiffness of the film has changed {changes} against the baseline under this"
+        f" condition{hours}."
     )
     cause = found.attribution
     if cause is None:

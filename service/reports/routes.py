@@ -64,7 +64,7 @@ class OccurrenceModel(ApiModel):
     or not recorded for this alarm."""
 
     evidence: Annotated[
-        str | None, Field(examples=["/api/v1/alarms/U1:UJB:stiffness_x/evidence/3"])
+        str | None, Field(examples=["/api/v1/alarms/U1:UJB:film_stiffness/evidence/3"])
     ]
     """URL path of the evidence document; null unless complete. Append /report or /bundle.zip for
     report and bundle."""
@@ -73,7 +73,7 @@ class OccurrenceModel(ApiModel):
 class OccurrencesModel(ApiModel):
     """List of the occurrences of an alarm."""
 
-    alarm: Annotated[str, Field(examples=["U1:UJB:stiffness_x"])]
+    alarm: Annotated[str, Field(examples=["U1:UJB:film_stiffness"])]
     """Identifier of the alarm."""
 
     origin: Literal["live", "replay"]

@@ -104,9 +104,9 @@ def kind_label(kind: str) -> str:
     return kind.replace("_", " ") if found is None else found.label
 
 
-def kind_words(kind: str) -> str:
-    """Return the label of an alarm kind with a lower-case initial: "shaft vibration 1×, x"."""
-    label = kind_label(kind)
+def kind_words(kind: str, directions: str = "") -> str:
+    """Return the label of an alarm kind in lower case: "film stiffness changed, x and y"."""
+    label = ", ".join(filter(None, (kind_label(kind), " and ".join(directions))))
     return label[:1].lower() + label[1:]
 
 

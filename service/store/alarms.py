@@ -30,7 +30,8 @@ ALARM_COLUMNS = (
     *("id", "unit", "subject", "kind", "level", "occurrence", "is_acknowledged", "raised_ns"),
     *("n_events", "is_known", "condition_level", "value", "limit_value", "reason"),
     *("suppressed_by", "is_latched", "shelf_actor", "shelf_reason", "shelf_since_ns"),
-    *("shelf_until_ns", "outage_actor", "outage_reason", "outage_since_ns", *POINT_COLUMNS),
+    *("shelf_until_ns", "outage_actor", "outage_reason", "outage_since_ns"),
+    *(*POINT_COLUMNS, "directions"),
 )
 UPSERT = upsert("alarm", ALARM_COLUMNS, ("id",)) + " WHERE alarm.n_events <= excluded.n_events"
 """Statement that writes the state of an alarm; an earlier state does not replace a later one."""
@@ -38,7 +39,7 @@ UPSERT = upsert("alarm", ALARM_COLUMNS, ("id",)) + " WHERE alarm.n_events <= exc
 EVENT_COLUMNS = (
     *("alarm", "number", "unit", "subject", "kind", "change", "level", "state_before"),
     *("state_after", "time_ns", "occurrence", "value", "limit_value", "actor", "reason"),
-    *POINT_COLUMNS,
+    *(*POINT_COLUMNS, "directions"),
 )
 INSERT_EVENT = insert("alarm_event", EVENT_COLUMNS) + " ON CONFLICT (alarm, number) DO NOTHING"
 SELECT_ALARMS = f"SELECT {', '.join(ALARM_COLUMNS)} FROM alarm ORDER BY id"  # noqa: S608
@@ -47,7 +48,9 @@ SELECT_EVENTS = f"""
     WHERE id < :before
     AND (CAST(:alarm AS TEXT) IS NULL OR alarm = :alarm)
     AND (CAST(:unit AS TEXT) IS NULL OR unit = :unit)
+    AND (CAST(:subject AS TEXT) IS NULL OR subject = :subject)
     AND (CAST(:kind AS TEXT) IS NULL OR kind = :kind)
+    AND (CAST(:level AS INTEGER) IS NULL OR level = :level)
     AND time_ns >= :start_ns AND time_ns < :end_ns
     AND {IN_STATES}
     AND {BETWEEN_BOUNDS}
@@ -117,7 +120,7 @@ def _actions(event: AlarmEvent, news: AlarmNews) -> list[AuditAction]:
 
 
 def _arguments(query: AlarmQuery) -> dict[str, object]:
-    names = ("before", "limit", "alarm", "unit", "kind", "start_ns", "end_ns")
+    names = ("before", "limit", "alarm", "unit", "subject", "kind", "level", "start_ns", "end_ns")
     asked = {name: getattr(query, name) for name in names}
     return (
         asked
@@ -136,7 +139,7 @@ def _alarm_row(alarm: Alarm) -> tuple[object, ...]:
         *(str(condition.reason), alarm.suppressed_by, alarm.is_latched),
         *(*_hold_row(shelf), shelf.until_ns if shelf else None),
         *_hold_row(outage),
-        *_point_row(alarm.raised_at),
+        *(*_point_row(alarm.raised_at), condition.directions),
     )
 
 
@@ -150,7 +153,7 @@ def _event_row(event: AlarmEvent) -> tuple[object, ...]:
         *(identity.id, event.number, identity.unit, identity.subject, identity.kind),
         *(event.change.value, event.level, event.state_before.value, event.state_after.value),
         *(event.time_ns, event.occurrence, event.value, event.limit, event.actor),
-        *(str(event.reason), *_point_row(event.raised_at)),
+        *(str(event.reason), *_point_row(event.raised_at), event.directions),
     )
 
 
@@ -183,6 +186,7 @@ def _alarm(row: tuple[Any, ...]) -> Alarm:
                 limit=found["limit_value"],
                 reason=found["reason"],
                 suppressed_by=found["suppressed_by"],
+                directions=found["directions"],
             ),
             suppressed_by=found["suppressed_by"],
             shelf=_hold(found, "shelf", found["shelf_until_ns"]),
@@ -213,6 +217,7 @@ def _event(row: tuple[Any, ...]) -> AlarmEvent:
             actor=found["actor"],
             reason=found["reason"],
             raised_at=_point(found),
+            directions=found["directions"],
         )
     except ValueError as error:
         name = f"stored event {found['number']} of alarm {found['alarm']}"

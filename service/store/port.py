@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from core.alarms.alarm import AlarmEvent
 from core.condition.operating_state import OperatingState
+from core.limits import AlarmLevel
 from core.quality import Level, Reading
 from core.samples.gaps import Gap
 
@@ -27,6 +28,13 @@ class ValueRange:
 
     low: float | None = None
     high: float | None = None
+
+    def includes(self, value: float | None) -> bool:
+        """Return whether a value is known and within the bounds."""
+        low, high = self.low, self.high
+        return value is not None and not (
+            (low is not None and value < low) or (high is not None and value > high)
+        )
 
 
 @dataclass(frozen=True)
@@ -115,7 +123,7 @@ class StoredReadings:
 
 @dataclass(frozen=True)
 class AlarmQuery:
-    """Query for alarm events, newest first; None for alarm, unit or kind matches all.
+    """Query for alarm events, newest first; None for a field matches all.
 
     Operating states and value ranges refer to the operating point at which the alarm was raised.
 
@@ -135,7 +143,9 @@ class AlarmQuery:
     limit: int = 100
     alarm: str | None = None
     unit: str | None = None
+    subject: str | None = None
     kind: str | None = None
+    level: AlarmLevel | None = None
     start_ns: int = 0
     end_ns: int = 2**63 - 1
     states: tuple[OperatingState, ...] = ()

@@ -159,6 +159,10 @@ MIGRATIONS = (
         f" ALTER TABLE {table} ADD COLUMN oil_temperature_c REAL;"
         for table in ("alarm", "alarm_event")
     ),
+    """
+    ALTER TABLE alarm ADD COLUMN directions TEXT NOT NULL DEFAULT '';
+    ALTER TABLE alarm_event ADD COLUMN directions TEXT NOT NULL DEFAULT '';
+    """,
 )
 """SQL script of each migration; item n migrates a database from schema n to schema n + 1."""
 

@@ -1,14 +1,16 @@
 """API models of alarms and alarm events."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState
-from core.alarms.kinds import FILM_KINDS
+from core.alarms.kinds import FILM_STIFFNESS
+from core.alarms.life_cycle import next_level
 from core.change.film_judge import FilmNews
 from core.condition.cells import CellGrid, OperatingPoint
+from core.limits import AlarmLevel
 from service.api.values import (
     ApiModel,
     ByName,
@@ -20,9 +22,9 @@ from service.api.values import (
     condition_model,
 )
 from service.live.current_state import LiveAlarms, LiveFilms
-from service.settings.alarm_kinds import AlarmKindName, AlarmLevelName, value_unit
+from service.settings.alarm_kinds import LEVEL_NAMES, AlarmKindName, AlarmLevelName, value_unit
 from service.settings.storage import Origin
-from service.store.port import StoredEvent
+from service.store.port import StoredEvent, ValueRange
 
 AlarmStateName = Literal[
     "normal",
@@ -57,6 +59,8 @@ AlarmChangeName = Literal[
 ConditionName = Literal["active", "within_limits", "unknown"]
 
 OriginName = Literal["live", "replay"]
+
+Directions = Annotated[Literal["", "x", "y", "xy"], Field(examples=["xy"])]
 
 AlarmIdText = Annotated[str, Field(examples=["U1:ujb_shaft_x:channel_not_ok"])]
 
@@ -157,6 +161,13 @@ class AlarmModel(ApiModel):
     value_unit: Annotated[str | None, Field(examples=["µm 0-pk"])]
     """Unit of value and limit; null for an alarm without a unit."""
 
+    directions: Directions
+    """Directions in which the limit is exceeded; empty for an alarm without directions."""
+
+    waits_for: Literal["normal", "alert", "danger"] | None
+    """State that the alarm takes if the present condition is certain and lasts for its delay; null
+    if no change is pending."""
+
     film: FilmConditionModel | None
     """Operating condition at the newest film reading, for alarms of film stiffness; null for other
     alarms, and before the first reading."""
@@ -254,6 +265,9 @@ class AlarmEventModel(ApiModel):
     value_unit: str | None
     """Unit of value and limit; null for an alarm without a unit."""
 
+    directions: Directions
+    """Directions in which the limit was exceeded; empty for an alarm without directions."""
+
     actor: str
     """Person or key that caused the event; empty for an automatic change."""
 
@@ -312,7 +326,37 @@ def alarm_model(engine: LiveAlarms, films: LiveFilms, alarm: Alarm) -> AlarmMode
         condition=judged if is_judged else "unknown",
         condition_reason=condition.reason if is_judged else unseen,
         value_unit=value_unit(identity.kind),
+        waits_for=_awaited(alarm, films) if is_judged else None,
         film=_film(films, identity),
+    )
+
+
+def _awaited(alarm: Alarm, films: LiveFilms) -> str | None:
+    """Return the state that an alarm takes after its running delays; None if it stays as it is."""
+    news, rules = _film_news(films, alarm.identity), films.rules(alarm.identity.unit)
+    level, timers = alarm.level, [alarm.timers]
+    if news is not None and rules is not None:
+        timers = [(each.alert, each.danger) for each in news.decisions]
+        changes = [abs(each.change or 0.0) for each in news.findings]
+        if level is AlarmLevel.ALERT and max(changes) >= rules.change.danger_change:
+            return LEVEL_NAMES[AlarmLevel.DANGER]  # large, but not certain yet
+    after = next_level(level, timers)
+    if after is level or alarm.is_latched:
+        return None
+    return "normal" if after is None else LEVEL_NAMES[after]
+
+
+def is_raised_within(
+    alarm: AlarmModel,
+    states: Sequence[OperatingStateName] | None,
+    ranges: Mapping[str, ValueRange],
+) -> bool:
+    """Return whether an alarm was raised in one of the states, and within ranges by quantity."""
+    at = alarm.raised_at
+    is_inside = not states or (at is not None and at.operating_state in states)
+    return is_inside and all(
+        wanted == ValueRange() or (at is not None and wanted.includes(getattr(at, name)))
+        for name, wanted in ranges.items()
     )
 
 
@@ -328,7 +372,7 @@ def _film(films: LiveFilms, identity: AlarmIdentity) -> FilmConditionModel | Non
 
 
 def _film_news(films: LiveFilms, identity: AlarmIdentity) -> FilmNews | None:
-    is_film = identity.kind in FILM_KINDS
+    is_film = identity.kind == FILM_STIFFNESS
     return films.newest(identity.unit, identity.subject) if is_film else None
 
 

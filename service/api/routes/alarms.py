@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from pydantic import Field
@@ -19,6 +19,7 @@ from core.alarms.operation import (
     Unshelve,
 )
 from core.condition.cells import CellGrid
+from core.limits import AlarmLevel
 from core.units import ns_from_s
 from service.api.answers import in_thread, rendered
 from service.api.auth.declared import Reach, needs, subject_router
@@ -46,11 +47,12 @@ from service.api.routes.alarm_models import (
     alarm_model,
     event_model,
     grid_of,
+    is_raised_within,
 )
 from service.api.tables import Column, Format, kind_of, table_content, table_response
 from service.api.token_bucket import TokenBucket
 from service.api.values import ActorModel, ApiModel, NoteText, ReasonText, states_named
-from service.settings.alarm_kinds import AlarmKindName
+from service.settings.alarm_kinds import AlarmKindName, AlarmLevelName
 from service.store.access.identities import Permission
 from service.store.port import AlarmQuery, StoredEvent
 
@@ -135,6 +137,9 @@ AlarmId = Annotated[
     ),
 ]
 
+OnlySubject = Annotated[str | None, only("bearing or other subject", "LJB", 64)]
+OnlyLevel = Annotated[AlarmLevelName | None, only("level", "danger")]
+
 OUTAGE = [needs(Permission.CHANGE_MEASURING)]
 """Permission to take an alarm out of service; the alarm then sends no messages."""
 
@@ -153,10 +158,14 @@ def alarm_router(context: Context) -> APIRouter:
     @router.get("", summary="All alarms that are not normal", response_model=AlarmListModel)
     async def alarms(
         request: Request,
+        eccentricity: Eccentricity,
+        oil_temperature: OilTemperature,
+        attitude: Attitude,
         unit: OnlyUnit = None,
-        subject: Annotated[str | None, only("bearing or other subject", "LJB", 64)] = None,
-        kind: Annotated[AlarmKindName | None, only("kind", "stiffness_x")] = None,
-        level: Annotated[Literal["alert", "danger"] | None, only("level", "danger")] = None,
+        subject: OnlySubject = None,
+        kind: Annotated[AlarmKindName | None, only("kind", "film_stiffness")] = None,
+        level: OnlyLevel = None,
+        state: States = None,
         acknowledged: Annotated[
             bool | None,
             Query(description="Only alarms that are acknowledged, or are not.", examples=[False]),
@@ -164,7 +173,8 @@ def alarm_router(context: Context) -> APIRouter:
     ) -> Response:
         """List alarms that are not normal, most urgent first; then those of unknown condition.
 
-        The parameters select alarms; `count` is that of the whole plant.
+        The parameters select alarms; operating state, eccentricity, attitude angle and oil
+        temperature are those at which an alarm was raised. `count` is that of the whole plant.
         """
         wanted = {
             "unit": unit,
@@ -174,12 +184,22 @@ def alarm_router(context: Context) -> APIRouter:
             "is_acknowledged": acknowledged,
         }
         asked = {name: value for name, value in wanted.items() if value is not None}
+        ranges = {
+            "eccentricity_ratio": eccentricity,
+            "oil_temperature_c": oil_temperature,
+            "attitude_deg": attitude,
+        }
 
         def make() -> AlarmListModel:
             found = alarm_list_model(engine, films, context.origin)
             return found.model_copy(
                 update={
-                    name: [a for a in listed if asked.items() <= dict(a).items()]
+                    name: [
+                        alarm
+                        for alarm in listed
+                        if asked.items() <= dict(alarm).items()
+                        and is_raised_within(alarm, state, ranges)
+                    ]
                     for name, listed in (("alarms", found.alarms), ("unjudged", found.unjudged))
                 }
             )
@@ -303,7 +323,9 @@ async def event_query(
     times: OptionalTimeRange,
     unit: OnlyUnit = None,
     alarm: Annotated[str | None, only("alarm", "U1:ujb_shaft_x:channel_not_ok", 128)] = None,
+    subject: OnlySubject = None,
     kind: Annotated[AlarmKindName | None, only("kind", "channel_not_ok")] = None,
+    level: OnlyLevel = None,
     before: Annotated[int | None, before_number("Return only events older than this id.")] = None,
     limit: Annotated[
         int, Query(ge=1, le=MAX_EVENTS, description="Maximum number of events in the answer.")
@@ -317,7 +339,9 @@ async def event_query(
         limit=limit,
         alarm=alarm,
         unit=unit,
+        subject=subject,
         kind=kind,
+        level=None if level is None else AlarmLevel[level.upper()],
         start_ns=max(start_ns, 0),
         end_ns=min(max(end_ns, 0), AlarmQuery.end_ns),
         states=states_named(state),

@@ -25,14 +25,14 @@ const CHANGES = {
   reset: "reset",
   acknowledged: "acknowledged",
   shelved: "shelved",
-  unshelved: "back from the shelf",
+  unshelved: "unshelved",
   suppressed: "suppressed by design",
   unsuppressed: "no longer suppressed",
   taken_out_of_service: "taken out of service",
   returned_to_service: "returned to service",
   commented: "commented",
-  condition_unknown: "condition no longer known",
-  condition_known: "condition known again",
+  condition_unknown: "cannot be evaluated",
+  condition_known: "can be evaluated again",
 };
 
 const REASONS = {
@@ -75,6 +75,8 @@ const WITHIN = {
 };
 
 export const kindWords = (kind) => ALARM_KINDS[kind]?.label ?? kind.replaceAll("_", " ");
+/** `Film stiffness changed, x and y` */
+export const whatWords = ({ kind, directions }) => [kindWords(kind), [...(directions ?? "")].join(" and ")].filter(Boolean).join(", ");
 export const stateWords = (state) => STATES[state] ?? state.replaceAll("_", " ");
 export const changeWords = (change) => CHANGES[change] ?? change.replaceAll("_", " ");
 
@@ -135,6 +137,13 @@ export function conditionWords({ condition, condition_reason: reason }) {
   if (condition === "unknown") return `Unknown: ${alarmReasonWords(reason)}`;
   if (condition === "within_limits") return WITHIN[reason] ?? "Within limits";
   return `Active: ${alarmReasonWords(reason)}`;
+}
+
+/** What an alarm becomes if its condition lasts; nothing where no delay is running. */
+export function waitWords({ kind, waits_for: next }) {
+  if (!next) return "";
+  const lasting = ALARM_KINDS[kind]?.rule === "films" ? "once it is certain and has lasted" : "if it lasts for its delay";
+  return next === "normal" ? `Returns ${lasting}` : `${next === "danger" ? "Danger" : "Eases to alert"} ${lasting}`;
 }
 
 /** Who has taken an alarm off the list, why and until when. */

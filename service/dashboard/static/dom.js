@@ -23,6 +23,16 @@ export function setText(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
 
+/** A pressed button may disappear when the page is drawn: the focus then moves to its row, or to `fallback`. */
+export function keepingFocus(fallback, draw) {
+  const focused = document.activeElement;
+  const row = focused.closest("tr, li");
+  draw();
+  if (focused.isConnected && !focused.closest("[hidden]")) return;
+  const next = row?.isConnected ? [...row.querySelectorAll("button, a")].find((one) => !one.closest("[hidden]")) : null;
+  (next ?? fallback).focus();
+}
+
 /** Set or, with null, remove an attribute, touching the page only on a change. */
 export function setAttribute(node, name, value) {
   if (value === null) node.removeAttribute(name);

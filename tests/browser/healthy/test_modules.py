@@ -32,7 +32,7 @@ UNKNOWN = SILENT | {"reason": "daq:502: [Errno -3] Temporary failure in name res
 async def test_an_alarm_leads_to_where_most_is_told_about_it(plant, page: Page) -> None:
     await page.goto(plant.url + EMPTY)
     bearing = ("order1_shaft_x", "zone_bearing_y", "oil_temperature", "gap_x", "opposite_gap_y")
-    alarms = [("stiffness_x", "UJB"), ("channel_not_ok", "a"), ("link_lost", "link")]
+    alarms = [("film_stiffness", "UJB"), ("channel_not_ok", "a"), ("link_lost", "link")]
     alarms += [(kind, "UJB") for kind in bearing]
     told = [{"unit": "U1", "subject": subject, "kind": kind} for kind, subject in alarms]
     found = [await page.evaluate(CALL, ["alarm_place", "alarmPlace", alarm]) for alarm in told]

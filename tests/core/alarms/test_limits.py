@@ -18,6 +18,8 @@ from core.alarms.judgements import (
     vector_judgement,
 )
 from core.alarms.kinds import Watch
+from core.alarms.life_cycle import SAME_EVENT_NS
+from core.alarms.operation import Acknowledge
 from core.alarms.rules import LimitRule, Region, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.condition.cells import NOWHERE_KNOWN, OperatingPoint
@@ -193,7 +195,7 @@ def test_a_zone_is_named_also_when_it_is_no_alarm(value, level, zone):
     assert (found.level, found.reason) == (level, zone)
 
 
-FILM_X = "U1:UJB:stiffness_x"
+FILM = "U1:UJB:film_stiffness"
 
 LOST = Judgement(AlarmLevel.ALERT, value=-0.21, limit=0.1, reason="film")
 
@@ -204,48 +206,112 @@ def alarms(unit: Unit) -> UnitAlarms:
 
 
 def changes(alarms: UnitAlarms, conditions: Mapping[str, Judgement], now_ns: int) -> list[str]:
-    news = alarms.films(conditions, now_ns)
+    """Changes of the alarm of a film with these judgements of its directions."""
+    news = alarms.films({FILM: conditions}, now_ns)
     return [event.change.value for told in news for event in told.events]
 
 
-def test_films_have_an_alarm_in_each_direction_that_announces_a_loss_with_its_size(alarms, unit):
+WELL_FILM = Judgement(value=-0.01, limit=0.1)
+DEEPER = Judgement(AlarmLevel.DANGER, value=-0.4, limit=0.3, reason="film")
+BLIND = unknown("insufficient_excitation")
+
+
+def seen(alarms: UnitAlarms, now_ns: int) -> None:
+    alarms.operate(FILM, Acknowledge("A. Name", alarms.alarm(FILM).occurrence), now_ns)
+
+
+def test_a_film_has_one_alarm_that_announces_a_loss_with_its_size_and_direction(alarms, unit):
     ids = [alarm.identity.id for alarm in alarms.alarms]
-    assert [id_ for id_ in ids if "stiffness" in id_] == [FILM_X, "U1:UJB:stiffness_y"]
+    assert [id_ for id_ in ids if "stiffness" in id_] == [FILM]
     unwatched = UnitAlarms(unit, UnitRules())
     assert not [a for a in unwatched.alarms if "stiffness" in a.identity.id]
     with pytest.raises(KeyError):
-        unwatched.films({FILM_X: LOST}, 0)
+        unwatched.films({FILM: {"x": LOST}}, 0)
 
-    [news] = alarms.films({FILM_X: LOST}, 7)
+    [news] = alarms.films({FILM: {"x": LOST, "y": WELL_FILM}}, 7)
 
     [event] = news.events
-    found = (event.change.value, event.value, event.limit, event.time_ns)
-    assert found == ("raised", -0.21, 0.1, 7)
+    found = (event.change.value, event.value, event.limit, event.time_ns, event.directions)
+    assert found == ("raised", -0.21, 0.1, 7, "x")
 
 
 @pytest.mark.parametrize(
     "verdict", ["no_baseline", "insufficient_excitation", "bad_quality", "transient"]
 )
 def test_a_film_that_cannot_be_judged_stays_in_alarm_and_says_why(alarms, verdict):
-    changes(alarms, {FILM_X: LOST}, 0)
+    changes(alarms, {"x": LOST, "y": WELL_FILM}, 0)
 
-    assert changes(alarms, {FILM_X: unknown(verdict)}, 1) == ["condition_unknown"]
-    alarm = alarms.alarm(FILM_X)
+    blind = {"x": unknown(verdict), "y": WELL_FILM}
+    assert changes(alarms, blind, 1) == ["condition_unknown"]
+    alarm = alarms.alarm(FILM)
     assert (alarm.level, alarm.condition.reason) == (AlarmLevel.ALERT, verdict)
+    assert alarm.condition.directions == "x"
+
+
+def test_a_film_returns_when_the_directions_of_its_alarm_are_within_limits(alarms):
+    changes(alarms, {"x": LOST, "y": WELL_FILM}, 0)
+
+    assert changes(alarms, {"x": WELL_FILM, "y": BLIND}, 1) == ["returned"]
+    changes(alarms, {"x": WELL_FILM, "y": BLIND}, 2)
+    assert not alarms.alarm(FILM).condition.is_known
+
+
+def test_both_directions_of_a_film_are_one_occurrence(alarms):
+    assert changes(alarms, {"x": LOST, "y": LOST}, 0) == ["raised"]
+    alarm = alarms.alarm(FILM)
+    assert (alarm.occurrence, alarm.condition.directions) == (1, "xy")
+    assert changes(alarms, {"x": DEEPER, "y": LOST}, 1) == ["escalated"]
+    assert (alarms.alarm(FILM).condition.value, alarms.alarm(FILM).occurrence) == (-0.4, 2)
+    assert changes(alarms, {"x": DEEPER, "y": DEEPER}, 2) == []
+    assert changes(alarms, {"x": BLIND, "y": LOST}, 3) == []  # x is not known to have eased
+    assert alarms.alarm(FILM).level is AlarmLevel.DANGER
+
+
+def test_a_direction_that_follows_soon_belongs_to_the_occurrence_that_nobody_has_seen(alarms):
+    changes(alarms, {"x": LOST, "y": WELL_FILM}, 1)
+
+    assert changes(alarms, {"x": LOST, "y": LOST}, 1 + SAME_EVENT_NS) == []
+    alarm = alarms.alarm(FILM)
+    assert (alarm.occurrence, alarm.condition.directions) == (1, "xy")
+
+
+@pytest.mark.parametrize(("is_seen", "after_ns"), [(True, 1), (False, SAME_EVENT_NS + 1)])
+def test_a_direction_that_follows_later_or_after_an_acknowledgement_is_announced(
+    alarms, is_seen, after_ns
+):
+    changes(alarms, {"x": LOST, "y": WELL_FILM}, 1)
+    if is_seen:
+        seen(alarms, 2)
+
+    assert changes(alarms, {"x": LOST, "y": LOST}, 1 + after_ns) == ["raised"]
+    alarm = alarms.alarm(FILM)
+    assert (alarm.occurrence, alarm.state) == (2, AlarmState.UNACKNOWLEDGED)
+    seen(alarms, 2 + after_ns)
+    assert changes(alarms, {"x": WELL_FILM, "y": LOST}, 3 + after_ns) == []
+    assert changes(alarms, {"x": BLIND, "y": LOST}, 4 + after_ns) == []
+
+
+def test_a_direction_that_joins_while_the_other_eases_is_announced(alarms):
+    changes(alarms, {"x": DEEPER, "y": WELL_FILM}, 1)
+    seen(alarms, 2)
+
+    assert changes(alarms, {"x": LOST, "y": LOST}, 3) == ["eased", "raised"]
+    alarm = alarms.alarm(FILM)
+    assert (alarm.level, alarm.is_latched) == (AlarmLevel.ALERT, False)
 
 
 def test_a_film_that_was_never_judged_raises_nothing(alarms):
-    assert changes(alarms, {FILM_X: unknown("no_baseline")}, 1) == []
-    alarm = alarms.alarm(FILM_X)
+    assert changes(alarms, {"x": unknown("no_baseline"), "y": WELL_FILM}, 1) == []
+    alarm = alarms.alarm(FILM)
     assert (alarm.state, alarm.condition.is_known) == (AlarmState.NORMAL, False)
 
 
 def test_a_latched_loss_outlasts_the_healthy_verdict(unit):
     alarms = UnitAlarms(unit, UnitRules(films=rule_of(0.0, 0.0, is_latching=True)))
-    changes(alarms, {FILM_X: LOST}, 0)
+    changes(alarms, {"x": LOST, "y": WELL_FILM}, 0)
 
-    assert changes(alarms, {FILM_X: Judgement()}, 1) == ["latched"]
-    assert alarms.alarm(FILM_X).level is AlarmLevel.ALERT
+    assert changes(alarms, {"x": WELL_FILM, "y": WELL_FILM}, 1) == ["latched"]
+    assert alarms.alarm(FILM).level is AlarmLevel.ALERT
 
 
 VECTOR_ALERT = AlarmLevel.ALERT

@@ -67,7 +67,7 @@ async def test_a_lost_probe_is_on_the_list_and_in_the_history(service, probes):
     [
         ({"unit": "U1"}, {"unit": "U2"}),
         ({"subject": "ujb_shaft_x"}, {"subject": "LJB"}),
-        ({"kind": "channel_not_ok"}, {"kind": "stiffness_x"}),
+        ({"kind": "channel_not_ok"}, {"kind": "film_stiffness"}),
         ({"level": "alert"}, {"level": "danger"}),
         ({"acknowledged": False}, {"acknowledged": True}),
     ],

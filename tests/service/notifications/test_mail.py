@@ -25,8 +25,9 @@ from service.settings.notifications import SmtpSettings
 MESSAGE: Message = {
     "format": 1, "id": "5e4b", "type": "alarm", "plant": "Itaipu",
     "written": "2026-01-01T00:00:05.000Z", "url": "https://padwatch.example/#/alarms",
-    "alarm": "U1:UJB:stiffness_x", "unit": "U1", "unit_name": "Unit 1", "subject": "UJB",
-    "kind": "stiffness_x", "number": 1, "change": "raised", "priority": "danger",
+    "alarm": "U1:UJB:film_stiffness", "unit": "U1", "unit_name": "Unit 1", "subject": "UJB",
+    "kind": "film_stiffness", "directions": "xy", "number": 1, "change": "raised",
+    "priority": "danger",
     "is_active": True, "state": "unacknowledged", "occurrence": 1, "actor": "",
     "time": "2026-01-01T00:00:04.000Z", "raised": "2026-01-01T00:00:04.000Z",
     "reason": "film", "value": -0.2, "uncertainty": 0.01, "limit": 0.1, "value_unit": "1",
@@ -117,7 +118,8 @@ async def test_a_mail_says_what_where_since_when_by_how_much_and_under_which_con
     assert server.mails[0] == server.mails[1]
     mail = email.message_from_bytes(server.mails[0], policy=default)
     assert mail["Message-ID"] == "<5e4b@x.example>"
-    assert mail["Subject"] == "[padwatch] Itaipu: DANGER, U1 UJB film stiffness changed, x raised"
+    where = "[padwatch] Itaipu: DANGER, U1 UJB"
+    assert mail["Subject"].strip() == f"{where} film stiffness changed, x and y raised"
     text = mail.get_content()
     assert "Itaipu, U1 UJB (Unit 1)" in text
     assert "Since:     2026-01-01T00:00:04.000Z" in text

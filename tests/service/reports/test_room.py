@@ -17,10 +17,10 @@ RoomOf = Callable[..., EvidenceRetention]
 KB = b"x" * 1000
 
 OLDEST, OLD, YOUNG, NEWEST = (
-    f"{moment}T000000.000Z-UJB-stiffness_x-{number}"
+    f"{moment}T000000.000Z-UJB-film_stiffness-{number}"
     for number, moment in enumerate(("20251001", "20251101", "20251228", "20251231"), 1)
 )
-FIFTH = "20251231T120000.000Z-UJB-stiffness_x-5"
+FIFTH = "20251231T120000.000Z-UJB-film_stiffness-5"
 
 
 @pytest.fixture
@@ -68,7 +68,7 @@ def test_what_is_young_stays_until_the_hard_limit(root, room_of, hard, kept):
 
 
 def test_an_alarm_that_chatters_loses_its_own_oldest(root, room_of):
-    other = bundle(root, "20250101T000000.000Z-LJB-stiffness_x-1").folder.name
+    other = bundle(root, "20250101T000000.000Z-LJB-film_stiffness-1").folder.name
     assert room_of(8000, most=2).make() == [OLDEST, OLD]
     assert left(root) == [other, YOUNG, NEWEST]
 

@@ -233,7 +233,7 @@ url = "https://alarms.example/padwatch?key=1"
 secret = { env = "PADWATCH_KEY" }
 quiet = { start = "22:00", end = "06:00", time_zone = "America/Asuncion" }
 units = ["U1"]
-kinds = ["link_lost", "stiffness_x"]
+kinds = ["link_lost", "film_stiffness"]
 lowest_priority = "danger"
 """
 
@@ -285,7 +285,7 @@ def test_every_recipient_is_a_receiver_and_secrets_in_addresses_are_not_shown(pl
         ('"06:00"', '"22:00"', "must differ from start"),
         ("America/Asuncion", "Mars/Olympus", "is not a known IANA time zone"),
         ('["U1"]', '["U9"]', "unknown unit; known units: U1, U2"),
-        ('["link_lost", "stiffness_x"]', '["mood"]', "delivery.receiver[1].kinds[1]"),
+        ('["link_lost", "film_stiffness"]', '["mood"]', "delivery.receiver[1].kinds[1]"),
         ('"danger"', '"panic"', "lowest_priority"),
         ('id = "shift"', 'id = "desk"', "is used twice"),
         ('username = "padwatch"\n', "", "username and password must be given"),

@@ -1,6 +1,6 @@
 /** The newest events of all alarms, one line each. */
 
-import { alarmReasonWords, changeWords, kindWords, placeWords, raisedWords, valueWords } from "../alarm_words.js";
+import { alarmReasonWords, changeWords, placeWords, raisedWords, valueWords, whatWords } from "../alarm_words.js";
 import { element, setText } from "../dom.js";
 import { formatTime } from "../format.js";
 import { evidenceLinks } from "../parts/evidence.js";
@@ -20,11 +20,11 @@ export function historyTable(filter) {
   );
   let shown = null;
   return {
-    node: element("section", { class: "panel alarm-list" }, element("h2", {}, "History"), filter.node, sentence, table),
+    node: element("section", { class: "panel alarm-list" }, element("h2", {}, "History"), sentence, table),
     draw(events) {
       table.hidden = events.length === 0;
       sentence.hidden = events.length > 0;
-      setText(sentence, filter.query().length ? "Nothing was raised under that condition." : "Nothing has happened yet.");
+      setText(sentence, filter.eventQuery().length ? "No event matches the filter." : "Nothing has happened yet.");
       const ids = events.map(({ id }) => id).join();
       if (ids === shown) return; // events never change
       shown = ids;
@@ -41,7 +41,7 @@ function eventRow(event) {
   const cells = [
     formatTime(Date.parse(event.time)),
     placeWords(event),
-    kindWords(event.kind),
+    whatWords(event),
     changeWords(event.change) + (event.change === "raised" && event.level === "danger" ? " as danger" : ""),
     valueWords(event),
     raisedWords(event),

@@ -18,25 +18,18 @@ export function ratesLine() {
   };
 }
 
-/** `Seven days: 12 alarms, 1.7 a day, at most 3 in ten minutes; ...` */
+/** `Last 7 days: 2 alarms (0.3/day, peak 2 per 10 min). Chattering 0, fleeting 0, stale 0.` */
 export function ratesWords({ all, stale, is_complete: complete }) {
-  const parts = [
-    `${count(all.n_alarms, "alarm")}, ${formatFixed(all.per_day, 1)} a day, ` +
-      `${formatFixed(all.per_10_min, 2)} in ten minutes, at most ${all.most_in_10_min}`,
-  ];
   const [first] = all.most_frequent;
-  if (first) parts.push(`most frequent ${nameOf(first.alarm)} (${formatFixed(100 * first.share, 0)} %)`);
-  if (all.n_alarms) parts.push(`${formatFixed(100 * all.share_by_level.danger, 0)} % danger`);
-  const chattering = Object.keys(all.chattering).length;
-  parts.push(chattering ? `${chattering} chattering` : "none chattering");
-  parts.push(`${all.n_fleeting} fleeting`);
-  parts.push(stale.length ? `${stale.length} standing for more than a day` : "none standing for more than a day");
-  return `${complete ? "Seven days" : "Lately (too many to count seven days)"}: ${parts.join("; ")}.`;
+  const often = first ? ` Most frequent: ${nameOf(first.alarm)} (${formatFixed(100 * first.share, 0)} %).` : "";
+  return (
+    `${complete ? "Last 7 days" : "Lately (too many to count 7 days)"}: ${all.n_alarms} ${all.n_alarms === 1 ? "alarm" : "alarms"} ` +
+    `(${formatFixed(all.per_day, 1)}/day, peak ${all.most_in_10_min} per 10 min). ` +
+    `Chattering ${Object.keys(all.chattering).length}, fleeting ${all.n_fleeting}, stale ${stale.length}.${often}`
+  );
 }
 
 function nameOf(alarm) {
   const [unit, subject, kind] = alarm.split(":");
   return `${unit} ${subject}: ${kindWords(kind)}`;
 }
-
-const count = (n, word) => `${n} ${word}${n === 1 ? "" : "s"}`;

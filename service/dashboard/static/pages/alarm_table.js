@@ -1,74 +1,57 @@
 /** Alarms as a table; a row stays the same row as long as its alarm is there. */
 
-import { conditionWords, holdWords, kindWords, levelMark, placeWords, raisedWords, stateWords, valueWords } from "../alarm_words.js";
+import { conditionWords, holdWords, levelMark, placeWords, raisedWords, stateWords, valueWords, waitWords, whatWords } from "../alarm_words.js";
 import { alarmPlace } from "../alarm_place.js";
 import { element, setAttribute, setText } from "../dom.js";
 import { formatTime } from "../format.js";
 import { evidenceLinks } from "../parts/evidence.js";
+import { listing, listingCell } from "../parts/listing.js";
 import { mark } from "../parts/mark.js";
+import { may } from "../session.js";
 import { alarmActions } from "./alarm_actions.js";
 
-const HEADS = ["Priority", "State", "Where", "What", "Value", "Condition now", "Since", ""];
+const HEADS = ["Priority", "State", "Where", "What", "Value", "Condition now", "Since", "Report", ""];
 
-/** Returns `{ node, draw(alarms), setCurrent(isCurrent) }`. */
-export function alarmTable(title, nothing, actor, again) {
-  const body = element("tbody", { role: "rowgroup" });
-  const empty = element("p", { class: "sentence" }, nothing);
-  const heads = HEADS.map((head) => element("th", { scope: "col", role: "columnheader" }, head || element("span", { class: "hidden" }, "Actions")));
-  const table = element(
-    "table",
-    { role: "table", "aria-label": title, hidden: "" },
-    element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...heads)),
-    body,
-  );
-  const rows = new Map();
-  return {
-    node: element("section", { class: "panel alarm-list" }, element("h2", {}, title), empty, table),
-    draw(alarms) {
-      table.hidden = alarms.length === 0;
-      empty.hidden = alarms.length > 0;
-      const present = new Set(alarms.map((alarm) => alarm.id));
-      for (const [id, row] of rows) {
-        if (!present.has(id)) {
-          row.node.remove();
-          rows.delete(id);
-        }
-      }
-      alarms.forEach((alarm, place) => {
-        const row = rows.get(alarm.id) ?? rows.set(alarm.id, alarmRow(actor, again)).get(alarm.id);
-        if (body.children[place] !== row.node) body.insertBefore(row.node, body.children[place] ?? null);
-        row.draw(alarm);
-      });
-    },
-    setCurrent(isCurrent) {
-      setAttribute(table, "data-current", String(isCurrent));
-    },
-  };
+/**
+ * Returns `{ node, draw(alarms), setCurrent(isCurrent) }`; `above` stands over the table.
+ *
+ * `onSelect(id, isSelected)` makes rows selectable; `onCell(alarm)` receives a request for the alarms of the same cell.
+ */
+export function alarmTable(title, nothing, again, { above = "", onSelect = null, onCell }) {
+  const table = listing(title, HEADS, nothing, ({ id }) => id, () => alarmRow(again, onSelect, onCell));
+  const node = element("section", { class: "panel alarm-list" }, element("h2", {}, title), above, table.node);
+  return { node, draw: table.draw, setCurrent: table.setCurrent };
 }
 
-function alarmRow(actor, again) {
+function alarmRow(again, onSelect, onCell) {
+  let alarm = null;
   const priority = mark();
-  const texts = HEADS.slice(1, -1).map((head) => element(head === "Where" ? "a" : "span"));
-  const hold = element("span", { class: "hold" });
-  const raisedAt = element("span", { class: "hold" });
-  const actions = alarmActions(actor, again);
-  const cells = [priority.node, ...texts, actions.node].map((node, index) =>
-    element("td", { role: "cell", "data-head": HEADS[index] }, node),
-  );
+  const select = element("input", { type: "checkbox", "aria-label": "Select" });
+  select.addEventListener("change", () => onSelect(alarm.id, select.checked));
+  const texts = HEADS.slice(1, 7).map((head) => element(head === "Where" ? "a" : "span"));
+  const [hold, raisedAt, waits] = [0, 1, 2].map(() => element("span", { class: "hold" }));
+  const cell = element("button", { type: "button", class: "same-cell", title: "Show alarms raised in the same condition cell" }, "Same cell");
+  cell.addEventListener("click", () => onCell(alarm));
   const evidence = evidenceLinks();
+  const actions = alarmActions(again);
+  const cells = [priority.node, ...texts, evidence.node, actions.node].map((content, n) => listingCell(HEADS[n], content));
+  cells[0].prepend(select);
   cells[1].append(hold);
-  cells[6].append(raisedAt, evidence.node);
+  cells[5].append(waits);
+  cells[6].append(raisedAt, cell);
   const node = element("tr", { role: "row" }, ...cells);
   return {
-    node,
-    draw(alarm) {
+    nodes: [node],
+    draw(now) {
+      alarm = now;
       setAttribute(node, "data-alarm", alarm.id);
       setAttribute(node, "data-state", alarm.state);
       priority.draw(...levelMark(alarm));
+      select.hidden = onSelect === null || alarm.is_acknowledged || !may("act_on_alarms");
       const words = [
         stateWords(alarm.state) + (alarm.is_latched ? ", latched" : "") + (alarm.is_chattering ? ", chattering" : ""),
         placeWords(alarm),
-        kindWords(alarm.kind),
+        whatWords(alarm),
         valueWords(alarm),
         conditionWords(alarm),
         alarm.raised ? formatTime(Date.parse(alarm.raised)) : "",
@@ -76,7 +59,9 @@ function alarmRow(actor, again) {
       texts.forEach((text, index) => setText(text, words[index]));
       setAttribute(texts[HEADS.indexOf("Where") - 1], "href", alarmPlace(alarm));
       setText(hold, holdWords(alarm));
+      setText(waits, waitWords(alarm));
       setText(raisedAt, raisedWords(alarm));
+      cell.hidden = !alarm.raised_at?.cell;
       evidence.draw(alarm.id, alarm.occurrence);
       actions.draw(alarm);
     },

@@ -2,14 +2,15 @@
 
 import { conditionWords, isHidden } from "../alarm_words.js";
 import { ask } from "../api.js";
-import { element, setText } from "../dom.js";
+import { element, keepingFocus, setText } from "../dom.js";
 import { formatAge } from "../format.js";
 import { CURRENT_LIMIT_S, moment, secondsBetween } from "../live.js";
+import { actorField } from "../parts/actor.js";
 import { deliveryView } from "../parts/delivery.js";
 import { mark } from "../parts/mark.js";
 import { poll } from "../poll.js";
-import { actorField } from "./alarm_actor.js";
 import { alarmFilter } from "./alarm_filter.js";
+import { groupAcknowledge } from "./alarm_group.js";
 import { historyTable } from "./alarm_history.js";
 import { ratesLine } from "./alarm_rates.js";
 import { alarmTable } from "./alarm_table.js";
@@ -22,23 +23,33 @@ const N_EVENTS = "50";
 /** Returns `{ draw(view), close() }`. */
 export function alarmsPage(main) {
   const state = mark();
-  const actor = actorField("act_on_alarms", "act on alarms", "before you acknowledge");
+  const actor = actorField("act_on_alarms", "act on alarms");
   const done = element("span", { class: "done", role: "status" });
   const again = (sentence) => {
     setText(done, sentence ?? "");
     for (const each of [lists, histories]) each.again();
   };
-  const listed = alarmTable("On the list", "Nothing is on the list.", actor, again);
-  const hidden = alarmTable("Taken off the list", "Nothing is shelved, suppressed or out of service.", actor, again);
+  const selected = new Set();
+  const group = groupAcknowledge(again);
+  const filter = alarmFilter(() => again(null));
+  const filtered = element("p", { class: "sentence", hidden: "" });
+  const onCell = filter.toCell;
+  const onSelect = (id, isSelected) => {
+    selected[isSelected ? "add" : "delete"](id);
+    group.draw(shown, selected);
+  };
+  const above = element("div", {}, filtered, group.node);
+  const listed = alarmTable("Active alarms", "No alarms.", again, { above, onSelect, onCell });
+  const hidden = alarmTable("Shelved and suppressed", "Nothing is shelved, suppressed or out of service.", again, { onCell });
   const unjudged = unjudgedView();
   const rates = ratesLine();
-  const filter = alarmFilter(() => histories.again());
   const history = historyTable(filter);
   const head = element("div", { class: "alarms-head" }, element("h1", { tabindex: "-1" }, "Alarms"), state.node, done, actor.node);
   const delivery = deliveryView();
-  main.append(head, delivery.node, listed.node, unjudged.node, hidden.node, rates.node, history.node);
+  main.append(head, delivery.node, filter.node, listed.node, unjudged.node, hidden.node, rates.node, history.node);
   let receivedAt = null;
   let failure = null;
+  let shown = [];
 
   function draw() {
     const silenceS = receivedAt ? secondsBetween(receivedAt, moment()) : null;
@@ -46,16 +57,22 @@ export function alarmsPage(main) {
     state.node.hidden = current && failure === null;
     state.draw("bad", silenceWords(silenceS, failure));
     for (const table of [listed, hidden]) table.setCurrent(current);
+    actor.draw();
   }
 
   async function askList(signal) {
     try {
-      const found = await ask(["alarms"], [], signal);
+      const found = await ask(["alarms"], filter.query(), signal);
       [receivedAt, failure] = [moment(), null];
-      keepingFocus(main, () => {
-        listed.draw(found.alarms.filter((alarm) => !isHidden(alarm)));
-        hidden.draw(found.alarms.filter(isHidden));
+      const alarms = filter.sorted(found.alarms);
+      shown = alarms.filter((alarm) => !isHidden(alarm));
+      keepingFocus(main.querySelector("h1"), () => {
+        listed.draw(shown);
+        hidden.draw(alarms.filter(isHidden));
+        group.draw(shown, selected);
       });
+      filtered.hidden = filter.query().length === 0;
+      setText(filtered, `Filtered: only alarms that match are shown; ${found.count.n_active} of the plant are active.`);
       unjudged.draw(found.unjudged);
     } catch (error) {
       if (signal.aborted) return;
@@ -66,7 +83,7 @@ export function alarmsPage(main) {
 
   async function askHistory(signal) {
     try {
-      history.draw((await ask(["alarms", "events"], [["limit", N_EVENTS], ...filter.query()], signal)).events);
+      history.draw((await ask(["alarms", "events"], [["limit", N_EVENTS], ...filter.eventQuery()], signal)).events);
     } catch (error) {
       if (!signal.aborted) history.fail(error.message);
     }
@@ -103,16 +120,6 @@ export function alarmsPage(main) {
   };
 }
 
-/** A pressed button may disappear with its action: the focus then moves to its row, or to the top. */
-function keepingFocus(main, draw) {
-  const focused = document.activeElement;
-  const row = focused.closest("tr");
-  draw();
-  if (focused.isConnected && !focused.closest("[hidden]")) return;
-  const next = row?.isConnected ? [...row.querySelectorAll("button")].find((button) => !button.closest("[hidden]")) : null;
-  (next ?? main.querySelector("h1")).focus();
-}
-
 function silenceWords(silenceS, failure) {
   if (silenceS === null) return failure ?? "Waiting for the list.";
   return `This list is ${formatAge(silenceS)} old: what has happened since is not known. ${failure ?? ""}`;
@@ -127,7 +134,7 @@ function unjudgedView() {
     node,
     draw(alarms) {
       node.hidden = alarms.length === 0;
-      setText(title, `${alarms.length} not active when last judged, and cannot be judged now`);
+      setText(title, `${alarms.length} alarms cannot be evaluated now (last known: inactive)`);
       const wanted = alarms.map((alarm) => `${alarm.id}: ${conditionWords(alarm)}`);
       while (list.childElementCount > wanted.length) list.lastChild.remove();
       wanted.forEach((words, n) => setText(list.children[n] ?? list.appendChild(element("li")), words));

@@ -3,6 +3,7 @@
 import { tell } from "../api.js";
 import { element, setText } from "../dom.js";
 import { formatZone } from "../format.js";
+import { nameField } from "../parts/actor.js";
 
 const ACTIONS = {
   accept: ["Accept", (version) => `Compare the bearing with version ${version} from its next reading on.`],
@@ -13,7 +14,7 @@ const ACTIONS = {
 };
 
 /** Returns `{ node, open(action, version, opener) }`; `again` asks for the baselines afresh. */
-export function baselineForm(path, actor, again) {
+export function baselineForm(path, again) {
   const title = element("strong");
   const reason = element("input", { name: "reason", required: "", maxlength: "500" });
   const event = element("input", { name: "event", type: "datetime-local" });
@@ -23,7 +24,8 @@ export function baselineForm(path, actor, again) {
   const send = element("button", { type: "submit" });
   const cancel = element("button", { type: "button" }, "Cancel");
   const failure = element("span", { class: "action-failure", role: "alert" });
-  const fields = [title, eventLabel, element("label", {}, "Why", reason), send, cancel, failure];
+  const who = nameField();
+  const fields = [title, eventLabel, element("label", {}, "Why", reason), who.node, send, cancel, failure];
   const node = element("form", { class: "baseline-form", hidden: "" }, ...fields);
   let asked = null;
 
@@ -34,11 +36,8 @@ export function baselineForm(path, actor, again) {
   }
 
   async function submit() {
-    const name = actor.name();
-    if (name === null) {
-      setText(failure, "Give your name first.");
-      return;
-    }
+    const name = who.take();
+    who.draw();
     try {
       await tell([...path, "baselines", ...stepOf(asked)], bodyOf(asked, name, reason.value.trim(), event.value));
       close();
@@ -66,6 +65,7 @@ export function baselineForm(path, actor, again) {
       eventLabel.hidden = action !== "renew";
       event.required = action === "renew";
       reason.value = "";
+      who.draw();
       node.hidden = false;
       (action === "renew" ? event : reason).focus();
     },

@@ -18,7 +18,7 @@ const STATUS = {
 
 /** Returns `{ node, draw(baselines), fail(sentence) }`; `again` asks for the baselines afresh. */
 export function baselineTable(path, actor, again) {
-  const form = baselineForm(path, actor, again);
+  const form = baselineForm(path, again);
   const learning = element("p", { class: "sentence", role: "status" }, "Asking the service.");
   const freeze = button("Freeze…", () => form.open("freeze", null, freeze));
   const thaw = button("Thaw…", () => form.open("thaw", null, thaw));

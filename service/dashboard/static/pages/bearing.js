@@ -4,6 +4,7 @@ import { bearingCharts } from "./bearing_charts.js";
 import { bearingNumbers } from "./bearing_numbers.js";
 import { element, setText } from "../dom.js";
 import { formatAge, formatTime } from "../format.js";
+import { bearingAlarms } from "../parts/alarm_brief.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { sourceView } from "../parts/source.js";
 import { wayLinks } from "../parts/ways.js";
@@ -22,7 +23,7 @@ export function bearingPage(main, unitId, bearingId) {
   const path = ["units", unitId, "bearings", bearingId];
   const summary = filmSummary(path, unitId, bearingId);
   const numbers = [bearingNumbers(path), summary, estimatorTable(path), filmMatrices(path)];
-  const parts = [headPart(unitId, bearingId), ...numbers, bearingCharts(path), windowFacts()];
+  const parts = [headPart(unitId, bearingId), bearingAlarms(unitId, bearingId), ...numbers, bearingCharts(path), windowFacts()];
   content.append(...parts.map((part) => part.node));
   return {
     draw(view) {

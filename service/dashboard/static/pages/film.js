@@ -2,9 +2,10 @@
 
 import { ask } from "../api.js";
 import { element, setText } from "../dom.js";
+import { bearingAlarms } from "../parts/alarm_brief.js";
 import { poll } from "../poll.js";
 import { bearingAddress, filmAddress } from "../route.js";
-import { actorField } from "./alarm_actor.js";
+import { actorField } from "../parts/actor.js";
 import { baselineTable } from "./baseline_table.js";
 import { filmCharts } from "./film_charts.js";
 import { askFilm } from "./film_summary.js";
@@ -16,11 +17,12 @@ const PERIOD_S = 10;
 export function filmPage(main, unitId, bearingId) {
   const path = ["units", unitId, "bearings", bearingId];
   const head = headPart(unitId, bearingId);
-  const actor = actorField("change_measuring", "change baselines", "before you change a baseline");
+  const actor = actorField("change_measuring", "change baselines");
   const verdict = verdictPanel();
+  const alarms = bearingAlarms(unitId, bearingId);
   const charts = filmCharts(path);
   const baselines = baselineTable(path, actor, () => questions.again());
-  main.append(element("div", { class: "bearing film-page" }, head.node, verdict.node, charts.node, actor.node, baselines.node));
+  main.append(element("div", { class: "bearing film-page" }, head.node, verdict.node, alarms.node, charts.node, actor.node, baselines.node));
   const films = askFilm(path, verdict, charts.update);
   let baseline = null;
 
@@ -38,11 +40,13 @@ export function filmPage(main, unitId, bearingId) {
   return {
     draw(view) {
       head.draw(view);
+      actor.draw();
       charts.draw(view);
     },
     close() {
       for (const one of [films, questions]) one.stop();
       charts.close();
+      alarms.close();
     },
   };
 }

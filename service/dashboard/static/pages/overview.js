@@ -1,6 +1,7 @@
 /** The plant at a glance: every unit, every bearing, worst state in words on top. */
 
 import { element, setText } from "../dom.js";
+import { alarmsToAcknowledge } from "../parts/alarm_brief.js";
 import { mark } from "../parts/mark.js";
 import { unitAlarmMarks } from "../parts/unit_alarm_mark.js";
 import { lookOf, qualityOf } from "../words.js";
@@ -15,7 +16,8 @@ export function overviewPage(main) {
   const summary = element("p", { class: "summary" });
   const legend = element("p", { class: "help" });
   const units = element("div");
-  main.append(element("h1", { class: "hidden" }, "Plant overview"), summary, legend, units);
+  const unseen = alarmsToAcknowledge();
+  main.append(element("h1", { class: "hidden" }, "Plant overview"), summary, unseen.node, legend, units);
   const tally = tallyView(summary);
   const alarms = unitAlarmMarks();
   let shape = null;
@@ -39,7 +41,10 @@ export function overviewPage(main) {
       tally.draw(view);
       drawn.forEach((one, index) => one.draw(view.units[index]));
     },
-    close: alarms.close,
+    close() {
+      alarms.close();
+      unseen.close();
+    },
   };
 }
 

@@ -1,6 +1,6 @@
 /** Reports of alarms: every time one was raised, with its page to print and its evidence to take away. */
 
-import { kindWords, placeWords, valueWords } from "../alarm_words.js";
+import { placeWords, valueWords, whatWords } from "../alarm_words.js";
 import { NotReachable, Refused, ask } from "../api.js";
 import { element, setText } from "../dom.js";
 import { formatTime } from "../format.js";
@@ -78,7 +78,7 @@ function reportRow({ event }) {
   links.draw(event.alarm, event.occurrence);
   const state = element("span", { class: "from" });
   const samples = element("span");
-  const contents = [placeWords(event), kindWords(event.kind), level.node, valueWords(event), element("span", {}, links.node, state), samples];
+  const contents = [placeWords(event), whatWords(event), level.node, valueWords(event), element("span", {}, links.node, state), samples];
   const cells = contents.map((content, n) => listingCell(HEADS[n + 1], content));
   const row = element("tr", { role: "row", "data-report": keyOf({ event }) }, listingName(formatTime(Date.parse(event.time))), ...cells);
   return {

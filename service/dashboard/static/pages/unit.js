@@ -2,7 +2,7 @@
 
 import { ask } from "../api.js";
 import { element } from "../dom.js";
-import { alarmBrief } from "../parts/alarm_brief.js";
+import { unitAlarms } from "../parts/alarm_brief.js";
 import { recordingsBrief } from "../parts/recordings_brief.js";
 import { poll } from "../poll.js";
 import { unitHead } from "./unit_head.js";
@@ -25,7 +25,7 @@ export function unitPage(main, unitId) {
 
   function build(unit) {
     bearings = unit.bearings.map(({ bearing }) => bearing);
-    parts = [unitHead(unitId), alarmBrief(unitId), recordingsBrief(unitId), unitTable(unit)];
+    parts = [unitHead(unitId), unitAlarms(unitId), recordingsBrief(unitId), unitTable(unit)];
     content.replaceChildren(...parts.map((part) => part.node));
     questions.again();
   }

@@ -13,34 +13,38 @@ export function listing(title, heads, nothing, keyOf, rowOf) {
   const head = element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...cells));
   const table = element("table", { role: "table", "aria-label": title, hidden: "" }, head, body);
   const empty = element("p", { class: "sentence", hidden: "" }, nothing);
-  const rows = new Map();
-
-  function forget(present) {
-    for (const [key, row] of rows) {
-      if (present.has(key)) continue;
-      for (const node of row.nodes) node.remove();
-      rows.delete(key);
-    }
-  }
-
+  const drawRows = keyedRows(body, keyOf, rowOf);
   return {
     node: element("div", {}, empty, table),
     draw(things) {
       table.hidden = things.length === 0;
       empty.hidden = things.length > 0;
-      forget(new Set(things.map(keyOf)));
-      let place = body.firstChild;
-      for (const thing of things) {
-        const key = keyOf(thing);
-        const row = rows.get(key) ?? rows.set(key, rowOf(thing)).get(key);
-        for (const node of row.nodes) {
-          if (place === node) place = node.nextSibling;
-          else body.insertBefore(node, place);
-        }
-        row.draw(thing);
-      }
+      drawRows(things);
     },
     setCurrent: (current) => setAttribute(table, "data-current", String(current)),
+  };
+}
+
+/** Returns a function that draws things as rows of `body`; the arguments are those of `listing`. */
+export function keyedRows(body, keyOf, rowOf) {
+  const rows = new Map();
+  return (things) => {
+    const present = new Set(things.map(keyOf));
+    for (const [key, row] of rows) {
+      if (present.has(key)) continue;
+      for (const node of row.nodes) node.remove();
+      rows.delete(key);
+    }
+    let place = body.firstChild;
+    for (const thing of things) {
+      const key = keyOf(thing);
+      const row = rows.get(key) ?? rows.set(key, rowOf(thing)).get(key);
+      for (const node of row.nodes) {
+        if (place === node) place = node.nextSibling;
+        else body.insertBefore(node, place);
+      }
+      row.draw(thing);
+    }
   };
 }
 

@@ -12,13 +12,15 @@ import pytest
 from harness.waiting import at_work, until
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
+from core.alarms.judgements import film_judgement
 from core.alarms.life_cycle import update
 from core.alarms.operation import Acknowledge, operate
 from core.change.film_judge import alarm_condition
+from core.limits import NEVER_JUDGED
 from service.api.auth.service import AccessService
 from service.store.access.identities import Role
 
-ALARM = "U1:UJB:stiffness_x"
+ALARM = "U1:UJB:film_stiffness"
 PATH = f"/api/v1/alarms/{ALARM}/evidence"
 HOSTILE = '<script>alert("1")</script><img src=x onerror=alert(2)>'
 
@@ -27,9 +29,10 @@ def raised(service: Any, machine: Any) -> AlarmNews:
     """A film that has lost a third raises its alarm."""
     machine.run(30, ln_change=-0.4)
     rules, told = service.films.rules("U1"), service.films.newest("U1", "UJB")
-    condition = alarm_condition(told.findings[0], rules.change)
+    found = {a: alarm_condition(f, rules.change) for a, f in zip("xy", told.findings, strict=True)}
+    condition = film_judgement(found, NEVER_JUDGED)
     assert condition.level is not None
-    alarm = Alarm(AlarmIdentity("U1", "UJB", "stiffness_x"))
+    alarm = Alarm(AlarmIdentity("U1", "UJB", "film_stiffness"))
     news = AlarmNews(*update(alarm, condition, machine.time_ns, AlarmRule()))
     service.evidence.see([news])
     service.store.append([], [], [news])
@@ -103,7 +106,9 @@ async def require_a_report_of_everything_without_a_script(service: Any) -> None:
     assert not page.tags & {"script", "img", "iframe", "link", "object", "form"}
     assert not {name for name in page.attributes if name.startswith("on")}
     for words in (
-        "film stiffness changed, x",
+        "film stiffness changed, x and y",
+        "has changed in x by −",
+        "and in y by −",
         "95 %:",
         "GN/m",
         "configuration ",
@@ -163,8 +168,8 @@ async def test_what_is_not_there_is_a_problem(learned):
     for path, status in (
         (f"{PATH}/1", 404),
         ("/api/v1/alarms/U1:UJB:nonsense/evidence", 404),
-        ("/api/v1/alarms/..:..:stiffness_x/evidence", 404),
-        ("/api/v1/alarms/..%2f..:x:stiffness_x/evidence/1", 404),
+        ("/api/v1/alarms/..:..:film_stiffness/evidence", 404),
+        ("/api/v1/alarms/..%2f..:x:film_stiffness/evidence/1", 404),
         (f"{PATH}/0", 422),
     ):
         await learned.problem(path, status)

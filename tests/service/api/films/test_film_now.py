@@ -70,8 +70,8 @@ def require_a_word_for_every_film(first: Any, second: Any) -> None:
 
 
 def require_the_condition_of_each_film(found: dict[str, Any]) -> None:
-    assert found["U1:UJB:stiffness_x"]["operating_state"] == "full_load"
-    assert found["U1:UJB:stiffness_x"]["cell"]["eccentricity_low"] is not None
+    assert found["U1:UJB:film_stiffness"]["operating_state"] == "full_load"
+    assert found["U1:UJB:film_stiffness"]["cell"]["eccentricity_low"] is not None
     assert {found[id_] for id_ in found if "stiffness" not in id_} == {None}
 
 

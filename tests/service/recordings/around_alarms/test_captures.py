@@ -140,7 +140,7 @@ async def test_a_device_whose_clock_is_put_back_ends_its_capture_by_count(root):
 async def test_a_changed_film_keeps_the_whole_averaging_window_before_it(root):
     settings = CaptureSettings(pre_s=3.0, post_s=2.0, max_s=12.0, window_s=8.0)
     async with running(root, settings) as rig:
-        rig.send(0, 100, {49: raised(10.0, "stiffness_x")})
+        rig.send(0, 100, {49: raised(10.0, "film_stiffness")})
         [recording] = await rig.written(1)
 
     assert samples(recording) == numbers(10, 60)
@@ -151,7 +151,7 @@ async def test_another_alarm_prolongs_the_capture_at_both_ends_instead_of_beginn
     root, pause
 ):
     settings = CaptureSettings(pre_s=3.0, post_s=4.0, max_s=14.0, window_s=8.0)
-    film = raised(12.0, "stiffness_x")
+    film = raised(12.0, "film_stiffness")
     told: list[Outcome] = []
     async with running(root, settings) as rig:
         rig.captures.set_listener(told.append)
@@ -166,7 +166,7 @@ async def test_another_alarm_prolongs_the_capture_at_both_ends_instead_of_beginn
     alarms = json.loads((recording.folder / "alarm.json").read_text())["alarms"]
     assert [(alarm["alarm"].rpartition(":")[2], alarm["time_ns"]) for alarm in alarms] == [
         ("order1_shaft_x", T0 + 10 * SECOND),
-        ("stiffness_x", T0 + 12 * SECOND),
+        ("film_stiffness", T0 + 12 * SECOND),
     ]
     assert [(len(outcome.alarms), outcome.folder) for outcome in told] == [(2, recording.folder)]
     assert rig.captures.n_failed == 0
