@@ -39,8 +39,8 @@ export function piecesOf(trends, name, refreshS) {
 function bucketAt(series, index, timeS, scale) {
   return {
     timeS,
-    minimum: series.min[index] / scale,
-    maximum: series.max[index] / scale,
+    minimum: series.minimum[index] / scale,
+    maximum: series.maximum[index] / scale,
     mean: series.mean[index] / scale,
     random: series.u_random?.[index] == null ? null : (NORMAL_95 * series.u_random[index]) / scale,
     level: series.worst_level[index],
