@@ -1,7 +1,7 @@
 """Commands of operators and engineers to the measuring process, and the errors they can cause."""
 
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -9,6 +9,7 @@ from core.alarms import operation
 from core.alarms.operation import Action
 from core.machine.unit import Estimator
 from service.store.baselines import BaselineEntry, BaselineStep, StoredStep, Versions
+from service.store.notes import Note
 
 
 @dataclass(frozen=True)
@@ -168,7 +169,7 @@ class TakeReference:
     note: str
 
 
-OperatorCommand: TypeAlias = AlarmCommand | BaselineCommand | TakeReference
+OperatorCommand: TypeAlias = AlarmCommand | BaselineCommand | TakeReference | Note
 
 _ALARM_ACTIONS = {
     kind.__name__: TypeAdapter[Any](tuple[str, kind])  # type: ignore[valid-type]
@@ -182,13 +183,14 @@ _BASELINE_ACTIONS = {
     kind.__name__: TypeAdapter[Any](tuple[FilmPlace, kind, str, str])  # type: ignore[valid-type]
     for kind in (Accept, Reject, Freeze, Thaw, Renew)
 }
-_REFERENCE = TypeAdapter(TakeReference)
+_WHOLE = {kind.__name__: TypeAdapter[Any](kind) for kind in (TakeReference, Note)}
 
 
 def encoded(command: OperatorCommand) -> tuple[str, str]:
     """Return the kind of a command (the name of its class or action) and its JSON document."""
-    if isinstance(command, TakeReference):
-        return TakeReference.__name__, _REFERENCE.dump_json(command).decode()
+    if isinstance(command, TakeReference | Note):
+        kind = type(command).__name__
+        return kind, _WHOLE[kind].dump_json(command).decode()
     kind = type(command.action).__name__
     if isinstance(command, AlarmCommand):
         return kind, _ALARM_ACTIONS[kind].dump_json((command.alarm, command.action)).decode()
@@ -209,8 +211,8 @@ def decoded(kind: str, document: str) -> OperatorCommand:
             return AlarmCommand(*_ALARM_ACTIONS[kind].validate_json(document))
         if kind in _BASELINE_ACTIONS:
             return BaselineCommand(*_BASELINE_ACTIONS[kind].validate_json(document))
-        if kind == TakeReference.__name__:
-            return _REFERENCE.validate_json(document)
+        if kind in _WHOLE:
+            return cast("OperatorCommand", _WHOLE[kind].validate_json(document))
     except ValidationError as error:
         raise UnreadableCommandError(f"command {kind} cannot be read: {error}") from error
     raise UnreadableCommandError(f"unknown command {kind}; update all processes to one version")
