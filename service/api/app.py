@@ -31,6 +31,7 @@ from service.api.routes.channels import channel_router
 from service.api.routes.film_history import film_history_router
 from service.api.routes.films import film_router
 from service.api.routes.motion import motion_router, recorded_motion_router
+from service.api.routes.notes import note_router
 from service.api.routes.notifications import delivery_router
 from service.api.routes.overview import overview_router
 from service.api.routes.plant import plant_router
@@ -130,6 +131,7 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
         spectra_router(context),
         motion_router(context),
         reference_router(context),
+        note_router(context),
         film_router(context),
         film_history_router(context),
         baseline_router(context),

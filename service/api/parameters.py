@@ -16,14 +16,14 @@ FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
 
 
 def written_as_date(text: object) -> object:
-    """Return the written time unchanged; a bare number is rejected, since its unit is unknown.
+    """Return the written time unchanged; a number is rejected, since its unit is unknown.
 
     Raises
     ------
     ValueError
-        If the text is a bare number.
+        If the value is a number, or a text that is one.
     """
-    if isinstance(text, str) and "-" not in text[1:]:
+    if not isinstance(text, str) or "-" not in text[1:]:
         raise ValueError("a time must be RFC 3339, such as 2026-11-21T08:00:00Z")
     return text
 

@@ -9,6 +9,7 @@ from core.alarms import operation
 from core.alarms.operation import Action
 from core.machine.unit import Estimator
 from service.store.baselines import BaselineEntry, BaselineStep, StoredStep, Versions
+from service.store.notes import Note
 
 
 @dataclass(frozen=True)
@@ -168,7 +169,7 @@ class TakeReference:
     note: str
 
 
-OperatorCommand: TypeAlias = AlarmCommand | BaselineCommand | TakeReference
+OperatorCommand: TypeAlias = AlarmCommand | BaselineCommand | TakeReference | Note
 
 _ALARM_ACTIONS = (
     *(operation.Acknowledge, operation.Shelve, operation.Unshelve, operation.TakeOutOfService),
@@ -185,6 +186,7 @@ _KINDS: dict[str, tuple[type[OperatorCommand], TypeAdapter[Any]]] = {
         for kind in (Accept, Reject, Freeze, Thaw, Renew)
     },
     TakeReference.__name__: (TakeReference, TypeAdapter(tuple[str, str, str, str])),
+    Note.__name__: (Note, TypeAdapter(tuple[str, str | None, int, str, str])),
 }
 """Class of the command, and adapter of its fields in their order, by kind."""
 

@@ -17,6 +17,7 @@ from service.live.commands import (
     TakeReference,
 )
 from service.live.current_state import LiveAlarms
+from service.store.notes import Note
 from service.store.references import SetVectorReference
 from service.store.sharing import Answer, CommandState
 from service.store.store import Store
@@ -98,6 +99,10 @@ class Operators(ABC):
             raise ReferenceRefusedError(answer.words)
         history = self._store.order1_references.history
         return (await asyncio.to_thread(history, command.unit, command.bearing))[0]
+
+    async def add_note(self, note: Note) -> None:
+        """Store a note; raises `CommandFailedError` if it was not stored."""
+        await self._carried_out(note.unit, note, note.author)
 
     async def _carried_out(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
         answer = await self.send(unit, command, actor)

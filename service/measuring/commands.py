@@ -24,6 +24,7 @@ from service.measuring.live_view import LiveView
 from service.measuring.recorder import NotStoredError, Recorder
 from service.measuring.references import measured_vectors
 from service.store.access.audit_entries import Acting, Source, acting_as
+from service.store.notes import Note, note_action
 from service.store.port import StoreError
 from service.store.references import SetVectorReference
 from service.store.sharing import DONE, Answer, CommandState
@@ -78,6 +79,9 @@ class CommandExecutor:
                 await self._films.act(command.place, command.action, command.actor, command.reason)
             case TakeReference():
                 await self._take_reference(command)
+            case Note():
+                added = note_action(command, self._clock.now_ns())
+                await asyncio.to_thread(self._store.audit.record, [added])
         return DONE
 
     async def _stored(self) -> Answer:

@@ -14,6 +14,8 @@ import pytest
 from rigs.command_line import padwatch, padwatch_program
 from rigs.tiers import fast_and_long
 
+from service.runtime.times import rfc3339
+
 from .conftest import PATIENCE_S, Start, programs
 
 RECORDINGS = Path(__file__).parents[1] / "recordings"
@@ -72,12 +74,12 @@ async def told(program: Any) -> dict[str, Any]:
 
 async def trends(program: Any, unit: str) -> dict[str, Any]:
     """All quantities of a unit's bearing, once all results are on the disk."""
-    last_s = known(unit)["time_ns"][-1] / 1_000_000_000
+    last = rfc3339(known(unit)["time_ns"][-1])
     names = list(known(unit)["series"])
     parts = [
         await program.until(
             f"/api/v1/units/{unit}/bearings/UJB/trends",
-            lambda answer: last_s in answer["time"],
+            lambda answer: last in answer["time"],
             **YEAR,
             quantity=names[first : first + MOST_QUANTITIES],
         )
@@ -100,9 +102,9 @@ def test_a_replayed_run_gives_the_known_trends_over_http(straight: dict[str, Any
     for unit, answer in straight["trends"].items():
         expected = known(unit)
         # between results that are far apart the API says that there is a hole
-        known_s = [ns / 1_000_000_000 for ns in expected["time_ns"]]
-        assert [t for t in answer["time"] if t in known_s] == known_s
-        rows = [answer["time"].index(t) for t in known_s]
+        times = [*map(rfc3339, expected["time_ns"])]
+        assert [t for t in answer["time"] if t in times] == times
+        rows = [answer["time"].index(t) for t in times]
         for name, values in expected["series"].items():
             series = answer["series"][name]
             assert [series["worst_level"][row] for row in rows] == expected["level"][name], name

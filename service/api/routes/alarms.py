@@ -145,9 +145,21 @@ OUTAGE = [needs(Permission.CHANGE_MEASURING)]
 
 UNKNOWN = {404: "Unknown alarm"}
 ACTION_PROBLEMS = problem_responses(403, 409, 422, 503, own=UNKNOWN)
-COMMENT_PROBLEMS = ACTION_PROBLEMS | problem_responses(
+COMMENT_LIMIT = problem_responses(
     own={429: "Too many comments; Retry-After gives the time to wait"}
 )
+
+
+class Allowances(dict[str, TokenBucket]):
+    """Rate limit of comments or notes: a token bucket per person or key."""
+
+    def take(self, request: Request, now_s: float) -> None:
+        """Take a token of the caller; raise a problem of status 429 if none is left."""
+        new = TokenBucket(N_COMMENTS, S_PER_COMMENT, now_s)
+        if not self.setdefault(identity_of(request).actor, new).take(now_s):
+            detail = f"too many comments; try again after {S_PER_COMMENT:g} s"
+            wait = {"Retry-After": f"{S_PER_COMMENT:.0f}"}
+            raise ProblemError(429, "Wait", detail, headers=wait)
 
 
 def alarm_router(context: Context) -> APIRouter:
@@ -254,7 +266,7 @@ def alarm_router(context: Context) -> APIRouter:
 def operation_router(context: Context) -> APIRouter:
     """Return the router for operations on alarms; each operation returns the changed alarm."""
     router = subject_router("/alarms/{alarm}", "alarms", Permission.ACT_ON_ALARMS)
-    allowances: dict[str, TokenBucket] = {}
+    allowances = Allowances()
 
     @router.post("/acknowledge", summary="Acknowledge", responses=ACTION_PROBLEMS)
     async def acknowledge(alarm: AlarmId, asked: AcknowledgeModel) -> AlarmModel:
@@ -302,15 +314,10 @@ def operation_router(context: Context) -> APIRouter:
         """Release the latch of an acknowledged alarm whose condition has cleared."""
         return await _done(context, alarm, Reset(actor_or(asked.actor)))
 
-    @router.post("/comment", summary="Comment", responses=COMMENT_PROBLEMS)
+    @router.post("/comment", summary="Comment", responses=ACTION_PROBLEMS | COMMENT_LIMIT)
     async def comment(request: Request, alarm: AlarmId, asked: CommentModel) -> AlarmModel:
         """Add a comment to the events of an alarm; the state of the alarm does not change."""
-        now_s = context.clock.monotonic_s()
-        new = TokenBucket(N_COMMENTS, S_PER_COMMENT, now_s)
-        if not allowances.setdefault(identity_of(request).actor, new).take(now_s):
-            detail = f"too many comments; try again after {S_PER_COMMENT:g} s"
-            wait = {"Retry-After": f"{S_PER_COMMENT:.0f}"}
-            raise ProblemError(429, "Wait", detail, headers=wait)
+        allowances.take(request, context.clock.monotonic_s())
         return await _done(context, alarm, Comment(actor_or(asked.actor), asked.text))
 
     return router

@@ -1,11 +1,10 @@
 """API models of baselines, and of requests that change baselines."""
 
-from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
-from service.api.parameters import written_as_date
+from service.api.parameters import Moment
 from service.api.values import (
     ActorModel,
     ApiModel,
@@ -257,19 +256,8 @@ class BaselineActionModel(ActorModel):
     """Reason, 1 to 500 printable characters."""
 
 
-def _only_text(value: object) -> object:
-    """Return the text of a time; raise ValueError for a number, whose unit is unknown."""
-    if not isinstance(value, str):
-        raise ValueError("a time must be RFC 3339, such as 2026-11-21T08:00:00Z")
-    return written_as_date(value)
-
-
 class RenewModel(BaselineActionModel):
     """Request to renew the baseline after a machine event."""
 
-    event_time: Annotated[
-        datetime,
-        BeforeValidator(_only_text),
-        Field(strict=False, examples=["2026-11-21T08:00:00Z"]),
-    ]
+    event_time: Annotated[Moment, Field(strict=False, examples=["2026-11-21T08:00:00Z"])]
     """End of the machine event, RFC 3339 with offset; only later readings are used."""

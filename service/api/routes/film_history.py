@@ -10,7 +10,6 @@ from fastapi import APIRouter, Query, Request, Response
 from core.baseline.history import ReadingOutcome
 from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
-from core.units import NS_PER_S
 from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
@@ -85,8 +84,8 @@ class FilmReadingsModel(BearingHistory):
     next_end: Time | None
     """Without thinning, parameter ``end`` for the page of older readings; null if there is none."""
 
-    time: list[float]
-    """Times of the readings, seconds since 1970 UTC."""
+    time: list[Time]
+    """Times of the readings."""
 
     provenance: list[ProvenanceName]
     """Origin of the readings: "measured" on the machine, or "simulated"."""
@@ -156,7 +155,7 @@ def film_readings_model(query: FilmQuery, found: FilmHistory, rows: Rows) -> Fil
         query,
         n_found=len(found),
         next_end=int(history.time_ns[first]) if first else None,
-        time=(history.time_ns[rows] / NS_PER_S).tolist(),
+        time=history.time_ns[rows].tolist(),
         provenance=["simulated" if one else "measured" for one in found.is_simulated[rows]],
         operating_state=[STATE_NAMES[OperatingState(code)] for code in found.state[rows]],
         is_settled=found.is_settled[rows].tolist(),

@@ -12,7 +12,6 @@ from pydantic import Field
 from core.arrays import FloatArray
 from core.monitor.assessment import Assessment
 from core.stiffness.order_line import marked_hz
-from core.units import NS_PER_S
 from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
@@ -49,8 +48,8 @@ class SpectraModel(BearingHistory):
     frequency_hz: Annotated[list[float], Field(examples=[[0.073, 0.146, 0.22]])]
     """Frequencies of the spectral lines of all spectra, Hz."""
 
-    time: list[float]
-    """End of the samples of each spectrum, seconds since 1970 UTC."""
+    time: list[Time]
+    """End of the samples of each spectrum."""
 
     duration_s: list[float]
     """Duration of the samples averaged for each spectrum, s."""
@@ -273,7 +272,7 @@ def _read(
         query,
         found,
         frequency_hz=frequency_hz.tolist(),
-        time=[each.time_ns / NS_PER_S for each in shown],
+        time=[each.time_ns for each in shown],
         operating_state=[STATE_NAMES[each.state] for each in shown],
         level=[LEVEL_NAMES[each.quality.level] for each in shown],
         reason=[each.quality.reason.value for each in shown],

@@ -80,10 +80,10 @@ class TrendSeriesModel(ApiModel):
     unit: str
     """Unit of the values; for an amplitude, also the detector."""
 
-    min: list[float | None]
+    minimum: list[float | None]
     """Minimum of the usable readings; null without usable readings."""
 
-    max: list[float | None]
+    maximum: list[float | None]
     """Maximum of the usable readings; null without usable readings."""
 
     mean: list[float | None]
@@ -108,8 +108,8 @@ class TrendColumns(ApiModel):
     bucket_s: float | None
     """Width of the time intervals (buckets) that combine readings, s; null for single readings."""
 
-    time: list[float]
-    """Time of each reading or start of each bucket, seconds since 1970 UTC."""
+    time: list[Time]
+    """Time of each reading or start of each bucket."""
 
     series: dict[str, TrendSeriesModel]
     """Values of the requested quantities, by name of the quantity."""
@@ -191,17 +191,12 @@ def _group(group: TrendGroup) -> dict[str, object]:
 
 def _columns_of(trend: Trend) -> dict[str, object]:
     series = {name: _series(name, trend.series) for name in trend.series if name in BY_NAME}
-    return {"bucket_s": bucket_s(trend), "time": times_s(trend), "series": series}
+    return {"bucket_s": bucket_s(trend), "time": [*map(rfc3339, trend.time_ns)], "series": series}
 
 
 def bucket_s(trend: Trend) -> float | None:
     """Return the width of the buckets of a trend, s; None for single readings."""
     return None if trend.bucket_ns is None else trend.bucket_ns / NS_PER_S
-
-
-def times_s(trend: Trend) -> list[float]:
-    """Return the times of a trend in seconds since 1970 UTC."""
-    return [time_ns / NS_PER_S for time_ns in trend.time_ns]
 
 
 def trend_columns(quantities: Iterable[str]) -> tuple[str, ...]:
@@ -214,8 +209,8 @@ def _series(name: str, columns: Mapping[str, TrendSeries]) -> dict[str, object]:
     random, systematic = columns.get(name + U_RANDOM), columns.get(name + U_SYSTEMATIC)
     return {
         "unit": BY_NAME[name].unit,
-        "min": series.minimum,
-        "max": series.maximum,
+        "minimum": series.minimum,
+        "maximum": series.maximum,
         "mean": series.mean,
         "count": series.count,
         "worst_level": level_names(series.worst_level),

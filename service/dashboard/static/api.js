@@ -71,6 +71,7 @@ async function given(response) {
   const body = await decoded(response);
   if (!response.ok) throw refusal(response, body);
   if (body === null) throw new NotReachable("The answer does not come from padwatch.");
+  if (Array.isArray(body.time)) body.time = body.time.map((time) => Date.parse(time) / 1000); // for charts
   return body;
 }
 

@@ -41,7 +41,17 @@ export function failedNow(live, sentence, now) {
 /** Seconds from a time in an answer to the present time of the service; null without that time. */
 export const ageAt = (time, timeMs) => (time && timeMs !== null ? Math.max(timeMs - Date.parse(time), 0) / 1000 : null);
 
-/** What to show at this moment: ages at the time `timeMs` of the service, and no number that is no longer current. */
+/** A second after the newest result of a replay, which has the time of the recording; null without a result. */
+function replayTimeMs({ units }) {
+  const times = units.flatMap(({ bearings }) => bearings.map(({ time }) => Date.parse(time ?? ""))).filter((ms) => !Number.isNaN(ms));
+  return times.length ? Math.max(...times) + 1000 : null;
+}
+
+/**
+ * What to show at this moment: ages at the time `timeMs` of the service, and no number that is no longer current.
+ *
+ * `serviceTimeMs`, where histories end, is that time, but in a replay that of its newest result.
+ */
 export function viewAt(live, now, timeMs) {
   const silenceS = live.receivedAt ? secondsBetween(live.receivedAt, now) : null;
   const current = silenceS !== null && silenceS <= CURRENT_LIMIT_S;
@@ -56,7 +66,7 @@ export function viewAt(live, now, timeMs) {
     captureError: live.overview?.captures.error ?? null,
     alarms: current ? live.overview.alarms : null,
     refreshS: live.overview?.refresh_s ?? null,
-    serviceTimeMs: live.overview ? timeMs : null,
+    serviceTimeMs: live.overview?.plant.origin === "replay" ? replayTimeMs(live.overview) : live.overview && timeMs,
     units: (live.overview?.units ?? []).map((unit) => agedUnit(unit, live.details, timeMs, current)),
   };
 }

@@ -142,7 +142,7 @@ const SOURCE_STATES = {
   connected: { level: "good", words: "Connected" },
   connecting: { level: "uncertain", words: "Connecting" },
   not_connected: { level: "bad", words: "Not connected" },
-  ended: { level: "uncertain", words: "Recording ended" },
+  ended: { level: "absent", words: "Replay finished" },
   unknown: { level: "bad", words: "State unknown" },
 };
 

@@ -16,7 +16,7 @@ class Permission(StrEnum):
     """Read results, alarms, evidence and health of the plant."""
 
     ACT_ON_ALARMS = "act_on_alarms"
-    """Acknowledge, comment and shelve alarms."""
+    """Acknowledge, comment and shelve alarms; add notes."""
 
     CHANGE_MEASURING = "change_measuring"
     """Change references, baselines and recordings; take alarms out of service; resend messages."""

@@ -55,7 +55,7 @@ async def test_quantities_are_found_by_words_coloured_and_taken_away(plant, page
 
     await await_curve(page, "[data-chart=trend-operation-c]")
     heading = page.locator("[data-chart=trend-operation-c] h2")
-    await expect(heading).to_have_text("Oil temperature")
+    await expect(heading).to_have_text("U1 UJB, U1 LJB: Oil temperature, °C")
     assert "q=oil_temperature_c" in await page.evaluate("location.hash")
 
     await page.get_by_role("radio", name="Oil temperature").check()
@@ -106,6 +106,51 @@ async def test_the_mouse_and_the_keyboard_zoom_and_back_leads_back(plant, page) 
     start, end = (datetime.fromisoformat(query[name][0]) for name in ("from", "to"))
     assert end - start == pytest.approx(timedelta(days=15), abs=timedelta(seconds=1))
     assert datetime.now(UTC) - end > timedelta(days=12)
+
+
+async def test_a_chart_shows_what_is_expected_the_limits_and_notes(plant, page) -> None:
+    await page.goto(plant.url + "#/trends")
+    legend = page.locator(f"{STIFFNESS} .legendtext")
+    for name in ("xx expected", "yy expected", "alert limit", "danger limit"):
+        await expect(legend.filter(has_text=name)).to_have_count(1)
+    heading = page.locator(f"{STIFFNESS} h2")
+    await expect(heading).to_have_text("U1 UJB: Film stiffness by the preferred estimator, GN/m")
+    zone = page.locator(f"{STIFFNESS} .xtitle")
+    await expect(zone).to_have_text(re.compile(r"^Local time, UTC"))
+
+    await page.get_by_label("Note", exact=True).fill("shims changed")
+    await page.get_by_label("Your name").fill("A. Name")
+    await page.get_by_role("button", name="Add note").click()
+
+    await expect(page.locator(".notes li").first).to_contain_text("U1 UJB: shims changed (A. Name)")
+    await page.get_by_role("radio", name="Week").check()  # the note is of this very minute
+    await expect(legend.filter(has_text="note")).to_have_count(1)
+    await page.goto(plant.url + "#/audit")
+    await expect(page.get_by_text("shims changed").first).to_be_visible()
+
+
+async def test_two_units_share_a_chart_and_stiffness_is_drawn_over_eccentricity(
+    plant, page
+) -> None:
+    await page.goto(plant.url + COMPARED + "&q=oil_temperature_c&last=2592000")
+    await await_curve(page, "[data-chart=trend-operation-c]")
+
+    await page.get_by_role("radio", name="Time, two axes").check()
+
+    await expect(page.locator(f"{STIFFNESS} .y3title")).to_have_text("°C")
+    await expect(page.locator("[data-chart=trend-operation-c]")).to_have_count(0)
+    legend = page.locator(f"{STIFFNESS} .legendtext")
+    await expect(legend.filter(has_text="U1 LJB: Oil temperature")).to_have_count(1)
+
+    over = page.get_by_role("group", name="Over")
+    await over.get_by_role("radio", name="Eccentricity").check()
+
+    await expect(page.locator(f"{STIFFNESS} .xtitle")).to_have_text("Eccentricity ratio")
+    points = page.locator(f"{STIFFNESS} .points path.point")
+    await expect(points.nth(20)).to_be_attached()
+    assert "over=eccentricity_ratio" in await page.evaluate("location.hash")
+    await page.reload()
+    await expect(over.get_by_role("radio", name="Eccentricity")).to_be_checked()
 
 
 async def test_a_time_without_results_says_so(plant, page) -> None:

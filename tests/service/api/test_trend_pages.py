@@ -19,6 +19,7 @@ from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.quality import Reading
 from service.api.tables import Column, csv_pieces, parquet_file
+from service.runtime.times import rfc3339
 from service.settings.plant import PlantFile
 from service.store.film_readings import FilmHistory
 
@@ -90,7 +91,7 @@ async def test_pages_of_a_trend_have_every_reading_once(stored):
         cursor = body["next_cursor"]
 
     assert means == [1e9 + n for n in range(N)]
-    assert times == [START_NS / 1e9 + n for n in range(N)]
+    assert times == [rfc3339(START_NS + n * 1_000_000_000) for n in range(N)]
     full = {"quantity": K, "max_points": N, "cursor": "first"}  # and the last
     assert (await stored.json(f"{UJB}/trends", **WHOLE, **full))["next_cursor"] is None
 
@@ -134,10 +135,12 @@ async def test_a_trend_is_a_parquet_file_where_that_is_accepted(stored):
     )
 
     table = pq.read_table(io.BytesIO(response.content))
-    assert table[f"{K}_minimum"].to_pylist() == body["series"][K]["min"]
+    assert table[f"{K}_minimum"].to_pylist() == body["series"][K]["minimum"]
     assert table[f"{K}_count"].to_pylist() == body["series"][K]["count"]
     assert table.schema.field(f"{K}_mean").metadata == {b"unit": b"N/m"}
-    assert [t.timestamp() for t in table["time_utc"].to_pylist()] == body["time"]
+    assert [t.timestamp() for t in table["time_utc"].to_pylist()] == [
+        datetime.fromisoformat(time).timestamp() for time in body["time"]
+    ]
 
 
 async def test_groups_are_below_each_other_in_a_file(service, assessment):
@@ -387,6 +390,6 @@ async def test_groups_are_the_same_when_they_have_been_gathered_beforehand(servi
     assert [group["name"] for group in gathered] == [group["name"] for group in single]
     for ours, theirs in zip(gathered, single, strict=True):
         assert ours["time"] == theirs["time"]
-        for column in ("min", "max", "count", "worst_level"):
+        for column in ("minimum", "maximum", "count", "worst_level"):
             assert ours["series"][K][column] == theirs["series"][K][column]
         assert minutes(ours) == minutes(theirs)

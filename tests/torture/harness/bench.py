@@ -71,7 +71,7 @@ class Bench:
         data, ports = data or folder / "data", ports or daq.ports
         self.plant_file = plant.write(folder / "plant.toml", data, ports, extra)
         self.rig = ServiceRig(self.plant_file, **how)
-        self.watch = Watch(plant, daq.offered, period_s)
+        self.watch = Watch(plant, period_s)
         self.lives: dict[str, list[int]] = {unit: [] for unit in plant.units}
 
     def __enter__(self) -> Self:

@@ -140,21 +140,21 @@ def _check_unit(case: Case, unit: str, rows: Rows, lives: Sequence[int], replay:
 
 def _check_shown(case: Case, unit: str, rows: Rows, index: Mapping[tuple[str, int], int]) -> None:
     found = case.found
-    there = {(bearing, index[bearing, time_ns]): (bearing, time_ns) for bearing, time_ns in rows}
+    there = {(bearing, time_ns // 1_000_000): (bearing, time_ns) for bearing, time_ns in rows}
     repeated = Counter((key[0], n) for key, n in index.items())
     found.duplicated += [f"{unit} {key}" for key, n in repeated.items() if n > 1]
     for (shown_unit, bearing), values in case.watch.shown.items():
         if shown_unit != unit:
             continue
         found.n_shown += len(values)
-        for stop, value in values.items():
-            key = there.get((bearing, stop))
+        for time_ms, value in values.items():
+            key = there.get((bearing, time_ms))
             if key is None and value is None:
                 found.n_shown -= 1  # where a trend breaks off: no result
             elif key is None:
-                found.lost.append(f"{unit} {bearing} to sample {stop}")
+                found.lost.append(f"{unit} {bearing} at {time_ms} ms")
             elif rows[key]["order1_shaft_x_um_pk"][0] != value:
-                found.altered.append(f"{unit} {bearing} to sample {stop}: shown as {value}")
+                found.altered.append(f"{unit} {bearing} at {time_ms} ms: shown as {value}")
 
 
 def _check_values(

@@ -136,7 +136,7 @@ class Replicas:
 
     def whole_watch(self) -> Watch:
         """What all clients together were shown and promised."""
-        whole = Watch(self.plant, self.daq.offered)
+        whole = Watch(self.plant)
         for watch in self.watches:
             for key, values in watch.shown.items():
                 whole.shown[key].update(values)
@@ -183,7 +183,7 @@ def replicas(
             own = plant.write(folder / f"{name}.toml", folder / name, daq.ports, extra)
             rig = ServiceRig(own, role=role, log=f"{name}.log")
             rigs[role[0]].append(running.enter_context(rig))
-        watches = [Watch(plant, daq.offered) for _ in rigs["serve"]]
+        watches = [Watch(plant) for _ in rigs["serve"]]
         for watch in watches:
             running.callback(watch.end)
         yield Replicas(plant, folder / "serve1.toml", daq, postgres, rigs, watches, nodes)

@@ -7,7 +7,6 @@ in truth: the seconds for which it was not are *silent-healthy seconds*.
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -52,11 +51,8 @@ class Look:
 class Watch:
     """Asks one service after the other, again and again, in a thread."""
 
-    def __init__(
-        self, plant: LedgerPlant, offered: Callable[[], Offered], period_s: float = PERIOD_S
-    ) -> None:
-        self._period_s = period_s
-        self._plant, self._t0_ns = plant, offered().t0_ns
+    def __init__(self, plant: LedgerPlant, period_s: float = PERIOD_S) -> None:
+        self._plant, self._period_s = plant, period_s
         self.shown: dict[tuple[str, str], dict[int, float | None]] = defaultdict(dict)
         self.events: set[tuple[str, int]] = set()
         self.promised: set[tuple[str, str, int]] = set()
@@ -127,11 +123,11 @@ class Watch:
             f"/api/v1/units/{unit}/bearings/{bearing}/trends?quantity=order1_shaft_x_um_pk"
             f"&start={start}&end={end}&max_points=1000"
         )
-        for time_s, value in zip(
+        for stamp, value in zip(
             found["time"], found["series"]["order1_shaft_x_um_pk"]["mean"], strict=True
         ):
-            stop = round((time_s - self._t0_ns / NS_PER_S) * self._plant.rate_hz)
-            self.shown[unit, bearing][stop] = value
+            time_ms = round(datetime.fromisoformat(stamp).timestamp() * 1000)
+            self.shown[unit, bearing][time_ms] = value
 
 
 def silent_healthy_s(plant: LedgerPlant, offered: Offered, looks: list[Look]) -> float:

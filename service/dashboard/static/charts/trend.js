@@ -1,6 +1,6 @@
 /** A quantity against time: the band between smallest and largest, the mean as a line. */
 
-import { formatTime, kindOf } from "../format.js";
+import { formatTime, formatZone, kindOf } from "../format.js";
 import { DOUBT_COLOUR, X_BAND, X_COLOUR, Y_BAND, Y_COLOUR, axis, baseLayout } from "./style.js";
 
 /** Half-width of the interval that holds 95 % of a normal distribution, over its standard deviation. */
@@ -39,8 +39,8 @@ export function piecesOf(trends, name, refreshS) {
 function bucketAt(series, index, timeS, scale) {
   return {
     timeS,
-    minimum: series.min[index] / scale,
-    maximum: series.max[index] / scale,
+    minimum: series.minimum[index] / scale,
+    maximum: series.maximum[index] / scale,
     mean: series.mean[index] / scale,
     random: series.u_random?.[index] == null ? null : (NORMAL_95 * series.u_random[index]) / scale,
     level: series.worst_level[index],
@@ -144,25 +144,54 @@ export function simulatedSentence(trends) {
 }
 
 /** Layout with the whole asked-for span on the time axis, however little of it has data. */
-export function trendLayout(trends, title, revision, rangemode) {
-  const range = [trends.start, trends.end].map((time) => formatTime(Date.parse(time)));
+export function trendLayout(trends, title, revision, valueRange) {
+  const [start, end] = [trends.start, trends.end].map((time) => Date.parse(time));
   return baseLayout(revision, {
-    xaxis: axis("", { type: "date", range, hoverformat: "%Y-%m-%d %H:%M:%S" }),
-    yaxis: axis(title, { rangemode }),
+    xaxis: axis(`Local time, ${formatZone(end)}`, { type: "date", range: [formatTime(start), formatTime(end)], hoverformat: "%Y-%m-%d %H:%M:%S" }),
+    yaxis: axis(title, { range: valueRange }),
     yaxis2: { overlaying: "y", range: [0, 1], visible: false, fixedrange: true },
     hovermode: "x unified",
+    margin: { l: 56, r: 12, t: 8, b: 56 },
   });
 }
+
+/** Of an axis that few good values set, the share at each end that does not. */
+const TRIMMED = 0.05;
+
+/**
+ * From the smallest to the largest value that sets the axis: uncertain ones do so only where hardly any is good.
+ *
+ * `beside` are traces drawn with the curves that must be seen, too; `fromZero` begins at zero.
+ */
+export function valueRange(allPieces, beside = [], fromZero = false) {
+  const all = allPieces.flat(2);
+  const good = all.filter(({ level }) => level === "good");
+  const isFew = good.length < TRIMMED * all.length;
+  const values = (isFew ? all : good).flatMap(({ minimum, maximum }) => [minimum, maximum]).sort((a, b) => a - b);
+  const n = isFew ? Math.floor(TRIMMED * values.length) : 0;
+  const shown = [...beside.filter(({ name }) => name !== "danger limit").flatMap(({ y }) => y.filter((gn) => gn !== null)), values[n], values.at(-1 - n)];
+  const [low, high] = [shown.reduce((a, b) => Math.min(a, b)), shown.reduce((a, b) => Math.max(a, b))];
+  const margin = 0.08 * (high - low) || 0.05 * Math.abs(high) || 1;
+  return [fromZero ? Math.min(low, 0) : low - margin, high + margin];
+}
+
+/** How many values lie beyond the axis. */
+export const nOutside = (allPieces, [low, high]) => allPieces.flat(2).filter(({ mean }) => mean < low || mean > high).length;
 
 const RANDOM_WORDS =
   " Dotted: random uncertainty of a result, 95 %; what transducers and bracket add stays the same and is left out.";
 
-/** From when to when there are data, and how to read the chart. */
-export function trendCaption(allPieces) {
+/** From when to when there are data. */
+export function spanCaption(allPieces) {
   const times = allPieces.flat(2).map((bucket) => bucket.timeS * 1000);
-  const span = `Data from ${formatTime(earliest(times))} to ${formatTime(latest(times))}.`;
+  return `Data from ${formatTime(earliest(times))} to ${formatTime(latest(times))}.`;
+}
+
+/** From when to when there are data, and how to read the chart. */
+export function trendCaption(allPieces, nBeyond) {
   const random = allPieces.flat(2).some(isKnown) ? RANDOM_WORDS : "";
-  return `${span} Band: smallest to largest; line: mean.${random}`;
+  const outside = nBeyond === 0 ? "" : ` ${nBeyond} uncertain value${nBeyond === 1 ? " lies" : "s lie"} outside the axis.`;
+  return `${spanCaption(allPieces)} Band: smallest to largest; line: mean.${random}${outside}`;
 }
 
 const earliest = (times) => times.reduce((a, b) => Math.min(a, b));

@@ -1,9 +1,10 @@
 /** The charts of the trend explorer: one for each kind of quantity, a sentence where there is nothing. */
 
 import { NotReachable } from "../api.js";
-import { MOST_LINES, compareLayout, compareTraces, lineOf } from "../charts/compare.js";
+import { besideWords } from "../charts/beside.js";
+import { MOST_LINES, againstLayout, againstTraces, besideTraces, compareLayout, compareTraces, lineOf } from "../charts/compare.js";
 import { panel } from "../charts/panel.js";
-import { simulatedSentence, trendCaption } from "../charts/trend.js";
+import { nOutside, simulatedSentence, spanCaption, trendCaption } from "../charts/trend.js";
 import { element } from "../dom.js";
 import { formatTime } from "../format.js";
 import { stateWords } from "../film_words.js";
@@ -26,9 +27,9 @@ export function explorerCharts(onZoom, onBack) {
 
   return {
     node,
-    /** `found` is a list of `{ bearing: [unit, bearing], trends }`. */
+    /** `found` is a list of `{ bearing: [unit, bearing], trends, beside }`; see `askBeside`. */
     async show(found, state, labels, refreshS) {
-      const axes = byAxis(state.quantities, labels);
+      const axes = chartsOf(byAxis(state.quantities, labels), found, state.form);
       panelsFor(axes);
       for (const one of axes) {
         const box = panels.get(keyOf(one));
@@ -54,23 +55,47 @@ export function explorerCharts(onZoom, onBack) {
 const keyOf = ({ chart, title }) => `${chart}: ${title}`;
 const nameOf = ({ chart }) => `trend-${chart.replace(/\W+/g, "-")}`;
 
-async function showAxis(box, { unit, names, title, words }, found, state, refreshS) {
-  const pairs = found.flatMap(({ bearing, trends }) => names.map((name) => ({ bearing, trends, name })));
+/** Kinds of quantities as charts: `title` names bearings, quantities and unit; with two axes the first two kinds share one. */
+function chartsOf(axes, found, form) {
+  const place = found.map(({ bearing }) => bearing.join(" ")).join(", ");
+  const groups = form === "two" && axes.length > 1 ? [axes.slice(0, 2), ...axes.slice(2).map((one) => [one])] : axes.map((one) => [one]);
+  return groups.map((parts) => ({
+    chart: parts[0].chart,
+    parts,
+    title: `${place}: ${parts.map(({ title, unit }) => [title, unit].filter(Boolean).join(", ")).join("; ")}`,
+  }));
+}
+
+async function showAxis(box, { parts }, found, state, refreshS) {
+  const pairs = parts.flatMap(({ title, names, words }, n) =>
+    found.flatMap(({ bearing, trends }) => names.map((name) => {
+      const own = words.get(name) || (parts.length > 1 ? title : "");
+      return { trends, name, label: lineLabel(bearing, own, found.length > 1) || title, scale: n === 0 ? "y" : "y3" };
+    })),
+  );
   const shown = pairs.slice(0, MOST_LINES);
-  const lines = shown.map(({ bearing, trends, name }, n) => lineOf(trends, name, lineLabel(bearing, words.get(name), found.length > 1) || title, n, refreshS));
+  const lines = shown.map(({ trends, name, label, scale }, n) => lineOf(trends, name, label, n, scale, refreshS));
   const [full, empty] = [lines.filter(hasData), lines.filter((line) => !hasData(line))];
   if (full.length === 0) {
     box.explain(emptyWords(lines, found[0].trends, state));
     return;
   }
-  const layout = compareLayout(full[0].trends, unit, state.colour);
+  const units = parts.map(({ unit }) => unit);
+  const isOverTime = state.form === "" || state.form === "two";
+  const beside = isOverTime ? besideTraces(full, found) : [];
+  const view = { against: state.form, colour: state.colour };
+  const layout = isOverTime ? compareLayout(full, units, state.colour, beside) : againstLayout(full, units[0], view);
+  const traces = isOverTime ? [...compareTraces(full, state.colour), ...beside] : againstTraces(full, view);
+  const nBeyond = full.reduce((sum, { pieces, scale }) => sum + nOutside(pieces, layout[scale.replace("y", "yaxis")].range), 0);
   const sentences = [
-    trendCaption(full.map(({ pieces }) => (state.colour ? withoutRandom(pieces) : pieces))) + simulatedSentence(full[0].trends),
+    isOverTime ? trendCaption(full.map(({ pieces }) => (state.colour ? withoutRandom(pieces) : pieces)), nBeyond) : `${spanCaption(full.map(({ pieces }) => pieces))} Points: means.`,
+    simulatedSentence(full[0].trends).trim(),
+    besideWords(beside, found.find((one) => one.beside.film)?.beside.film),
     COLOURED[state.colour] ?? "",
     empty.length ? `No value in this time: ${empty.map(({ label }) => label).join("; ")}.` : "",
     pairs.length > shown.length ? `Only the first ${MOST_LINES} of ${pairs.length} lines are drawn; choose fewer quantities or bearings.` : "",
   ];
-  await box.show(compareTraces(full, state.colour), layout, sentences.filter(Boolean).join(" "));
+  await box.show(traces, layout, sentences.filter(Boolean).join(" "));
 }
 
 const COLOURED = {
@@ -104,7 +129,7 @@ function wire(chart, onZoom, onBack) {
   chart.dataset.zooms = "yes";
   let doubleMs = -Infinity;
   chart.on("plotly_relayout", (change) => {
-    if (performance.now() - doubleMs < AFTER_DOUBLE_MS) return;
+    if (performance.now() - doubleMs < AFTER_DOUBLE_MS || chart.layout.xaxis.type !== "date") return;
     const [from, to] = [change["xaxis.range[0]"], change["xaxis.range[1]"]];
     if (from !== undefined && to !== undefined) onZoom(momentOf(from), momentOf(to));
   });

@@ -5,7 +5,9 @@ import { queryOf } from "../route.js";
 export const MOST_QUANTITIES = 12;
 export const MOST_BEARINGS = 8;
 export const SPANS = [
+  [900, "15 min"],
   [3600, "Hour"],
+  [8 * 3600, "8 h"],
   [86400, "Day"],
   [7 * 86400, "Week"],
   [30 * 86400, "Month"],
@@ -13,6 +15,14 @@ export const SPANS = [
 ];
 export const COLOURS = [
   ["", "Line"],
+  ["oil_temperature_c", "Oil temperature"],
+  ["eccentricity_ratio", "Eccentricity"],
+];
+
+/** What the charts are drawn over, and whether two units share a chart. */
+export const FORMS = [
+  ["", "Time"],
+  ["two", "Time, two axes"],
   ["oil_temperature_c", "Oil temperature"],
   ["eccentricity_ratio", "Eccentricity"],
 ];
@@ -30,7 +40,7 @@ export function stateOf(hash) {
   const query = queryOf(hash);
   const fixed = fixedRange(query);
   const spanS = Number(query.get("last"));
-  const colour = query.get("colour") ?? "";
+  const [colour, form] = ["colour", "over"].map((name) => query.get(name) ?? "");
   return {
     quantities: query.has("q") ? query.getAll("q").filter(Boolean).slice(0, MOST_QUANTITIES) : USUAL,
     bearings: query.getAll("b").map((one) => one.split("/")).filter((parts) => parts.length === 2).slice(0, MOST_BEARINGS),
@@ -38,6 +48,7 @@ export function stateOf(hash) {
     ...(fixed ?? { fromMs: null, toMs: null }),
     state: query.get("state") ?? "",
     colour: COLOURS.some(([name]) => name === colour) ? colour : "",
+    form: FORMS.some(([name]) => name === form) ? form : "",
   };
 }
 
@@ -47,13 +58,14 @@ function fixedRange(query) {
 }
 
 /** The address of a state; what is not given is as usual. */
-export function addressOf({ quantities, bearings, spanS = A_DAY_S, fromMs, toMs, state, colour }) {
+export function addressOf({ quantities, bearings, spanS = A_DAY_S, fromMs, toMs, state, colour, form }) {
   const pairs = bearings.map((one) => ["b", one.join("/")]);
   pairs.push(...(quantities.length ? quantities : [""]).map((name) => ["q", name]));
   if (spanS === null) pairs.push(["from", new Date(fromMs).toISOString()], ["to", new Date(toMs).toISOString()]);
   else pairs.push(["last", String(spanS)]);
   if (state) pairs.push(["state", state]);
   if (colour) pairs.push(["colour", colour]);
+  if (form) pairs.push(["over", form]);
   return `#/trends?${new URLSearchParams(pairs)}`;
 }
 

@@ -1,6 +1,7 @@
 /** Which time the trend explorer shows: a span until now, from one moment to another, and steps from there. */
 
 import { element, setText } from "../dom.js";
+import { formatZone } from "../format.js";
 import { choice } from "../parts/choice.js";
 import { SPANS, changedRange, rangeOf } from "./explorer_state.js";
 
@@ -18,7 +19,8 @@ export function timeBar(onRange, onBack) {
   const box = element("div");
   const [from, to] = ["From", "To"].map((words) => {
     const input = element("input", { type: "datetime-local", step: "1", required: "" });
-    return { input, node: element("label", {}, `${words} `, input) };
+    const zone = element("span");
+    return { input, zone, node: element("label", {}, `${words} `, zone, " ", input) };
   });
   const form = element("form", { class: "asking", "aria-label": "From one moment to another" }, from.node, to.node, element("button", { type: "submit" }, "Show"));
   const wrong = element("p", { class: "action-failure", role: "alert", hidden: "" });
@@ -51,7 +53,10 @@ export function timeBar(onRange, onBack) {
       box.replaceChildren(last.node);
       if (focused) last.node.querySelector("input:checked")?.focus();
       const range = rangeOf(state, nowMs);
-      [from, to].forEach(({ input }, n) => (input.value = localSecond(range[n])));
+      [from, to].forEach(({ input, zone }, n) => {
+        input.value = localSecond(range[n]);
+        setText(zone, `(${formatZone(range[n])}; ${new Date(range[n]).toISOString().slice(0, 19)}Z)`);
+      });
       back.disabled = !canGoBack;
       complain("");
     },
@@ -60,7 +65,8 @@ export function timeBar(onRange, onBack) {
   };
 }
 
-function localSecond(timeMs) {
+/** Local time to the second, as an input of a moment takes it. */
+export function localSecond(timeMs) {
   const local = new Date(timeMs - new Date(timeMs).getTimezoneOffset() * 60_000);
   return local.toISOString().slice(0, 19);
 }

@@ -8,6 +8,7 @@ import { listing } from "../parts/listing.js";
 import { losses } from "../parts/losses.js";
 import { mark } from "../parts/mark.js";
 import { poll } from "../poll.js";
+import { serviceTimeMs } from "../server_time.js";
 import { isAboutSamples, troubleOf } from "../source_words.js";
 import { HEADS, sourceRow } from "./source_row.js";
 
@@ -51,10 +52,10 @@ export function sourcesPage(main) {
   }
 
   return {
-    draw(view) {
+    draw() {
       drawState();
-      if (known === null || view.serviceTimeMs === null) return;
-      const judged = judgedSources(known, view.serviceTimeMs);
+      if (known === null) return;
+      const judged = judgedSources(known, serviceTimeMs());
       table.draw(judged);
       setText(sentence, countSentence(judged));
     },

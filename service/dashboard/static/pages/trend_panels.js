@@ -2,8 +2,10 @@
 
 import { amplitudeUnit } from "../amplitudes.js";
 import { NotReachable, ask } from "../api.js";
+import { askBeside, besideWords, expectedTraces, markTraces, namedOnce } from "../charts/beside.js";
 import { panel } from "../charts/panel.js";
-import { doubtTrace, piecesOf, simulatedSentence, trendCaption, trendLayout, trendTraces } from "../charts/trend.js";
+import { X_COLOUR, Y_COLOUR } from "../charts/style.js";
+import { doubtTrace, nOutside, piecesOf, simulatedSentence, trendCaption, trendLayout, trendTraces, valueRange } from "../charts/trend.js";
 import { element, setAttribute } from "../dom.js";
 import { choice } from "../parts/choice.js";
 import { readingOf } from "../parts/reading.js";
@@ -59,8 +61,9 @@ export function trendPanels(path) {
   const scale = choice("Scale", SCALES, "tozero", refresh);
   const which = choice("Estimate", STIFFNESSES, "stiffness", refresh);
   const order = choice("Order", ORDERS, "order1", refresh);
-  const stiffness = panel("Film stiffness", "stiffness-trend", which.node);
-  const amplitude = panel("Vibration amplitude", "amplitude-trend", order.node);
+  const place = `${path[1]} ${path[3]}`;
+  const stiffness = panel(`${place}: film stiffness`, "stiffness-trend", which.node);
+  const amplitude = panel(`${place}: vibration amplitude`, "amplitude-trend", order.node);
   const boxes = [stiffness, amplitude];
   const more = element("a", {}, "Compare in Trends");
 
@@ -75,10 +78,13 @@ export function trendPanels(path) {
     if (view?.serviceTimeMs == null) return;
     try {
       const lines = [stiffnessLines(which.value()), amplitudeLines(order.value())];
-      trends = await askTrends(path, lines.flat(), span.value(), view.serviceTimeMs, signal);
-      const asked = { trends, refreshS: view.refreshS, span, scale: scale.value(), latest };
-      await showTrends(stiffness, asked, lines[0], "GN/m");
-      await showTrends(amplitude, asked, lines[1], amplitudeUnit());
+      const endMs = Math.ceil(view.serviceTimeMs / WHOLE_MS) * WHOLE_MS;
+      const range = [endMs - span.value() * 1000, endMs];
+      const [found, beside] = await Promise.all([askTrends(path, lines.flat(), range, signal), askBeside([path[1], path[3]], lines[0].map(([name]) => name), range, signal)]);
+      trends = found;
+      const asked = { trends, beside, refreshS: view.refreshS, span, scale: scale.value(), latest };
+      await showTrends(stiffness, asked, lines[0], "Film stiffness, GN/m");
+      await showTrends(amplitude, asked, lines[1], `Vibration amplitude, ${amplitudeUnit()}`);
     } catch (failure) {
       if (signal.aborted) return;
       const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
@@ -106,15 +112,14 @@ function periodS(trends) {
   return Math.min(Math.max(trends?.bucket_s ?? 0, SHORTEST_PERIOD_S), LONGEST_PERIOD_S);
 }
 
-function askTrends(path, lines, spanS, nowMs, signal) {
-  const endMs = Math.ceil(nowMs / WHOLE_MS) * WHOLE_MS;
+function askTrends(path, lines, [startMs, endMs], signal) {
   const query = [...lines.map(([name]) => name), ...CENTRE].map((name) => ["quantity", name]);
-  query.push(["start", new Date(endMs - spanS * 1000).toISOString()], ["end", new Date(endMs).toISOString()]);
+  query.push(["start", new Date(startMs).toISOString()], ["end", new Date(endMs).toISOString()]);
   query.push(["max_points", String(MAX_POINTS)]);
   return ask([...path, "trends"], query, signal);
 }
 
-async function showTrends(box, { trends, refreshS, span, scale, latest }, lines, title) {
+async function showTrends(box, { trends, beside, refreshS, span, scale, latest }, lines, title) {
   const all = lines.map(([name]) => piecesOf(trends, name, refreshS));
   if (all.flat().length === 0) {
     const { value, reason } = readingOf(latest, lines[0][0]);
@@ -125,8 +130,12 @@ async function showTrends(box, { trends, refreshS, span, scale, latest }, lines,
   const traces = lines.flatMap(([name, label, letter, changes], index) =>
     trendTraces(all[index], name, label, letter, changes),
   );
-  const layout = trendLayout(trends, title, `${span.value()} ${scale} ${title}`, scale);
-  await box.show([...traces, doubtTrace(all)], layout, trendCaption(all) + simulatedSentence(trends));
+  const levels = lines.flatMap(([name, label, letter]) => expectedTraces(beside, name, label, letter === "x" ? X_COLOUR : Y_COLOUR));
+  const added = namedOnce([...levels, ...markTraces(beside)]);
+  const range = valueRange(all, levels, scale === "tozero");
+  const layout = trendLayout(trends, title, `${span.value()} ${scale} ${title}`, range);
+  const words = trendCaption(all, nOutside(all, range)) + simulatedSentence(trends) + besideWords(added, beside.film);
+  await box.show([...traces, doubtTrace(all), ...added], layout, words);
 }
 
 /** Means of the shaft centre over the chosen span, oldest first; without gaps' empty buckets. */

@@ -16,7 +16,7 @@ export function sourceView() {
     draw(source) {
       const { level, words } = sourceState(source.state);
       link.draw(level, sourceSentence(source, words));
-      setText(age, ageWords(source.data_age_s));
+      setText(age, source.state === "ended" ? "" : ageWords(source.data_age_s));
       age.dataset.current = String(source.state === "connected");
       setText(count, source.n_stored === undefined ? "" : sampleWords(source));
       setText(clock, clockWords(source.clock));
@@ -25,6 +25,7 @@ export function sourceView() {
 }
 
 function sourceSentence(source, words) {
+  if (source.state === "ended") return `${words} at ${formatTime(Date.parse(source.since))}`;
   const reason = source.reason ? `: ${source.reason}` : "";
   const since = source.since ? `, since ${formatTime(Date.parse(source.since))}` : "";
   return `${words}${reason}${since}`;

@@ -52,6 +52,8 @@ TABLE = {
     "GET /api/v1/units/{unit}/channels": Row("viewer"),
     "GET /api/v1/units/{unit}/waveform": Row("viewer"),
     "GET /api/v1/units/{unit}/gaps": Row("viewer"),
+    "GET /api/v1/units/{unit}/notes": Row("viewer"),
+    "POST /api/v1/units/{unit}/notes": Row("operator"),
     "GET /api/v1/units/{unit}/bearings": Row("viewer"),
     "GET /api/v1/quantities": Row("viewer", NO_UNIT),
     "GET /api/v1/sources": Row("viewer", PLANT),

@@ -140,7 +140,7 @@ async def test_readings_are_the_stored_ones_with_their_conditions(learned, lived
 
     n = found["n_found"]
     assert n == int(np.sum(lived.time_ns < lived.time_ns[0] + DAY_NS)) == len(found["time"])
-    assert found["time"] == pytest.approx(lived.time_ns[:n] / 1e9)
+    assert found["time"] == [*map(rfc3339, lived.time_ns[:n].tolist())]
     assert found["x"]["stiffness_n_per_m"] == pytest.approx(np.exp(lived.ln_k[0, :n]))
     assert found["y"]["u_random_n_per_m"] == pytest.approx(
         np.exp(lived.ln_k[1, :n]) * lived.u_random[1, :n]
@@ -162,17 +162,17 @@ async def test_more_readings_than_wanted_are_thinned_evenly_or_come_page_by_page
 
     assert found["n_found"] == len(lived)
     assert len(found["time"]) == 50
-    assert found["time"][0] == lived.time_ns[0] / 1e9
-    assert found["time"][-1] == lived.time_ns[-1] / 1e9
+    assert found["time"][0] == rfc3339(int(lived.time_ns[0]))
+    assert found["time"][-1] == rfc3339(int(lived.time_ns[-1]))
     assert found["next_end"] is None
 
-    times: list[float] = []
+    times: list[str] = []
     end = ALL["end"]
     while end:
         page = await learned.json(READINGS, start=ALL["start"], end=end, thin=False, max_points=999)
         times = page["time"] + times
         end = page["next_end"]
-    assert times == (lived.time_ns / 1e9).tolist()
+    assert times == [*map(rfc3339, lived.time_ns.tolist())]
 
 
 async def test_readings_are_filtered_by_state_eccentricity_and_oil(learned, lived):

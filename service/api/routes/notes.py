@@ -1,0 +1,87 @@
+"""Routes for notes about a unit or a bearing at a time."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Request
+from pydantic import Field
+
+from service.api.answers import in_thread
+from service.api.auth.declared import needs, subject_router
+from service.api.auth.gate import actor_or
+from service.api.context import Context, UnitId
+from service.api.parameters import Moment, OptionalTimeRange, ns_from_datetime
+from service.api.problems import ProblemError, problem_responses
+from service.api.routes.alarms import COMMENT_LIMIT, Allowances
+from service.api.values import ActorModel, ApiModel, ReasonText, Time
+from service.store.access.identities import Permission
+from service.store.notes import Note, notes_between
+
+
+class NoteModel(ApiModel):
+    """Note about a unit or a bearing at a time."""
+
+    unit: str
+    """Identifier of the unit."""
+
+    bearing: str | None
+    """Identifier of the bearing; null for a note about the whole unit."""
+
+    time: Time
+    """Time to which the note refers."""
+
+    text: str
+    """Text of the note."""
+
+    author: str
+    """Person or key that added the note."""
+
+
+class AddNoteModel(ActorModel):
+    """Request to add a note."""
+
+    text: ReasonText
+    """Text, 1 to 500 printable characters."""
+
+    time: Annotated[Moment, Field(strict=False, examples=["2026-11-21T08:00:00Z"])]
+    """Time to which the note refers, RFC 3339 with offset, from 1970 to 2262."""
+
+    bearing: Annotated[str | None, Field(examples=["UJB"])] = None
+    """Identifier of the bearing; null for a note about the whole unit."""
+
+
+def note_router(context: Context) -> APIRouter:
+    """Return the router for notes."""
+    router = subject_router("/units/{unit}/notes", "plant")
+    allowances = Allowances()
+
+    @router.get("", summary="Notes", responses=problem_responses(404, 422, 503))
+    async def notes(unit: UnitId, times: OptionalTimeRange) -> list[NoteModel]:
+        """List the notes about a unit and its bearings that refer to a time range.
+
+        Of a unit, the 1000 notes that were added last are listed, the newest first.
+        """
+        context.unit(unit)
+        audit = context.store.audit
+        found = await in_thread(lambda: list(notes_between(audit, unit, *times)))
+        return [NoteModel.of(note) for note in found]
+
+    @router.post(
+        "",
+        summary="Add a note",
+        responses=problem_responses(403, 404, 422, 503) | COMMENT_LIMIT,
+        dependencies=[needs(Permission.ACT_ON_ALARMS)],
+    )
+    async def add_note(request: Request, unit: UnitId, asked: AddNoteModel) -> NoteModel:
+        """Add a note; the audit trail records it, and it is never changed or deleted."""
+        context.unit(unit)
+        if asked.bearing is not None:
+            context.bearing(unit, asked.bearing)
+        time_ns = ns_from_datetime(asked.time, "time")
+        if not 0 <= time_ns < 2**63:
+            raise ProblemError(422, "Wrong parameter", "time must be from 1970 to 2262", "time")
+        allowances.take(request, context.clock.monotonic_s())
+        note = Note(unit, asked.bearing, time_ns, asked.text, actor_or(asked.actor))
+        await context.operators.add_note(note)
+        return NoteModel.of(note)
+
+    return router

@@ -1,0 +1,62 @@
+/** Notes about the bearings shown, in the time shown, and a form to add one. */
+
+import { tell } from "../api.js";
+import { element, setText } from "../dom.js";
+import { formatTime, formatZone } from "../format.js";
+import { actorField } from "./alarm_actor.js";
+import { localSecond } from "./explorer_time.js";
+
+/** Returns `{ node, show(found, [startMs, endMs]) }`; `again` asks for the trends afresh. */
+export function explorerNotes(again) {
+  const list = element("ul", { class: "notes" });
+  const about = element("select", { "aria-label": "About" });
+  const time = element("input", { type: "datetime-local", step: "1", required: "" });
+  const text = element("input", { required: "", maxlength: "500", placeholder: "for example: shims changed" });
+  const failure = element("span", { class: "action-failure", role: "alert" });
+  const actor = actorField("act_on_alarms", "add notes", "before you add a note");
+  const form = element(
+    "form",
+    { class: "asking", "aria-label": "Add a note", hidden: "" },
+    element("label", {}, "About ", about),
+    element("label", {}, `Time (${formatZone(Date.now())}) `, time),
+    element("label", {}, "Note ", text),
+    actor.node,
+    element("button", { type: "submit" }, "Add note"),
+    failure,
+  );
+  const node = element("section", { class: "panel explorer-notes", "aria-label": "Notes" }, element("h2", {}, "Notes"), list, actor.may ? form : actor.node);
+
+  form.addEventListener("submit", async (submitted) => {
+    submitted.preventDefault();
+    const name = actor.name();
+    if (name === null) return setText(failure, "Give your name first.");
+    const [unit, bearing] = about.value.split("/");
+    const body = { actor: name, text: text.value, time: new Date(time.value).toISOString(), bearing: bearing ?? null };
+    try {
+      await tell(["units", unit, "notes"], body);
+      [failure.textContent, text.value] = ["", ""];
+      again();
+    } catch (refused) {
+      setText(failure, refused.message);
+    }
+  });
+
+  return {
+    node,
+    show(found, [, endMs]) {
+      form.hidden = found.length === 0;
+      const notes = new Map(found.flatMap(({ beside }) => beside.notes.map((note) => [JSON.stringify(note), note])));
+      const sorted = [...notes.values()].sort((one, other) => other.time.localeCompare(one.time));
+      list.replaceChildren(...sorted.map(noteRow), ...(sorted.length ? [] : [element("li", { class: "sentence" }, "No notes in this time.")]));
+      time.value ||= localSecond(endMs);
+      const places = [...new Set(found.flatMap(({ bearing: [unit, bearing] }) => [`${unit}/${bearing}`, unit]))];
+      if (places.join() === [...about.options].map(({ value }) => value).join()) return;
+      about.replaceChildren(...places.map((place) => element("option", { value: place }, place.replace("/", " "))));
+    },
+  };
+}
+
+function noteRow({ unit, bearing, time, text, author }) {
+  const place = [unit, bearing].filter(Boolean).join(" ");
+  return element("li", {}, element("time", { datetime: time }, formatTime(Date.parse(time))), ` ${place}: ${text} (${author})`);
+}

@@ -1,0 +1,52 @@
+"""Notes of people about a unit or a bearing at a time; the audit trail keeps them."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from service.store.access.audit_entries import AuditAction, acting
+from service.store.audit import AuditQuery, AuditStore
+
+NOTE_ADDED = "note.added"
+"""Action in the audit trail; its object is the unit."""
+
+MAX_NOTES = 1000
+"""Maximum number of notes of a unit that are read; older notes remain in the audit trail."""
+
+
+@dataclass(frozen=True)
+class Note:
+    """Note about a unit or a bearing, such as "shims changed"; notes are never changed.
+
+    Parameters
+    ----------
+    bearing
+        Identifier of the bearing; None for a note about the whole unit.
+    time_ns
+        Time to which the note refers, ns since 1970 UTC.
+    author
+        Person or API key that added the note.
+    """
+
+    unit: str
+    bearing: str | None
+    time_ns: int
+    text: str
+    author: str
+
+
+def note_action(note: Note, now_ns: int) -> AuditAction:
+    """Return the audit entry that stores a note."""
+    after = {"bearing": note.bearing, "time_ns": note.time_ns, "text": note.text}
+    who = acting()
+    return AuditAction(
+        now_ns, note.author, NOTE_ADDED, note.unit, after=after, source=who.source, peer=who.peer
+    )
+
+
+def notes_between(audit: AuditStore, unit: str, start_ns: int, end_ns: int) -> Iterator[Note]:
+    """Yield the notes of a unit that refer to a half-open time range, last added first."""
+    for entry in audit.entries(AuditQuery(limit=MAX_NOTES, action=NOTE_ADDED, object=unit)):
+        note = Note(unit=unit, author=entry.actor, **json.loads(entry.after or "{}"))
+        if start_ns <= note.time_ns < end_ns:
+            yield note
