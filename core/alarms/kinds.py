@@ -123,7 +123,7 @@ ALARM_KINDS = kind_table(
         "oil_temperature_c",
         OIL_TEMPERATURE,
     ),
-    *_pair("films", "1", "stiffness_{}", "Film stiffness changed, {}"),
+    *_pair("films", "%", "stiffness_{}", "Film stiffness changed, {}"),
     AlarmKind(
         "clock_offset",
         "Device clock off",

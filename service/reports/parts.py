@@ -187,20 +187,17 @@ class FindingPart(EvidencePart):
     level: LevelWord | None
     """Alarm level of the film; null without an alarm."""
 
-    change: float | None
-    """Most significant mean deviation from the baseline, in ln."""
-
-    change_std: float | None
-    """Standard uncertainty of `change`."""
+    change_percent: float | None
+    """Most significant mean deviation, % of the expected stiffness."""
 
     time_scale_h: float | None
-    """Time scale over which `change` was averaged, in running hours."""
+    """Time scale over which `change_percent` was averaged, in running hours."""
 
-    deviation: float | None
-    """Deviation of the newest reading from the baseline, in ln; null unless it was compared."""
+    deviation_percent: float | None
+    """Deviation of the newest reading, % of the expected stiffness; null unless it was compared."""
 
-    deviation_std: float | None
-    """Standard uncertainty of `deviation`."""
+    deviation_95_percent: tuple[float, float] | None
+    """95 % interval of `deviation_percent`."""
 
     baseline_version: int | None
     """Version of the baseline."""

@@ -69,6 +69,9 @@ class BearingModel(ApiModel):
     id: str
     """Identifier of the bearing."""
 
+    name: str | None
+    """Display name of the bearing; null without a name."""
+
     bracket_stiffness_n_per_m: float
     """Radial stiffness of the bearing bracket, N/m."""
 

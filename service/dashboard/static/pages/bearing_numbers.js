@@ -11,36 +11,46 @@ const PAIRS = (order, what, axes, unit) => [axes.map((axis) => `${order}_${what.
 const SHAFT = (order) => PAIRS(order, "shaft_*_um_pk", ["x", "y"]);
 const BRACKET = (order) => PAIRS(order, "bearing_*_um_pk", ["x", "y"]);
 
-const TILES = [
-  ["Shaft motion, 1×", SHAFT("order1")],
-  ["Bearing motion, 1×", BRACKET("order1")],
+const KEY = [
+  ["Shaft vibration, 1×", SHAFT("order1")],
+  ["Bearing vibration, 1×", BRACKET("order1")],
+  ["Eccentricity ratio, attitude angle", [["eccentricity_ratio", "attitude_angle_deg"], ["ratio", "angle"]]],
+  ["Oil temperature, active power", [["oil_temperature_c", "power_mw"], ["oil", "power"]]],
+];
+const MORE = [
   ["Shaft centre", [["shaft_centre_x_um", "shaft_centre_y_um"], ["x", "y"]]],
-  ["Shaft motion, vortex", SHAFT("vortex")],
-  ["Bearing motion, vortex", BRACKET("vortex")],
-  ["Eccentricity and attitude", [["eccentricity_ratio", "attitude_angle_deg"], ["ratio", "angle"]]],
-  ["Line frequencies", [["order1_frequency_hz", "vortex_frequency_hz"], ["1×", "vortex"]]],
-  ["Orbit roundness, + forward", [["order1_roundness", "vortex_roundness"], ["1×", "vortex"]]],
-  ["Oil and power", [["oil_temperature_c", "power_mw"], ["oil", "power"]]],
-];
-const BROAD_BAND = [
-  ["Shaft motion, broad-band", [["overall_shaft_x_um_pp", "overall_shaft_y_um_pp"], ["x", "y"]]],
+  ["Frequency and orbit shape, 1×", [["order1_frequency_hz", "order1_roundness"], ["", "shape"]]],
+  ["Shaft vibration, vortex", SHAFT("vortex")],
+  ["Bearing vibration, vortex", BRACKET("vortex")],
+  ["Frequency and orbit shape, vortex", [["vortex_frequency_hz", "vortex_roundness"], ["", "shape"]]],
+  ["Shaft vibration, broad-band", [["overall_shaft_x_um_pp", "overall_shaft_y_um_pp"], ["x", "y"]]],
   ["Bearing velocity, broad-band", [["overall_bearing_x_mm_s_rms", "overall_bearing_y_mm_s_rms"], ["x", "y"]]],
-  ["Phase of shaft motion, 1×", [["order1_shaft_x_phase_deg", "order1_shaft_y_phase_deg"], ["x", "y"]]],
-  ["Phase of bearing motion, 1×", [["order1_bearing_x_phase_deg", "order1_bearing_y_phase_deg"], ["x", "y"]]],
+  ["Maximum shaft displacement", [["overall_shaft_um_pk"], [""]]],
+  ["Phase of shaft vibration, 1×", [["order1_shaft_x_phase_deg", "order1_shaft_y_phase_deg"], ["x", "y"]]],
+  ["Phase of bearing vibration, 1×", [["order1_bearing_x_phase_deg", "order1_bearing_y_phase_deg"], ["x", "y"]]],
 ];
+
+/** What does not exist here is left out: a vortex at full load, phases without a key-phase. */
+const LEFT_OUT = ["no_vortex", "not_measured", "switched_off"];
 const OPPOSITE = ["opposite_gap_x_um", "opposite_gap_y_um"];
 const GROWTH = "gap_growth_um";
 
-/** Returns `{ node, draw(latest), close() }`. */
-export function bearingNumbers(path) {
+/** Stiffness and condition. Returns `{ node, draw(latest), close() }`. */
+export function keyNumbers(path) {
+  return numbers(path, "tiles", (budget) => [preferredStiffness(budget), ...KEY.map((one) => tile(one, budget)), speedTile()]);
+}
+
+/** The other numbers. Returns `{ node, draw(latest), close() }`. */
+export function moreNumbers(path) {
+  return numbers(path, "more-tiles", (budget) => [...MORE.map((one) => tile(one, budget)), gapsTile(budget)]);
+}
+
+function numbers(path, style, tilesOf) {
   const budget = budgetPanel(path);
   budget.node.classList.add("panel");
-  const small = TILES.map((one) => tile(one, budget));
-  const more = [...BROAD_BAND.map((one) => tile(one, budget)), excursionTile()];
-  const tiles = [preferredStiffness(budget), ...small, gapsTile(budget), speedTile(), ...more];
-  const nodes = [...tiles.map((one) => one.node), budget.node];
+  const tiles = tilesOf(budget);
   return {
-    node: element("section", { class: "tiles", "aria-label": "Numbers" }, ...nodes),
+    node: element("section", { class: style, "aria-label": "Numbers" }, ...tiles.map((one) => one.node), budget.node),
     draw(latest) {
       const { reason } = qualityOf(latest);
       for (const one of tiles) one.draw(latest, reason);
@@ -51,9 +61,13 @@ export function bearingNumbers(path) {
 
 function tile([title, [names, labels]], budget) {
   const pair = pairView(names, labels, undefined, (name) => budgetSpread(name, budget));
+  const node = element("div", { class: "tile" }, element("h2", {}, title), pair.node);
   return {
-    node: element("div", { class: "tile" }, element("h2", {}, title), pair.node),
-    draw: pair.draw,
+    node,
+    draw(latest, saidReason) {
+      pair.draw(latest, saidReason);
+      node.hidden = names.every((name) => readingOf(latest, name).value === null && LEFT_OUT.includes(readingOf(latest, name).reason));
+    },
   };
 }
 
@@ -72,12 +86,6 @@ function gapsTile(budget) {
       growth.node.hidden = opposite.node.hidden || !exists(latest, GROWTH);
     },
   };
-}
-
-/** The farthest that the shaft moves from its mean, in whichever direction. */
-function excursionTile() {
-  const excursion = readingView("overall_shaft_um_pk", "");
-  return { node: element("div", { class: "tile" }, element("h2", {}, "Farthest excursion"), excursion.node), draw: excursion.draw };
 }
 
 function speedTile() {

@@ -2,7 +2,7 @@
 
 import { amplitudeUnit } from "../amplitudes.js";
 import { element, setText } from "../dom.js";
-import { changeBrief, limitWords, verdictMark, whyUnjudged } from "../film_words.js";
+import { limitWords, nowSentence, verdictMark, whyUnjudged } from "../film_words.js";
 import { formatAge } from "../format.js";
 import { centrePicture } from "../parts/centre_picture.js";
 import { drawQuality, mark } from "../parts/mark.js";
@@ -17,7 +17,7 @@ const pair = (names, labels, unit) => () => readingCell(pairView(names, labels, 
 
 /** Each row: its head, its unit, and a view that draws `(latest, film, brief)`. */
 const rows = () => [
-  ["Film", "against its baseline", filmCell],
+  ["Verdict", "on the film against its baseline", filmCell],
   ["Film stiffness", "GN/m ± 95 %", () => readingCell(stiffnessBrief())],
   ["Shaft vibration, 1×", amplitudeUnit(), pair(["order1_shaft_x_um_pk", "order1_shaft_y_um_pk"], ["x", "y"], "")],
   ["Shaft vibration, broad-band", "µm pk-pk", pair(["overall_shaft_x_um_pp", "overall_shaft_y_um_pp"], ["x", "y"], "")],
@@ -74,7 +74,7 @@ function filmCell() {
     node: element("div", { class: "film-lines" }, none, ...lines.map((line) => line.node), limits),
     draw(latest, film, brief) {
       setText(none, brief.why_not ? `Not watched: ${brief.why_not}` : "");
-      setText(limits, film?.is_watched ? `limit ${limitWords(film.limits)}` : "");
+      setText(limits, film?.is_watched ? limitWords(film.limits) : "");
       const found = lines.map((line) => film?.[line.direction] ?? null);
       const said = found.map((one) => (one ? whyUnjudged(one) : ""));
       if (said[0] === said[1]) said[0] = "";
@@ -96,7 +96,7 @@ function filmLine(direction) {
       if (brief === null) return;
       const [look, words] = verdictMark(brief);
       verdict.draw(look, `${direction} ${words.charAt(0).toLowerCase()}${words.slice(1)}`);
-      setText(change, found ? changeBrief(found) : "");
+      setText(change, found ? nowSentence(found) : "");
       setText(said, why);
     },
   };

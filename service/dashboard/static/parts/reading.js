@@ -68,5 +68,5 @@ export function pairView(names, labels, unit, spreadOf = spreadView) {
 /** Whether both of two readings are missing for one and the same reason. */
 export function missingAlike(latest, names) {
   const [first, second] = names.map((name) => readingOf(latest, name));
-  return first.value === null && second.value === null && first.reason === second.reason;
+  return second !== undefined && first.value === null && second.value === null && first.reason === second.reason;
 }
