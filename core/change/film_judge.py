@@ -82,7 +82,7 @@ def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Judgement:
     if finding.level is not None:
         reason = ALARM_REASONS[finding.attribution.cause if finding.attribution else Cause.UNKNOWN]
     change = None if finding.change is None else percent_of(finding.change)
-    signed = math.copysign(100.0 * limit, change or 0.0)
+    signed = math.copysign(round(100.0 * limit, 6), change or 0.0)
     return Judgement(finding.level, value=change, limit=signed, reason=reason)
 
 

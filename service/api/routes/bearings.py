@@ -168,7 +168,7 @@ class BudgetModel(ApiModel):
     quantity: Annotated[str, Field(examples=["dynamic_k_xx_n_per_m"])]
     """Name of the quantity in the catalogue."""
 
-    label: Annotated[str, Field(examples=["Stiffness xx, dynamic"])]
+    label: Annotated[str, Field(examples=["Film stiffness, broadband estimate, xx"])]
     """Description of the quantity in words."""
 
     unit: Annotated[str, Field(examples=["N/m"])]

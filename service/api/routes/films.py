@@ -13,7 +13,7 @@ from core.baseline.history import DIRECTIONS
 from core.change.decision import Decision, Verdict
 from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading
-from core.change.settings import FilmRules, percent_of
+from core.change.settings import ChangeLimits, FilmRules, percent_of
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import ProblemError, problem_responses
@@ -209,6 +209,9 @@ class FilmBriefModel(ApiModel):
     why_not: str | None
     """Reason why the film is not watched; null if it is watched."""
 
+    limits: FilmLimitsModel | None
+    """Alarm limits; null if the film is not watched."""
+
     x: FilmWordModel | None
     """State in x; null if the film is not watched."""
 
@@ -259,7 +262,6 @@ def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
     """Return the API model of the current state of the film of a bearing."""
     seen, place = _seen(context, unit, bearing), context.films.place(unit, bearing)
     x, y = _directions(seen) if seen else (None, None)
-    limits = seen.rules.change if seen else None
     return FilmModel.of(
         unit=unit,
         bearing=bearing,
@@ -271,10 +273,7 @@ def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
         next_reading=seen and _next_reading_ns(seen),
         condition=seen and _condition(seen),
         baseline_version=seen and _version(seen.baseline),
-        limits=limits
-        and FilmLimitsModel(
-            alert_percent=100.0 * limits.alert_change, danger_percent=100.0 * limits.danger_change
-        ),
+        limits=seen and _limits(seen.rules.change),
         x=x,
         y=y,
     )
@@ -284,7 +283,14 @@ def film_brief(context: Context, unit: str, bearing: str) -> FilmBriefModel:
     """Return the API model of the film summary of a bearing."""
     seen = _seen(context, unit, bearing)
     x, y = (_word(found) for found in _directions(seen)) if seen else (None, None)
-    return FilmBriefModel(why_not=why_unwatched(context, unit, bearing), x=x, y=y)
+    limits = _limits(seen.rules.change) if seen else None
+    why_not = why_unwatched(context, unit, bearing)
+    return FilmBriefModel(why_not=why_not, limits=limits, x=x, y=y)
+
+
+def _limits(limits: ChangeLimits) -> FilmLimitsModel:
+    percent = [round(100.0 * each, 6) for each in (limits.alert_change, limits.danger_change)]
+    return FilmLimitsModel(alert_percent=percent[0], danger_percent=percent[1])
 
 
 def _word(found: FilmDirectionModel) -> FilmWordModel:

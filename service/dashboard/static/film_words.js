@@ -71,10 +71,10 @@ export function signedPercent(percent, decimals = 1) {
 }
 
 /** `Now 0.231, expected 0.330 GN/m (−30.0 %).`; nothing without a reading. */
-export function nowSentence({ stiffness_n_per_m: stiffness, expected_n_per_m: expected, deviation }) {
+export function nowSentence({ stiffness_n_per_m: stiffness, expected_n_per_m: expected, deviation_percent: deviation }) {
   if (stiffness === null) return "";
   const gn = (value) => formatQuantity("stiffness_xx_n_per_m", value);
-  return deviation === null ? `Now ${gn(stiffness)} GN/m.` : `Now ${gn(stiffness)}, expected ${gn(expected)} GN/m (${signedPercent(deviation.percent)}).`;
+  return deviation === null ? `Now ${gn(stiffness)} GN/m.` : `Now ${gn(stiffness)}, expected ${gn(expected)} GN/m (${signedPercent(deviation)}).`;
 }
 
 /** `Confirmed −12.4 %, mean over 4 running hours.`; of the past while it cannot be judged. */

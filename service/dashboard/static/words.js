@@ -90,7 +90,7 @@ export function reasonSentence(reason) {
 }
 
 const ESTIMATORS = {
-  dynamic: "dynamic",
+  dynamic: "broadband estimate",
   transfer_order1: "transfer at 1×",
   transfer_vortex: "transfer at vortex",
   ratio_order1: "equation (5) at 1×",

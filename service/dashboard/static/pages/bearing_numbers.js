@@ -1,10 +1,10 @@
 /** Every number of a bearing, in the order an engineer asks for them. */
 
-import { element, setText } from "../dom.js";
+import { element } from "../dom.js";
 import { budgetPanel } from "../parts/budget.js";
 import { pairView, readingOf, readingView } from "../parts/reading.js";
 import { budgetSpread } from "../parts/spread.js";
-import { qualityOf, speedOrigin } from "../words.js";
+import { qualityOf } from "../words.js";
 import { preferredStiffness } from "./preferred_stiffness.js";
 
 const PAIRS = (order, what, axes, unit) => [axes.map((axis) => `${order}_${what.replace("*", axis)}`), axes, unit];
@@ -15,7 +15,7 @@ const KEY = [
   ["Shaft vibration, 1×", SHAFT("order1")],
   ["Bearing vibration, 1×", BRACKET("order1")],
   ["Eccentricity ratio, attitude angle", [["eccentricity_ratio", "attitude_angle_deg"], ["ratio", "angle"]]],
-  ["Oil temperature, active power", [["oil_temperature_c", "power_mw"], ["oil", "power"]]],
+  ["Operation", [["oil_temperature_c", "power_mw", "speed_rpm"], ["oil", "power", "speed"]]],
 ];
 const MORE = [
   ["Shaft centre", [["shaft_centre_x_um", "shaft_centre_y_um"], ["x", "y"]]],
@@ -37,7 +37,7 @@ const GROWTH = "gap_growth_um";
 
 /** Stiffness and condition. Returns `{ node, draw(latest), close() }`. */
 export function keyNumbers(path) {
-  return numbers(path, "tiles", (budget) => [preferredStiffness(budget), ...KEY.map((one) => tile(one, budget)), speedTile()]);
+  return numbers(path, "tiles", (budget) => [preferredStiffness(budget), ...KEY.map((one) => tile(one, budget))]);
 }
 
 /** The other numbers. Returns `{ node, draw(latest), close() }`. */
@@ -84,18 +84,6 @@ function gapsTile(budget) {
       for (const part of parts) part.draw(latest, saidReason);
       opposite.node.hidden = !OPPOSITE.some((name) => exists(latest, name));
       growth.node.hidden = opposite.node.hidden || !exists(latest, GROWTH);
-    },
-  };
-}
-
-function speedTile() {
-  const speed = readingView("speed_rpm", "");
-  const from = element("span", { class: "from" });
-  return {
-    node: element("div", { class: "tile" }, element("h2", {}, "Speed"), speed.node, from),
-    draw(latest, saidReason) {
-      speed.draw(latest, saidReason);
-      setText(from, speedOrigin(latest));
     },
   };
 }

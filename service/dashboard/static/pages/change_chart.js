@@ -12,13 +12,13 @@ import { serviceTimeMs } from "../server_time.js";
 
 const PERIOD_S = 15;
 const MAX_POINTS = 500;
-const SPANS = [[8 * 3600, "8 h"], [86400, "1 d"], [30 * 86400, "30 d"]];
+const SPANS = [[3600, "1 h"], [8 * 3600, "8 h"], [86400, "1 d"], [30 * 86400, "30 d"]];
 const LOOKS = { x: { color: X_COLOUR, width: 1.8 }, y: { color: Y_COLOUR, width: 1.8, dash: "dash" } };
 
 /** Returns `{ node, update(film), draw(latest, unit, view), close() }`. */
 export function changeChart(path) {
   let film = null;
-  const span = choice("Span", SPANS, SPANS[0][0], () => questions.again());
+  const span = choice("Span", SPANS, 8 * 3600, () => questions.again());
   const box = panel("Change of film stiffness against the baseline", "change", span.node);
   const questions = poll(async (signal) => {
     if (film === null) return;

@@ -48,14 +48,14 @@ function directionRow(direction) {
     node: element("div", { class: "verdict", "data-direction": direction }, element("span", { class: "axis" }, direction), verdict.node, element("span", {}, change, " ", said)),
     draw(found, limits) {
       verdict.draw(...verdictMark(found));
-      setText(change, nowSentence(found));
+      setText(change, nowSentence({ ...found, deviation_percent: found.deviation?.percent ?? null }));
       setText(said, [whyUnjudged(found), changeSentence(found), pendingSentence(found, limits), causeSentence(found.cause)].filter(Boolean).join(" "));
     },
   };
 }
 
 function comparedWords({ baseline_version: version, estimator }) {
-  const by = `Stiffness by ${estimatorWords(estimator)}`;
+  const by = `Stiffness: ${estimatorWords(estimator)}`;
   return version === null ? `${by}; no baseline in force.` : `${by}, compared with baseline version ${version}.`;
 }
 

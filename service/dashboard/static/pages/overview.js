@@ -87,6 +87,7 @@ function tallyView(node) {
       captures.node.hidden = view.captureError === null;
       captures.draw("uncertain", `Samples around alarms are not kept: ${view.captureError}`);
       setText(words, emptyWords(view));
+      words.hidden = words.textContent === "";
       const looks = view.units.flatMap(({ id, bearings, films }) => bearings.map(({ bearing }, n) => bearingVerdict(films[n], alarms.of(id, bearing))[0]));
       for (const [look, one] of Object.entries(marks)) {
         const n = looks.filter((each) => each === look).length;

@@ -1,6 +1,6 @@
 /** One generating unit on the overview: how it runs, and a row for each bearing with its verdict. */
 
-import { element, setText } from "../dom.js";
+import { element, setAttribute, setText } from "../dom.js";
 import { signedPercent } from "../film_words.js";
 import { formatAge } from "../format.js";
 import { filmBrief } from "../parts/film_brief.js";
@@ -14,7 +14,7 @@ import { qualityOf, sourceState } from "../words.js";
 const HEADS = [
   ["Bearing", ""],
   ["Film stiffness", "GN/m"],
-  ["Change", "of expected"],
+  ["Change", "from expected"],
   ["Trend", ""],
   ["Eccentricity", ""],
   ["Oil", "°C"],
@@ -31,12 +31,14 @@ export function unitCard(unit, alarm) {
   const rows = unit.bearings.map((one) => bearingRow(unit.id, one));
   const title = element("h2", { dir: "auto" }, element("a", { href: unitAddress(unit.id) }, unit.name));
   const head = element("div", { class: "unit-head" }, title, running, alarm.node, link.node);
+  const node = element("section", { class: "unit-card", "data-unit": unit.id }, head, table(unit, rows));
   return {
-    node: element("section", { class: "unit-card", "data-unit": unit.id }, head, table(unit, rows)),
+    node,
     draw(now, alarmsOf, historyOf) {
       setText(running, runningWords(now));
       drawLink(link, now.source);
       alarm.draw();
+      setAttribute(node, "data-worst", alarm.node.dataset.look ?? null);
       rows.forEach((row, n) => row.draw(now.bearings[n], now.films[n], alarmsOf(now.bearings[n].bearing), historyOf(now.bearings[n].bearing)));
     },
   };

@@ -42,8 +42,8 @@ function unitMark(find) {
     node: shown.node,
     draw() {
       const open = find();
-      shown.node.hidden = open !== null && open.length === 0;
-      shown.draw(...(open === null ? ["uncertain", "Alarms unknown"] : wordsOf(open)));
+      shown.node.hidden = open?.length === 0;
+      if (!shown.node.hidden) shown.draw(...(open === null ? ["uncertain", "Alarms unknown"] : wordsOf(open)));
     },
   };
 }
