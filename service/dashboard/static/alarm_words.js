@@ -94,7 +94,7 @@ export function placeWords({ unit, subject }) {
 
 /** Look and word of a priority; what has returned is quiet. */
 export function levelMark({ level, is_active: active }) {
-  if (!active) return ["unjudged", "Returned"];
+  if (!active) return ["quiet", "Returned"];
   return level === "danger" ? ["danger", "Danger"] : ["alert", "Alert"];
 }
 
@@ -150,6 +150,6 @@ export function countWords(count) {
   if (unseen) parts.push(`${unseen} not acknowledged`);
   if (!active && !unseen) parts.push("No alarms");
   if (unjudged) parts.push(`${unjudged} not judged`);
-  const look = danger ? "danger" : active ? "alert" : "unjudged";
+  const look = danger ? "danger" : active ? "alert" : "quiet";
   return [active || unseen || unjudged ? look : "normal", parts.join(", ")];
 }

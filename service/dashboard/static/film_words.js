@@ -7,12 +7,12 @@ const VERDICTS = {
   normal: ["normal", "Normal"],
   alert: ["alert", "Alert"],
   danger: ["danger", "Danger"],
-  gathering_evidence: ["unjudged", "Gathering evidence"],
-  no_baseline: ["unjudged", "No baseline"],
-  insufficient_excitation: ["unjudged", "Weak signal"],
-  bad_quality: ["unjudged", "Reading doubted"],
-  transient: ["unjudged", "Not settled"],
-  no_reading: ["unjudged", "No current reading"],
+  gathering_evidence: ["quiet", "Gathering evidence"],
+  no_baseline: ["quiet", "No baseline"],
+  insufficient_excitation: ["quiet", "Weak signal"],
+  bad_quality: ["quiet", "Reading doubted"],
+  transient: ["quiet", "Not settled"],
+  no_reading: ["quiet", "No current reading"],
 };
 
 const JUDGED = ["normal", "alert", "danger"];
@@ -54,7 +54,7 @@ export const stateWords = (state) => STATES[state] ?? state.replaceAll("_", " ")
 
 /** Look and word of a verdict; a level that is held shows, whether or not it can be judged now. */
 export function verdictMark({ verdict, level }) {
-  const [look, word] = VERDICTS[verdict] ?? ["unjudged", verdict.replaceAll("_", " ")];
+  const [look, word] = VERDICTS[verdict] ?? ["quiet", verdict.replaceAll("_", " ")];
   return level === null || verdict === level ? [look, word] : [level, `${word}, ${level} held`];
 }
 

@@ -18,10 +18,8 @@ const KINDS = [
   { name: /_c$/, scale: 1, decimals: 1, unit: "°C" },
   { name: /_deg$/, scale: 1, decimals: 0, unit: "°" },
   { name: /_hz$/, scale: 1, decimals: 3, unit: "Hz" },
-  { name: /_ratio$/, scale: 1, decimals: 2, unit: "" },
   { name: /_coherence_/, scale: 1, decimals: 3, unit: "" },
-  { name: /_lack_of_fit_/, scale: 1, decimals: 2, unit: "" },
-  { name: /_roundness$/, scale: 1, decimals: 2, unit: "" },
+  { name: /_ratio$|_lack_of_fit_|_roundness$/, scale: 1, decimals: 2, unit: "" },
   { name: /_n_lines$/, scale: 1, decimals: 0, unit: "" },
 ];
 

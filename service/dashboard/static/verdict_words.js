@@ -11,7 +11,7 @@ const CAUSES = {
   changed_cause_unknown: "cause unclear",
 };
 
-const RANKS = ["danger", "alert", "unjudged", "normal"];
+const RANKS = ["danger", "alert", "quiet", "normal"];
 const MOST_OTHERS = 2;
 
 /**
@@ -35,8 +35,8 @@ export function bearingVerdict(film, alarms) {
 
 /** The worse verdict of x and y, without alarms. */
 function filmVerdict(film) {
-  if (film.why_not !== null) return ["unjudged", "Not watched", "not watched"];
-  const marks = [film.x, film.y].map((one) => (isAhead(one, film.limits) ? ["unjudged", "Change not confirmed yet"] : verdictMark(one)));
+  if (film.why_not !== null) return ["quiet", "Not watched", "not watched"];
+  const marks = [film.x, film.y].map((one) => (isAhead(one, film.limits) ? ["quiet", "Change not confirmed yet"] : verdictMark(one)));
   const [look, words] = marks.toSorted(([a], [b]) => RANKS.indexOf(a) - RANKS.indexOf(b))[0];
   return [look, words, words.toLowerCase()];
 }

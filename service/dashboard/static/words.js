@@ -117,13 +117,6 @@ export function runoutWords(runout) {
   return x === y ? x : `x ${x}, y ${y}`;
 }
 
-/** Which estimator the preferred stiffness comes from, in one go if it is the same in both axes. */
-export function preferredOrigin({ estimators }) {
-  const chosen = Object.entries(estimators ?? {}).filter(([, name]) => name !== null);
-  if (new Set(chosen.map(([, name]) => name)).size === 1 && chosen.length === 2) return estimatorWords(chosen[0][1]);
-  return chosen.map(([axes, name]) => `${axes} ${estimatorWords(name)}`).join(", ");
-}
-
 const SPEED_SOURCES = {
   key_phase: "measured by key-phase",
   slow_channel: "measured",

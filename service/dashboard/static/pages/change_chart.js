@@ -53,14 +53,12 @@ async function show(box, limits, readings, words) {
   }
   const times = readings.time.map((timeS) => formatTime(timeS * 1000));
   const first = readings.time.findIndex((_, n) => readings.x.deviation_percent[n] !== null || readings.y.deviation_percent[n] !== null);
-  const traces = Object.entries(LOOKS).map(([direction, line]) => traceOf(direction, line, times, readings[direction].deviation_percent));
+  const traces = Object.entries(LOOKS).map(([name, line]) => ({
+    ...{ name, line, x: times, y: readings[name].deviation_percent, type: "scatter", mode: "lines+markers" },
+    ...{ marker: { color: line.color, size: 4 }, hovertemplate: `${name}: %{y:+.1f} %<extra></extra>` },
+  }));
   const caption = `A point: one reading against what the baseline expects under its condition. ${limitWords(limits)}.`;
   await box.show(traces, layoutOf(limits, known, [times[first], times.at(-1)], words), caption);
-}
-
-function traceOf(direction, line, times, percent) {
-  const shown = { x: times, y: percent, type: "scatter", mode: "lines+markers", name: direction, line, marker: { color: line.color, size: 4 } };
-  return { ...shown, connectgaps: false, hovertemplate: `${direction}: %{y:+.1f} %<extra></extra>` };
 }
 
 /** Softening to beyond the limit of danger is always in the picture. */

@@ -29,7 +29,11 @@ export function overviewPage(main) {
   let films = [];
 
   const trends = poll(async (signal) => {
-    for (const key of films) histories.set(key, await historyOf(key, signal));
+    const give = (failure) => (signal.aborted ? Promise.reject(failure) : null); // the row has no trend then, and all else
+    for (const [unit, bearing] of films) {
+      const path = ["units", unit, "bearings", bearing];
+      histories.set(`${unit}/${bearing}`, await askReadings(path, serviceTimeMs(), TREND_SPAN_S, TREND_POINTS, signal).catch(give));
+    }
   }, () => TREND_PERIOD_S);
 
   function build(view) {
@@ -39,7 +43,7 @@ export function overviewPage(main) {
     units.className = isLarge ? "unit-tiles" : "units";
     units.replaceChildren(...drawn.map((one) => one.node));
     summary.nextSibling.hidden = !isLarge;
-    const watched = view.units.flatMap(({ id, bearings, films: found }) => bearings.filter((_, n) => found[n].why_not === null).map(({ bearing }) => `${id}/${bearing}`));
+    const watched = view.units.flatMap((unit) => unit.bearings.filter((_, n) => unit.films[n].why_not === null).map(({ bearing }) => [unit.id, bearing]));
     films = isLarge ? [] : watched;
     trends.again();
   }
@@ -62,18 +66,7 @@ export function overviewPage(main) {
   };
 }
 
-/** Newest readings of a film; null if the request fails: the row then has no trend, and all else. */
-async function historyOf(key, signal) {
-  const [unit, bearing] = key.split("/");
-  try {
-    return await askReadings(["units", unit, "bearings", bearing], serviceTimeMs(), TREND_SPAN_S, TREND_POINTS, signal);
-  } catch (failure) {
-    if (signal.aborted) throw failure;
-    return null;
-  }
-}
-
-const VERDICTS = { danger: "danger", alert: "alert", normal: "normal", unjudged: "not judged" };
+const VERDICTS = { danger: "danger", alert: "alert", normal: "normal", quiet: "not judged" };
 
 function tallyView(node) {
   const words = element("span");

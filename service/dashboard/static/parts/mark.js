@@ -2,7 +2,7 @@
  * A mark: shape, colour and words, each sufficient alone.
  *
  * Round shapes are about data, with the looks of `lookOf`; angular ones about the machine, with the
- * looks `danger`, `alert`, `normal`, and `unjudged` for all that is none of these.
+ * looks `danger`, `alert`, `normal`, and `quiet` for all that is none of these.
  */
 
 import { element, setAttribute, setText, shape } from "../dom.js";
@@ -33,7 +33,7 @@ const SHAPES = {
     shape("path", { d: "M8 6v4.2M8 11.7v1.2", class: "stroke" }),
   ],
   normal: () => [shape("path", { d: "M2.5 8.5l3.5 3.5 7.5-8", class: "stroke" })],
-  unjudged: () => [shape("path", { d: "M3 8h10", class: "stroke" })],
+  quiet: () => [shape("path", { d: "M3 8h10", class: "stroke" })],
 };
 
 /** The shape alone, hidden from screen readers: words must stand beside it. */
