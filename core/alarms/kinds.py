@@ -126,7 +126,7 @@ ALARM_KINDS = kind_table(
         "oil_temperature_c",
         OIL_TEMPERATURE,
     ),
-    AlarmKind(FILM_STIFFNESS, "Film stiffness changed", "1", BEARING, "films"),
+    AlarmKind(FILM_STIFFNESS, "Film stiffness changed", "%", BEARING, "films"),
     AlarmKind(
         "clock_offset",
         "Device clock off",

@@ -207,14 +207,15 @@ def _is_exceeded(finding: Finding, limit: float, margin: float, limits: ChangeLi
     """Whether a change is significant, and exceeds the limit by `margin` standard uncertainties."""
     significance = finding.significance
     threshold = limits.significance_threshold(finding.time_scale_h)
-    size = abs(finding.change) * (1.0 - margin / max(significance, 1e-9))
-    return significance >= threshold and size >= limit
+    surely = finding.change * (1.0 - margin / max(significance, 1e-9))
+    return significance >= threshold and abs(math.expm1(surely)) >= limit
 
 
 def _is_held(finding: Finding, limit: float, limits: ChangeLimits) -> bool:
     """Whether a change still exceeds the limit minus the deadband."""
     threshold = limits.significance_threshold(finding.time_scale_h) * limits.holding_share
-    return finding.significance > threshold and abs(finding.change) > limit - limits.deadband
+    size = abs(math.expm1(finding.change))
+    return finding.significance > threshold and size > limit - limits.deadband
 
 
 def _verdict(decision: Decision, baseline: QuantityBaseline, limits: ChangeLimits) -> Verdict:

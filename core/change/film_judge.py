@@ -13,10 +13,13 @@ from core.baseline.history import DIRECTIONS
 from core.change.cause import Attribution, Cause, UnitReadings, attribute
 from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, outcomes, step
 from core.change.film_reading import FilmReading
-from core.change.settings import ChangeLimits, FilmRules
+from core.change.settings import ChangeLimits, FilmRules, percent_of
 from core.change.shaft_response import MEAN_READINGS, FilmDirection, ShaftResponse
 from core.condition.operating_state import OilSettling, Operation
 from core.limits import AlarmLevel, Judgement, unknown
+
+NORMAL_95 = 1.96
+"""Half-width of the 95 % interval of a normal distribution, in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,14 @@ class FilmFinding:
     baseline_version: int | None = None
     attribution: Attribution | None = None
 
+    @property
+    def deviation_95_percent(self) -> tuple[float, float] | None:
+        """95 % interval of the deviation, % of the expected stiffness; None without deviation."""
+        if self.deviation is None or self.deviation_std is None:
+            return None
+        half = NORMAL_95 * self.deviation_std
+        return percent_of(self.deviation - half), percent_of(self.deviation + half)
+
 
 ALARM_REASONS = {
     Cause.FILM: "film_changed",
@@ -60,14 +71,19 @@ ALARM_REASONS = {
 
 
 def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Judgement:
-    """Return the judgement of a film in one direction; unknown if the reading was not judged."""
+    """Return the judgement of a film in one direction; unknown if the reading was not judged.
+
+    Value and limit are changes in percent of the expected stiffness, with the sign of the change.
+    """
     if finding.verdict not in JUDGED:
         return unknown(finding.verdict.name.lower())
     limit = limits.danger_change if finding.level is AlarmLevel.DANGER else limits.alert_change
     reason = "ok"
     if finding.level is not None:
         reason = ALARM_REASONS[finding.attribution.cause if finding.attribution else Cause.UNKNOWN]
-    return Judgement(finding.level, value=finding.change, limit=limit, reason=reason)
+    change = None if finding.change is None else percent_of(finding.change)
+    signed = math.copysign(round(100.0 * limit, 6), change or 0.0)
+    return Judgement(finding.level, value=change, limit=signed, reason=reason)
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,16 @@ detected within two weeks, with an uncertainty of 0.7 %. An alert is raised long
 danger."""
 
 
+def percent_of(ln: float) -> float:
+    """Return a change of ln(stiffness) in percent of the expected stiffness."""
+    return 100.0 * math.expm1(ln)
+
+
 @dataclass(frozen=True)
 class ChangeLimits:
-    """Limits of the change of ln k of a film (0.035 is 3.5 %), for increase and decrease.
+    """Limits of the change of a film's stiffness, for increase and decrease.
+
+    Changes and `deadband` are fractions of the expected stiffness: 0.035 is 3.5 %.
 
     Parameters
     ----------

@@ -48,21 +48,21 @@ def _coefficients(
 
 
 def _order_quantities(line: str, of: str) -> tuple[Quantity, ...]:
-    roundness = f"Roundness of the shaft's orbit, {of}, forward +"
+    roundness = f"Orbit shape, {of} (−1 backward to +1 forward circle)"
     return (
         Quantity(f"{line}_frequency_hz", "Hz", f"Frequency of {of}", *LIVE),
-        *_each(line + "_shaft_{}_um_pk", "µm 0-pk", f"Relative shaft vibration {{}}, {of}"),
-        *_each(line + "_bearing_{}_um_pk", "µm 0-pk", f"Absolute bearing vibration {{}}, {of}"),
+        *_each(line + "_shaft_{}_um_pk", "µm 0-pk", f"Shaft vibration {{}}, {of}"),
+        *_each(line + "_bearing_{}_um_pk", "µm 0-pk", f"Bearing vibration {{}}, {of}"),
         Quantity(f"{line}_roundness", "1", roundness, *LIVE),
         *_each(line + "_coherence_{0}{0}", "1", f"Coherence of shaft and bearing {{}}, {of}"),
-        *_coefficients(f"{line}_k_eff", "N/m", f"Effective stiffness, {of}, equation (5)"),
-        *_coefficients(f"{line}_transfer_k", "N/m", f"Stiffness, {of}, transfer"),
-        *_coefficients(f"{line}_transfer_c", "N·s/m", f"Damping, {of}, transfer"),
+        *_coefficients(f"{line}_k_eff", "N/m", f"Film stiffness, equation (5) at {of}"),
+        *_coefficients(f"{line}_transfer_k", "N/m", f"Film stiffness, transfer at {of}"),
+        *_coefficients(f"{line}_transfer_c", "N·s/m", f"Film damping, transfer at {of}"),
     )
 
 
 CATALOGUE: tuple[Quantity, ...] = (
-    *_coefficients("stiffness", "N/m", "Film stiffness by the preferred estimator"),
+    *_coefficients("stiffness", "N/m", "Film stiffness"),
     Quantity("speed_rpm", "r/min", "Running speed", *LIVE),
     Quantity("power_mw", "MW", "Active power", *LIVE),
     Quantity("oil_temperature_c", "°C", "Oil temperature", *LIVE),
@@ -73,20 +73,23 @@ CATALOGUE: tuple[Quantity, ...] = (
     Quantity("eccentricity_ratio", "1", "Eccentricity ratio", *STORED),
     Quantity("attitude_angle_deg", "deg", "Attitude angle", *STORED),
     *_order_quantities("order1", "1×"),
-    *_each("order1_shaft_{}_phase_deg", "deg", "Phase of relative shaft vibration {}, 1×"),
-    *_each("order1_bearing_{}_phase_deg", "deg", "Phase of absolute bearing vibration {}, 1×"),
-    *_each("overall_shaft_{}_um_pp", "µm pk-pk", "Relative shaft vibration {}, broad-band"),
-    Quantity(
-        "overall_shaft_um_pk", "µm 0-pk", "Farthest excursion of the shaft, broad-band", *LIVE
-    ),
+    *_each("order1_shaft_{}_phase_deg", "deg", "Phase of shaft vibration {}, 1×"),
+    *_each("order1_bearing_{}_phase_deg", "deg", "Phase of bearing vibration {}, 1×"),
+    *_each("overall_shaft_{}_um_pp", "µm pk-pk", "Shaft vibration {}, broad-band"),
+    Quantity("overall_shaft_um_pk", "µm 0-pk", "Maximum shaft displacement, broad-band", *LIVE),
     *_each("overall_bearing_{}_mm_s_rms", "mm/s rms", "Bearing velocity {}, broad-band"),
     *_order_quantities("vortex", "vortex"),
-    *_coefficients("dynamic_k", "N/m", "Film stiffness, dynamic", AXES),
-    *_coefficients("dynamic_c", "N·s/m", "Film damping, dynamic", AXES),
+    *_coefficients("dynamic_k", "N/m", "Film stiffness, broadband estimate", AXES),
+    *_coefficients("dynamic_c", "N·s/m", "Film damping, broadband estimate", AXES),
     *_each("dynamic_coherence_{}", "1", "Share of the bearing's motion {} that the film explains"),
     *_each("dynamic_lack_of_fit_{}", "1", "Lack of fit of the film {}, about 1 if it fits", ()),
-    Quantity("dynamic_n_lines", "1", "Spectral lines used by dynamic"),
-    Quantity("dynamic_delay_s", "s", "Delay of the bearing channels that dynamic finds", *LIVE),
+    Quantity("dynamic_n_lines", "1", "Spectral lines used by the broadband estimate"),
+    Quantity(
+        "dynamic_delay_s",
+        "s",
+        "Delay of the bearing channels found by the broadband estimate",
+        *LIVE,
+    ),
     Quantity("dynamic_bracket_mass_kg", "kg", "Bracket mass, fitted where none is given", *LIVE),
 )
 

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import math
 import socket
 from collections.abc import Iterator
 from datetime import datetime
@@ -12,6 +11,7 @@ from email.policy import SMTP as SMTP_POLICY
 import aiosmtplib
 
 from acquisition.delivery.network import NameLookUp
+from core.alarms.kinds import FILM_STIFFNESS
 from service.notifications.channel import (
     Delivered,
     Failed,
@@ -61,20 +61,12 @@ def value_words(message: Message) -> str | None:
     value, limit, std = message["value"], message["limit"], message["uncertainty"]
     if value is None:
         return None
-    if message["value_is"] == "ln_change":
-        return _change(value, limit, std)
     unit = message["value_unit"] or ""
     spread = "" if std is None else f" ± {2 * std:.2g} (95 %)"
     passed = "" if limit is None else f"; limit {limit:g} {unit}"
+    if message["kind"] == FILM_STIFFNESS:
+        return f"{value:+.1f} {unit} of the expected stiffness, on average{passed}"
     return f"{value:.4g}{spread} {unit}{passed}"
-
-
-def _change(value: float, limit: float | None, std: float | None) -> str:
-    percent = 100.0 * math.expm1(value)
-    spread = "" if std is None else f" ± {2 * 100.0 * std * math.exp(value):.1f} (95 %)"
-    edge = None if limit is None else 100.0 * math.expm1(math.copysign(limit, value))
-    passed = "" if edge is None else f"; limit {edge:+.1f} %"
-    return f"{percent:+.1f}{spread} % against the baseline at the same condition{passed}"
 
 
 def _alarm(message: Message) -> Iterator[str]:
@@ -84,7 +76,7 @@ def _alarm(message: Message) -> Iterator[str]:
         ("Where", f"{message['plant']}, {_place(message)}{_unit_name(message)}"),
         ("When", message["time"]),
         ("Since", message["raised"]),
-        ("Value", value_words(message)),
+        ("Confirmed" if message["kind"] == FILM_STIFFNESS else "Value", value_words(message)),
         ("Reason", "" if message["reason"] == "ok" else message["reason"].replace("_", " ")),
         ("By", message["actor"]),
         ("State", message["state"].replace("_", " ")),

@@ -10,8 +10,9 @@ from uuid import uuid4
 from core.alarms.alarm import Alarm, AlarmEvent, AlarmIdentity
 from core.alarms.kinds import ALARM_KINDS, FILM_STIFFNESS
 from core.change.film_judge import FilmNews
+from core.change.settings import percent_of
 from core.monitor.assessment import Assessment
-from core.monitor.catalogue import CATALOGUE
+from core.monitor.catalogue import BY_NAME
 from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import value_unit
 
@@ -23,10 +24,11 @@ FORMAT = 1
 
 ALARMS_PAGE = "#/alarms"
 
-CONDITION = ("speed_rpm", "power_mw", "eccentricity_ratio", "oil_temperature_c")
-"""Names of the quantities in the `condition` of a message."""
-
-QUANTITIES = {quantity.name: quantity for quantity in CATALOGUE}
+CONDITION = {
+    name: BY_NAME[name]
+    for name in ("speed_rpm", "power_mw", "eccentricity_ratio", "oil_temperature_c")
+}
+"""Quantities in the `condition` of a message, by name."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +38,12 @@ class AlarmContext:
     Parameters
     ----------
     uncertainty
-        Standard uncertainty of the alarm's value; None if unknown.
+        Standard uncertainty of the alarm's value; None if unknown, and for films.
     state
         Name of the operating state; None if unknown.
     condition
-        Label, value, unit and uncertainty of each quantity of `CONDITION` by name, as JSON object.
+        Label, value, unit and uncertainty of each quantity of `CONDITION` by name, as JSON object;
+        for films also the stiffness and its deviation from the baseline in the newest reading.
     """
 
     uncertainty: float | None = None
@@ -78,17 +81,31 @@ class LiveContext:
         return AlarmContext(
             uncertainty=self._uncertainty(identity, assessment),
             state=condition.state.name.lower() if condition else None,
-            condition={
-                name: _fact(name, reading.value, reading.u_random)
-                for name in CONDITION
+            condition=self._film(identity)
+            | {
+                name: _fact(quantity.label, reading.value, quantity.unit, reading.u_random)
+                for name, quantity in CONDITION.items()
                 if (reading := assessment.readings[name]).value is not None
             },
         )
 
+    def _film(self, identity: AlarmIdentity) -> dict[str, Message]:
+        """Return stiffness, expected stiffness and deviation in the newest reading of a film."""
+        is_film = identity.kind == FILM_STIFFNESS
+        news = self._newest_film(identity.unit, identity.subject) if is_film else None
+        if news is None:
+            return {}
+        ln_k, found = news.reading.values[news.worst].ln_k, news.findings[news.worst]
+        if found.deviation is None or found.deviation_std is None:
+            return {}
+        std = math.exp(found.deviation) * 100.0 * found.deviation_std
+        return {
+            "stiffness": _fact("Stiffness now", math.exp(ln_k) / 1e9, "GN/m"),
+            "expected": _fact("Expected", math.exp(ln_k - found.deviation) / 1e9, "GN/m"),
+            "deviation": _fact("Change now", percent_of(found.deviation), "%", std),
+        }
+
     def _uncertainty(self, identity: AlarmIdentity, assessment: Assessment) -> float | None:
-        if identity.kind == FILM_STIFFNESS:
-            news = self._newest_film(identity.unit, identity.subject)
-            return news.findings[news.worst].change_std if news else None
         kind = ALARM_KINDS.get(identity.kind)
         measured = assessment.readings.get(kind.reading or "") if kind else None
         return measured.u_random if measured else None
@@ -148,7 +165,6 @@ class Composer:
             "uncertainty": _finite(context.uncertainty),
             "limit": _finite(event.limit),
             "value_unit": value_unit(identity.kind),
-            "value_is": "ln_change" if identity.kind == FILM_STIFFNESS else "reading",
             "operating_state": context.state,
             "condition": dict(context.condition),
             "unit_name": self._unit_names.get(identity.unit),
@@ -180,12 +196,11 @@ def loads(body: str) -> Message:
     return message
 
 
-def _fact(name: str, value: float | None, uncertainty: float | None) -> Message:
-    quantity = QUANTITIES[name]
+def _fact(label: str, value: float, unit: str, uncertainty: float | None = None) -> Message:
     return {
-        "label": quantity.label,
+        "label": label,
         "value": _finite(value),
-        "unit": quantity.unit,
+        "unit": unit,
         "uncertainty": _finite(uncertainty),
     }
 

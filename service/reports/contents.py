@@ -12,7 +12,7 @@ from core.baseline.history import StiffnessHistory
 from core.change.cause import Attribution
 from core.change.decision import Decision
 from core.change.film_judge import FilmFinding, FilmNews
-from core.change.settings import FilmRules
+from core.change.settings import FilmRules, percent_of
 from core.condition.cells import BearingCondition, Cell, CellGrid, FilmConditions
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
@@ -150,11 +150,10 @@ def _finding(direction: Direction, found: FilmFinding) -> FindingPart:
         direction=direction,
         verdict=found.verdict.name.lower(),
         level=None if found.level is None else LEVEL_NAMES[found.level],
-        change=finite(found.change),
-        change_std=finite(found.change_std),
+        change_percent=None if found.change is None else percent_of(found.change),
         time_scale_h=found.time_scale_h,
-        deviation=finite(found.deviation),
-        deviation_std=finite(found.deviation_std),
+        deviation_percent=None if found.deviation is None else percent_of(found.deviation),
+        deviation_95_percent=_finite_pair(found.deviation_95_percent),
         baseline_version=found.baseline_version,
         attribution=None if found.attribution is None else _cause(found.attribution),
     )

@@ -70,7 +70,7 @@ class AlarmPart(EvidencePart):
     """Time of the event, in nanoseconds since 1970 UTC."""
 
     value: float | None
-    """Value compared with the limit, or null; for film alarms the change of ln(stiffness)."""
+    """Value compared with the limit, or null; for film alarms the mean change in percent."""
 
     limit: float | None
     """Limit of the alarm; null for an alarm without a limit."""

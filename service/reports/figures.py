@@ -257,11 +257,11 @@ class _Trend:
 
     @property
     def lows(self) -> list[float | None]:
-        return _times(self.expected, math.exp(-self.limit))
+        return _times(self.expected, 1.0 - self.limit)
 
     @property
     def highs(self) -> list[float | None]:
-        return _times(self.expected, math.exp(self.limit))
+        return _times(self.expected, 1.0 + self.limit)
 
     @property
     def first_s(self) -> float:

@@ -1,6 +1,5 @@
 """Report of an alarm as self-contained HTML without scripts, for one page of A4."""
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 
@@ -71,8 +70,6 @@ footer { border-top: .6pt solid #888; margin-top: 1.4mm; padding-top: .8mm; font
 """
 
 
-SURE_95 = 1.96
-
 CAUSES = {
     "film": "the oil film itself",
     "oil": "the oil or its cooling, in all films",
@@ -129,15 +126,11 @@ def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
 
 
 def value_words(case: Case) -> str:
-    """Return value and limit of the alarm; for film alarms in percent with 95 % interval."""
+    """Return value and limit of the alarm; for film alarms also the newest deviation."""
     alarm, found = case.evidence.alarm, finding(case)
-    if alarm.kind == FILM_STIFFNESS and found is not None and found.change is not None:
-        limit = (
-            ""
-            if alarm.limit is None
-            else f"; limit {percent(-alarm.limit)} or {percent(alarm.limit)}"
-        )
-        return f"{change_words(found)} of the expected stiffness{limit}"
+    if alarm.kind == FILM_STIFFNESS and found is not None and found.change_percent is not None:
+        limit = "" if alarm.limit is None else f"; limit {percent(alarm.limit)}"
+        return f"Stiffness {change_words(found)}{limit}"
     if alarm.value is None:
         return "no number"
     unit = "" if alarm.value_unit in (None, "1") else f" {alarm.value_unit}"
@@ -146,19 +139,20 @@ def value_words(case: Case) -> str:
 
 
 def change_words(found: FindingPart) -> str:
-    """Return the change of a film in percent with its 95 % interval; a dash if unknown."""
-    if found.change is None:
-        return "–"
-    if found.change_std is None:
-        return percent(found.change)
-    half = SURE_95 * found.change_std
-    low, high = percent(found.change - half), percent(found.change + half)
-    return f"{percent(found.change)} (95 %: {low} to {high})"
+    """Return the newest deviation and the confirmed mean change of a film, in percent."""
+    words = []
+    if found.deviation_percent is not None:
+        interval = found.deviation_95_percent
+        known = f" (95 %: {percent(interval[0])} to {percent(interval[1])})" if interval else ""
+        words.append(f"now {percent(found.deviation_percent)}{known}")
+    if found.change_percent is not None:
+        words.append(f"confirmed {percent(found.change_percent)}")
+    return ", ".join(words) or "–"
 
 
-def percent(change: float) -> str:
-    """Return a change of ln(stiffness) as text in percent, with its sign."""
-    return f"{100.0 * math.expm1(change):+.1f} %".replace("-", "−")
+def percent(number: float) -> str:
+    """Return a number of percent as text, with its sign."""
+    return f"{number:+.1f} %".replace("-", "−")
 
 
 def condition_words(bearing: BearingPart) -> str:
@@ -210,7 +204,7 @@ def story(case: Case) -> str:
     film = None if case.bearing is None else case.bearing.film
     if case.evidence.alarm.kind != FILM_STIFFNESS or film is None or found is None:
         return ""
-    moved = [each for each in film.findings if each.level and each.change is not None]
+    moved = [each for each in film.findings if each.level and each.change_percent is not None]
     if not moved:
         return ""
     hours = (
@@ -218,10 +212,9 @@ def story(case: Case) -> str:
         if found.time_scale_h is None
         else f", averaged over {found.time_scale_h:g} running hours"
     )
-    changes = " and ".join(f"in {each.direction} by {change_words(each)}" for each in moved)
+    changes = "; ".join(f"in {each.direction} {change_words(each)}" for each in moved)
     sentence = (
-        f"The stiffness of the film has changed {changes} against the baseline under this"
-        f" condition{hours}."
+        f"Stiffness of the film against the baseline under this condition: {changes}{hours}."
     )
     cause = found.attribution
     if cause is None:
@@ -315,7 +308,7 @@ def _films(bearing: BearingPart) -> list[str]:
 
 def _said(found: FindingPart) -> str:
     verdict = plain(found.verdict)
-    return verdict if found.change is None else f"{verdict}, {change_words(found)}"
+    return verdict if found.change_percent is None else f"{verdict}, {change_words(found)}"
 
 
 def _estimate(found: EstimatorPart) -> tuple[str, str]:

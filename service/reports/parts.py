@@ -187,20 +187,17 @@ class FindingPart(EvidencePart):
     level: LevelWord | None
     """Alarm level of the film; null without an alarm."""
 
-    change: float | None
-    """Most significant mean deviation from the baseline, in ln; null if there is none yet."""
-
-    change_std: float | None
-    """Standard uncertainty of `change`; null if that is null."""
+    change_percent: float | None
+    """Most significant mean deviation, % of the expected stiffness; null if there is none yet."""
 
     time_scale_h: float | None
-    """Time scale over which `change` was averaged, in running hours; null if `change` is null."""
+    """Running hours over which `change_percent` was averaged; null if that is null."""
 
-    deviation: float | None
-    """Deviation of the newest reading from the baseline, in ln; null unless it was compared."""
+    deviation_percent: float | None
+    """Deviation of the newest reading, % of the expected stiffness; null unless it was compared."""
 
-    deviation_std: float | None
-    """Standard uncertainty of `deviation`; null if that is null."""
+    deviation_95_percent: tuple[float, float] | None
+    """95 % interval of `deviation_percent`; null if that is null."""
 
     baseline_version: int | None
     """Version of the baseline; null without a baseline."""

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, StringConstraints, model_validator
 
 from core.machine.unit import PREFERENCE, Estimator
 from service.settings.alarms import BearingAlarmSettings
@@ -28,6 +28,9 @@ class BearingSettings(Settings):
     id: Identifier
     """Id of the bearing, unique within the unit; example: "UJB", "LJB", "TJB" for upper, lower and
     turbine journal bearing."""
+
+    name: Annotated[str, StringConstraints(min_length=1, max_length=80)] | None = None
+    """Display name of the bearing beside its id; none by default; example: "upper guide"."""
 
     bracket_stiffness_n_per_m: Annotated[float, Field(ge=1e7, le=1e12)]
     """Radial stiffness of the bracket in N/m, between 1e7 and 1e12; example: 1.18e9. Every result

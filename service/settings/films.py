@@ -18,16 +18,15 @@ class ChangeLimitSettings(Settings):
     """Magnitude, significance and duration of a stiffness change that raises an alarm."""
 
     alert_change: Share = ChangeLimits.alert_change
-    """Limit of a stiffness increase or decrease, as the natural logarithm of the ratio to the
-    baseline (0.035 is 3.5 %). A change that exceeds the limit by one standard uncertainty is an
-    alert."""
+    """Limit of a stiffness increase or decrease, as a fraction of the expected stiffness (0.035 is
+    3.5 %). A change that exceeds the limit by one standard uncertainty is an alert."""
 
     danger_change: Share = ChangeLimits.danger_change
     """Limit of a stiffness change, as alert_change; a change that exceeds the limit by three
     standard uncertainties is a danger. Must be above alert_change; example: 0.15."""
 
     deadband: Share = ChangeLimits.deadband
-    """Amount, as a natural logarithm, by which a change must fall below its limit for the alarm
+    """Fraction of the expected stiffness by which a change must fall below its limit for the alarm
     level to end; example: 0.01."""
 
     significance: Annotated[float, Field(gt=0.0, le=100.0)] = ChangeLimits.significance

@@ -24,8 +24,7 @@ HAS_ORBIT = """() => {
 }"""
 
 NO_NUMBER = """() => [...document.querySelectorAll('.number')].every(n => n.textContent === '—')
-    && [...document.querySelectorAll('.spread')].every(n => n.hidden)
-    && [...document.querySelectorAll('.interval')].every(n => n.textContent === '')"""
+    && [...document.querySelectorAll('.spread')].every(n => n.hidden)"""
 
 AGE = """() => {
     const words = document.querySelector('.source .data-age').textContent;

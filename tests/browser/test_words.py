@@ -67,6 +67,6 @@ def test_every_other_code_has_words_and_no_word_is_left_over(source, table, code
 
 
 def test_only_a_film_that_is_normal_looks_and_is_called_so() -> None:
-    good = {name for name, look in entries("VERDICTS", FILM_WORDS).items() if "good" in look}
+    good = {name for name, look in entries("VERDICTS", FILM_WORDS).items() if '"normal"' in look}
     normal = {name for name, look in entries("VERDICTS", FILM_WORDS).items() if "Normal" in look}
     assert good == normal == {"normal"}

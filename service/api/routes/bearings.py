@@ -69,6 +69,9 @@ class BearingModel(ApiModel):
     id: str
     """Identifier of the bearing."""
 
+    name: str | None
+    """Display name of the bearing; null without a name."""
+
     bracket_stiffness_n_per_m: float
     """Radial stiffness of the bearing bracket, N/m."""
 
@@ -165,7 +168,7 @@ class BudgetModel(ApiModel):
     quantity: Annotated[str, Field(examples=["dynamic_k_xx_n_per_m"])]
     """Name of the quantity in the catalogue."""
 
-    label: Annotated[str, Field(examples=["Stiffness xx, dynamic"])]
+    label: Annotated[str, Field(examples=["Film stiffness, broadband estimate, xx"])]
     """Description of the quantity in words."""
 
     unit: Annotated[str, Field(examples=["N/m"])]

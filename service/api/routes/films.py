@@ -13,7 +13,7 @@ from core.baseline.history import DIRECTIONS
 from core.change.decision import Decision, Verdict
 from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading
-from core.change.settings import FilmRules
+from core.change.settings import ChangeLimits, FilmRules, percent_of
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import ProblemError, problem_responses
@@ -51,25 +51,14 @@ class FilmChangeModel(ApiModel):
     """Mean deviation of stiffness from the baseline, at its most significant averaging time."""
 
     percent: Annotated[float, Field(examples=[-19.2])]
-    """Change of stiffness, %; negative if the film is softer than the baseline."""
-
-    low_95: Annotated[float, Field(examples=[-21.9])]
-    """Lower end of the 95 % interval of the change, %."""
-
-    high_95: Annotated[float, Field(examples=[-16.4])]
-    """Upper end of the 95 % interval of the change, %."""
-
-    ln: Annotated[float, Field(examples=[-0.213])]
-    """Change as ln(stiffness / baseline stiffness); the alarm limits apply to this value."""
-
-    ln_std: float
-    """Standard uncertainty of `ln`."""
+    """Mean change, % of the expected stiffness; negative if softer. The alarm limits apply to it.
+    After a sudden change, it follows the deviation of the newest reading with delay."""
 
     time_scale_h: Annotated[float, Field(examples=[4.0])]
     """Averaging time of this change, running hours."""
 
     significance: Annotated[float, Field(examples=[12.4])]
-    """Absolute value of `ln`, divided by `ln_std`."""
+    """Absolute value of the change, divided by its standard uncertainty."""
 
     significance_wanted: Annotated[float, Field(examples=[6.5])]
     """Smallest significance at which a change with this averaging time can raise an alarm."""
@@ -83,7 +72,7 @@ class FilmDeviationModel(ApiModel):
     """Deviation of the stiffness of one reading from the baseline."""
 
     percent: float
-    """Deviation of stiffness, %."""
+    """Deviation, % of the expected stiffness."""
 
     low_95: float
     """Lower end of the 95 % interval of the deviation, %."""
@@ -135,18 +124,22 @@ class FilmDirectionModel(ApiModel):
     stiffness_n_per_m: float | None
     """Stiffness of the newest reading, N/m; null if it could not be determined."""
 
+    expected_n_per_m: float | None
+    """Stiffness that the baseline expects under the condition of the newest reading, N/m; null if
+    this reading was not compared."""
+
     cause: FilmCauseModel | None
     """Cause of the change while a level is in force; otherwise null."""
 
 
 class FilmLimitsModel(ApiModel):
-    """Alarm limits for the absolute change of ln(stiffness)."""
+    """Alarm limits for the mean change of stiffness, as increase and as decrease."""
 
-    alert: Annotated[float, Field(examples=[0.035])]
-    """Limit for an alert; 0.04 is a change of 4 %."""
+    alert_percent: Annotated[float, Field(examples=[3.5])]
+    """Limit for an alert, % of the expected stiffness."""
 
-    danger: Annotated[float, Field(examples=[0.15])]
-    """Limit for danger."""
+    danger_percent: Annotated[float, Field(examples=[15.0])]
+    """Limit for danger, % of the expected stiffness."""
 
 
 class FilmModel(BearingAnswer):
@@ -187,7 +180,7 @@ class FilmModel(BearingAnswer):
 
 
 class FilmWordModel(ApiModel):
-    """Verdict, alarm level and change of stiffness of a film in one direction."""
+    """Verdict, alarm level, stiffness and change of a film in one direction."""
 
     verdict: VerdictName
     """Verdict on the newest reading; "no_reading" if this reading is not current."""
@@ -196,7 +189,18 @@ class FilmWordModel(ApiModel):
     """Alarm level in force; null without a level."""
 
     change_percent: float | None
-    """Most significant mean change of stiffness, %; null if `change` of the film is null."""
+    """Most significant mean change of stiffness, % of the expected stiffness; null if `change` of
+    the film is null."""
+
+    deviation_percent: float | None
+    """Deviation of the newest reading alone, % of the expected stiffness; null if this reading was
+    not compared."""
+
+    stiffness_n_per_m: float | None
+    """Stiffness of the newest reading, N/m; null if it could not be determined."""
+
+    expected_n_per_m: float | None
+    """Stiffness that the baseline expects, N/m; null if this reading was not compared."""
 
 
 class FilmBriefModel(ApiModel):
@@ -204,6 +208,9 @@ class FilmBriefModel(ApiModel):
 
     why_not: str | None
     """Reason why the film is not watched; null if it is watched."""
+
+    limits: FilmLimitsModel | None
+    """Alarm limits; null if the film is not watched."""
 
     x: FilmWordModel | None
     """State in x; null if the film is not watched."""
@@ -214,9 +221,6 @@ class FilmBriefModel(ApiModel):
 
 CURRENT_PERIODS = 2.5
 """Maximum time from a current reading to the newest result, in reading periods."""
-
-NORMAL_95 = 1.96
-"""Half-width of the 95 % interval of a normal distribution, in standard deviations."""
 
 NOT_LEARNED, ATTITUDE_NOT_LEARNED = "condition_not_learned", "attitude_not_learned"
 
@@ -258,7 +262,6 @@ def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
     """Return the API model of the current state of the film of a bearing."""
     seen, place = _seen(context, unit, bearing), context.films.place(unit, bearing)
     x, y = _directions(seen) if seen else (None, None)
-    limits = seen.rules.change if seen else None
     return FilmModel.of(
         unit=unit,
         bearing=bearing,
@@ -270,7 +273,7 @@ def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
         next_reading=seen and _next_reading_ns(seen),
         condition=seen and _condition(seen),
         baseline_version=seen and _version(seen.baseline),
-        limits=limits and FilmLimitsModel(alert=limits.alert_change, danger=limits.danger_change),
+        limits=seen and _limits(seen.rules.change),
         x=x,
         y=y,
     )
@@ -280,12 +283,22 @@ def film_brief(context: Context, unit: str, bearing: str) -> FilmBriefModel:
     """Return the API model of the film summary of a bearing."""
     seen = _seen(context, unit, bearing)
     x, y = (_word(found) for found in _directions(seen)) if seen else (None, None)
-    return FilmBriefModel(why_not=why_unwatched(context, unit, bearing), x=x, y=y)
+    limits = _limits(seen.rules.change) if seen else None
+    why_not = why_unwatched(context, unit, bearing)
+    return FilmBriefModel(why_not=why_not, limits=limits, x=x, y=y)
+
+
+def _limits(limits: ChangeLimits) -> FilmLimitsModel:
+    percent = [round(100.0 * each, 6) for each in (limits.alert_change, limits.danger_change)]
+    return FilmLimitsModel(alert_percent=percent[0], danger_percent=percent[1])
 
 
 def _word(found: FilmDirectionModel) -> FilmWordModel:
-    percent = found.change.percent if found.change else None
-    return FilmWordModel(verdict=found.verdict, level=found.level, change_percent=percent)
+    return FilmWordModel.of(
+        found,
+        change_percent=found.change and found.change.percent,
+        deviation_percent=found.deviation and found.deviation.percent,
+    )
 
 
 def _seen(context: Context, unit: str, bearing: str) -> WatchedFilm | None:
@@ -340,21 +353,29 @@ def _directions(seen: WatchedFilm) -> tuple[FilmDirectionModel, FilmDirectionMod
 
 def _unread(reason: str, level: LevelHeldName | None) -> FilmDirectionModel:
     """Return the state in a direction without a current reading: a reason and the alarm level."""
-    unknown = dict.fromkeys(("change", "deviation", "stiffness_n_per_m", "cause"))
+    unknown = dict.fromkeys(
+        ("change", "deviation", "stiffness_n_per_m", "expected_n_per_m", "cause")
+    )
     return FilmDirectionModel.of(verdict="no_reading", reason=reason, level=level, **unknown)
 
 
 def _direction(seen: WatchedFilm, news: FilmNews, row: int) -> FilmDirectionModel:
     finding, ln_k = news.findings[row], news.reading.values[row].ln_k
+    ln_expected = math.nan if finding.deviation is None else ln_k - finding.deviation
     return FilmDirectionModel.of(
         verdict=finding.verdict,
         reason=_reason(seen, news.reading, finding, row),
         level=level_name(finding.level),
         change=_change(finding, news.decisions[row], seen.rules),
         deviation=_deviation(finding),
-        stiffness_n_per_m=None if math.isnan(ln_k) else math.exp(ln_k),
+        stiffness_n_per_m=_stiffness(ln_k),
+        expected_n_per_m=_stiffness(ln_expected),
         cause=finding.attribution,
     )
+
+
+def _stiffness(ln_k: float) -> float | None:
+    return None if math.isnan(ln_k) else math.exp(ln_k)
 
 
 def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding, row: int) -> str:
@@ -378,15 +399,10 @@ def _change(finding: FilmFinding, decision: Decision, rules: FilmRules) -> FilmC
     change, std, time_scale_h = finding.change, finding.change_std, finding.time_scale_h
     if change is None or std is None or time_scale_h is None:
         return None
-    low, high = interval_percent(change, std)
     counted_ns = decision.last_counted_ns
     return FilmChangeModel.of(
         finding,
         percent=percent_of(change),
-        low_95=low,
-        high_95=high,
-        ln=change,
-        ln_std=std,
         significance=abs(change) / std,
         significance_wanted=rules.change.significance_threshold(time_scale_h),
         as_of=None if counted_ns is None else round(counted_ns / rules.time_lapse),
@@ -394,23 +410,11 @@ def _change(finding: FilmFinding, decision: Decision, rules: FilmRules) -> FilmC
 
 
 def _deviation(finding: FilmFinding) -> FilmDeviationModel | None:
-    if finding.deviation is None or finding.deviation_std is None:
+    interval = finding.deviation_95_percent
+    if finding.deviation is None or interval is None:
         return None
-    low, high = interval_percent(finding.deviation, finding.deviation_std)
+    low, high = interval
     return FilmDeviationModel(percent=percent_of(finding.deviation), low_95=low, high_95=high)
-
-
-def percent_of(ln: float) -> float:
-    """Return the relative change of a quantity, %, for a change `ln` of its natural logarithm."""
-    return 100.0 * math.expm1(ln)
-
-
-def interval_percent(ln: float, std: float) -> tuple[float, float]:
-    """Return the lower and upper end of the 95 % interval of a relative change, %.
-
-    `std` is the standard uncertainty of the change `ln` of the natural logarithm.
-    """
-    return percent_of(ln - NORMAL_95 * std), percent_of(ln + NORMAL_95 * std)
 
 
 def verdict_name(verdict: Verdict) -> VerdictName:

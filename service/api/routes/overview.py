@@ -13,7 +13,14 @@ from service.api.routes.alarm_models import AlarmCountModel
 from service.api.routes.bearings import ResultModel, result_model
 from service.api.routes.films import FilmBriefModel, film_brief
 from service.api.routes.plant import BasicUnitModel, LinkModel
-from service.api.values import ApiModel, ReadingModel, reading_model
+from service.api.values import (
+    STATE_NAMES,
+    ApiModel,
+    OperatingStateName,
+    ReadingModel,
+    reading_model,
+)
+from service.settings.bearings import BearingSettings
 
 SHOWN = (
     "speed_rpm",
@@ -22,12 +29,6 @@ SHOWN = (
     "stiffness_yy_n_per_m",
     "order1_shaft_x_um_pk",
     "order1_shaft_y_um_pk",
-    "order1_bearing_x_um_pk",
-    "order1_bearing_y_um_pk",
-    "order1_k_eff_xx_n_per_m",
-    "order1_k_eff_yy_n_per_m",
-    "vortex_k_eff_xx_n_per_m",
-    "vortex_k_eff_yy_n_per_m",
     "eccentricity_ratio",
     "oil_temperature_c",
 )
@@ -92,6 +93,9 @@ class TileModel(ResultModel):
     Only the readings of the preferred stiffness have an uncertainty.
     """
 
+    name: Annotated[str | None, Field(examples=["upper guide"])]
+    """Display name of the bearing; null without a name."""
+
     bad_reasons: Annotated[list[str], Field(examples=[["no_vortex"]])]
     """Distinct reasons of all readings of the bearing whose level is bad."""
 
@@ -104,6 +108,12 @@ class UnitTileModel(BasicUnitModel):
 
     source: LinkModel
     """State of the link to the data source of the unit."""
+
+    operating_state: OperatingStateName | None
+    """Operating state of the unit; null without current data."""
+
+    is_settled: bool | None
+    """Whether the operating state has lasted long enough to judge films; null without a state."""
 
     bearings: list[TileModel]
     """Newest results of the guide bearings."""
@@ -194,20 +204,27 @@ class Overview:
         if kept is not None and kept[0] == at:
             return kept[1]
         settings = self._context.units[unit]
+        live = (self._context.live.current(unit, bearing.id) for bearing in settings.bearing)
+        newest = (c.assessment for c in live if c.assessment and c.is_current)
+        condition = next((found.condition for found in newest if found.condition), None)
         tile = UnitTileModel.of(
             settings,
             source=self._context.live.status(unit),
-            bearings=[self._bearing(unit, bearing.id) for bearing in settings.bearing],
+            operating_state=condition and STATE_NAMES[condition.state],
+            is_settled=condition and condition.is_settled,
+            bearings=[self._bearing(unit, bearing) for bearing in settings.bearing],
         )
         self._tiles[unit] = at, tile
         return tile
 
-    def _bearing(self, unit: str, bearing: str) -> TileModel:
+    def _bearing(self, unit: str, settings: BearingSettings) -> TileModel:
+        bearing = settings.id
         current = self._context.live.current(unit, bearing)
         readings = {name: _brief(name, current.readings[name]) for name in SHOWN}
         bad = (r.quality for r in current.readings.values() if r.quality.level is Level.BAD)
         return TileModel.of(
             result_model(current, bearing, readings),
+            name=settings.name,
             bad_reasons=list(dict.fromkeys(quality.reason.value for quality in bad)),
             film=film_brief(self._context, unit, bearing),
         )

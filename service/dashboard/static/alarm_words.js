@@ -2,7 +2,7 @@
 
 import { ALARM_KINDS } from "./alarm_kinds.js";
 import { amplitudeUnit, shownAmplitude } from "./amplitudes.js";
-import { stateWords as operationWords } from "./film_words.js";
+import { signedPercent, stateWords as operationWords } from "./film_words.js";
 import { formatFixed, formatTime } from "./format.js";
 import { reasonWords } from "./words.js";
 
@@ -96,28 +96,22 @@ export function placeWords({ unit, subject }) {
 
 /** Look and word of a priority; what has returned is quiet. */
 export function levelMark({ level, is_active: active }) {
-  if (!active) return ["absent", "Returned"];
-  return level === "danger" ? ["bad", "Danger"] : ["uncertain", "Alert"];
+  if (!active) return ["quiet", "Returned"];
+  return level === "danger" ? ["danger", "Danger"] : ["alert", "Alert"];
 }
 
 /** Rules whose alarms have the amplitude of a line as value; those of broad-band vibration have not. */
 const LINE_AMPLITUDES = ["shaft_order1", "shaft_change", "bearing_change"];
 
-/** `163.2 µm pk, limit 150.0`; nothing where there are no numbers. */
+/** `163.2 µm pk, limit 150.0`, `−11.4 %, limit −3.5 %`; nothing where there are no numbers. */
 export function valueWords({ kind, value, limit, value_unit: unit }) {
   if (value === null) return "";
   const rule = ALARM_KINDS[kind]?.rule;
-  if (rule === "films") return filmWords(value, limit);
+  if (rule === "films") return signedPercent(value) + (limit === null ? "" : `, limit ${signedPercent(limit)}`);
   const isLine = LINE_AMPLITUDES.includes(rule);
   const digits = (number) => formatFixed(isLine ? shownAmplitude(number) : number, DECIMALS[unit] ?? 2);
   const shownUnit = isLine ? amplitudeUnit() : (unit ?? "");
   return `${digits(value)} ${shownUnit}${limit === null ? "" : `, limit ${digits(limit)}`}`;
-}
-
-/** A change of stiffness, which the API gives in ln: `−11.4 %, limit −3.9 %`. */
-function filmWords(value, limit) {
-  const percent = (ln) => `${formatFixed(100 * Math.expm1(ln), 1)} %`;
-  return percent(value) + (limit === null ? "" : `, limit ${percent(Math.sign(value) * Math.abs(limit))}`);
 }
 
 /** `full load, eccentricity 0.37, attitude 47°, oil 46.2 °C`: what is known of where it was raised. */
@@ -165,6 +159,6 @@ export function countWords(count) {
   if (unseen) parts.push(`${unseen} not acknowledged`);
   if (!active && !unseen) parts.push("No alarms");
   if (unjudged) parts.push(`${unjudged} not judged`);
-  const look = danger ? "bad" : active ? "uncertain" : "absent";
-  return [active || unseen || unjudged ? look : "good", parts.join(", ")];
+  const look = danger ? "danger" : active ? "alert" : "quiet";
+  return [active || unseen || unjudged ? look : "normal", parts.join(", ")];
 }

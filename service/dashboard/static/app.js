@@ -8,7 +8,6 @@ import { loadCatalogue } from "./catalogue.js";
 import { SILENCE, failedNow, heardNow, merged, moment, viewAt } from "./live.js";
 import { PAGES } from "./pages.js";
 import { bar } from "./parts/bar.js";
-import { N_CARDS } from "./pages/overview.js";
 import { poll } from "./poll.js";
 import { ALARMS_ADDRESS } from "./route.js";
 import { serviceTimeMs } from "./server_time.js";
@@ -45,14 +44,11 @@ async function heard(signal) {
 /**
  * What the open page shows beyond tiles: `sources` by unit, and `latest` results by `unit/bearing`.
  *
- * Cards of few units show their sources; a page about a unit or bearing shows all readings.
+ * Only a page about a unit or bearing does.
  */
 async function detailsOf(overview, signal) {
   const { page: wanted, segments } = pageOf(location.hash);
   const details = { sources: new Map(), latest: new Map() };
-  if (wanted.pattern === "#/" && overview.units.length <= N_CARDS) {
-    for (const { id, source } of await ask(["units"], [], signal)) details.sources.set(id, source);
-  }
   const [unitId, bearingId] = wanted.pattern?.startsWith("#/units/") ? segments : [];
   const unit = overview.units.find(({ id }) => id === unitId);
   if (!unit) return details;

@@ -1,23 +1,21 @@
 /** Films compared with their baselines, in words for people, and how each verdict looks. */
 
-import { formatFixed } from "./format.js";
+import { formatFixed, formatQuantity } from "./format.js";
 import { reasonSentence } from "./words.js";
 
 const VERDICTS = {
-  normal: ["good", "Normal"],
-  alert: ["uncertain", "Alert"],
-  danger: ["bad", "Danger"],
-  gathering_evidence: ["absent", "Gathering evidence"],
-  no_baseline: ["absent", "No baseline"],
-  insufficient_excitation: ["absent", "Not enough excitation"],
-  bad_quality: ["absent", "Reading doubted"],
-  transient: ["absent", "Not settled"],
-  no_reading: ["absent", "No current reading"],
+  normal: ["normal", "Normal"],
+  alert: ["alert", "Alert"],
+  danger: ["danger", "Danger"],
+  gathering_evidence: ["quiet", "Gathering evidence"],
+  no_baseline: ["quiet", "No baseline"],
+  insufficient_excitation: ["quiet", "Weak signal"],
+  bad_quality: ["quiet", "Reading doubted"],
+  transient: ["quiet", "Not settled"],
+  no_reading: ["quiet", "No current reading"],
 };
 
 const JUDGED = ["normal", "alert", "danger"];
-
-const LEVELS = { alert: ["uncertain", "alert"], danger: ["bad", "danger"] };
 
 const WHY = {
   gathering_evidence: () => "Too few readings have been compared with the baseline yet.",
@@ -39,7 +37,7 @@ const CAUSES = {
   film: "film",
   oil: "oil or cooling of all films",
   bracket_or_transducer: "bracket or transducer",
-  unknown: "not known",
+  unknown: "unclear",
 };
 
 const STATES = {
@@ -56,10 +54,8 @@ export const stateWords = (state) => STATES[state] ?? state.replaceAll("_", " ")
 
 /** Look and word of a verdict; a level that is held shows, whether or not it can be judged now. */
 export function verdictMark({ verdict, level }) {
-  const [look, word] = VERDICTS[verdict] ?? ["absent", verdict.replaceAll("_", " ")];
-  if (level === null || verdict === "alert" || verdict === "danger") return [look, word];
-  const [held, name] = LEVELS[level];
-  return [held, `${word}, ${name} held`];
+  const [look, word] = VERDICTS[verdict] ?? ["quiet", verdict.replaceAll("_", " ")];
+  return level === null || verdict === level ? [look, word] : [level, `${word}, ${level} held`];
 }
 
 /** Why a film is not judged, as a sentence; nothing if it is. */
@@ -74,40 +70,30 @@ export function signedPercent(percent, decimals = 1) {
   return `${/^[−]/.test(digits) || Number(digits) === 0 ? "" : "+"}${digits} %`;
 }
 
-/** `−19.2 % ± 2.8 % over 4 running hours; limit 4 %`. */
-export function changeSentence({ change, verdict }, limits) {
-  return change === null || !JUDGED.includes(verdict) ? "" : changeWords(change, limits);
+/** `Now 0.231, expected 0.330 GN/m (−30.0 %).`; nothing without a reading. */
+export function nowSentence({ stiffness_n_per_m: stiffness, expected_n_per_m: expected, deviation_percent: deviation }) {
+  if (stiffness === null) return "";
+  const gn = (value) => formatQuantity("stiffness_xx_n_per_m", value);
+  return deviation === null ? `Now ${gn(stiffness)} GN/m.` : `Now ${gn(stiffness)}, expected ${gn(expected)} GN/m (${signedPercent(deviation)}).`;
 }
 
-/** What was found when a film that cannot be judged now was judged last. */
-export function lastSentence({ change, verdict }, limits) {
-  return change === null || JUDGED.includes(verdict) ? "" : `When it was judged last: ${changeWords(change, limits)}.`;
+/** `Confirmed −12.4 %, mean over 4 running hours.`; of the past while it cannot be judged. */
+export function changeSentence({ change, verdict, level }) {
+  if (change === null) return "";
+  const mean = `${signedPercent(change.percent)}, mean over ${formatFixed(change.time_scale_h, 0)} running hours`;
+  if (!JUDGED.includes(verdict)) return `When it was judged last: ${mean}.`;
+  return level === null ? `${mean.replace(", mean", " as a mean")}.` : `Confirmed ${mean}.`;
 }
 
 /** A change that is large but no alarm yet: it must be sure, and last. */
-export function pendingSentence({ change, verdict }, { alert }) {
-  const isPending = verdict === "normal" && change !== null && Math.abs(change.ln) >= alert;
+export function pendingSentence({ change, verdict }, { alert_percent: limit }) {
+  const isPending = verdict === "normal" && change !== null && Math.abs(change.percent) >= limit;
   return isPending ? "Beyond its limit; an alarm once it is sure and has lasted." : "";
 }
 
-function changeWords(change, limits) {
-  const hours = `${formatFixed(change.time_scale_h, 0)} running hours`;
-  return `${percentWords(change)} over ${hours}; limit ${limitWords(limits)}`;
-}
-
-function percentWords(change) {
-  const spread = Math.max(change.high_95 - change.percent, change.percent - change.low_95);
-  return `${signedPercent(change.percent)} ± ${formatFixed(spread, 1)} %`;
-}
-
-/** `−19.2 % ± 2.8 %`; nothing while it is not judged. */
-export function changeBrief({ change, verdict }) {
-  return change === null || !JUDGED.includes(verdict) ? "" : percentWords(change);
-}
-
-/** `4 %, danger 15 %` */
-export const limitWords = ({ alert, danger }) => `${trimmed(100 * alert)} %, danger ${trimmed(100 * danger)} %`;
-const trimmed = (number) => String(Number(number.toFixed(2)));
+/** `Limits: alert ±3.5 %, danger ±15 %` */
+export const limitWords = ({ alert_percent: alert, danger_percent: danger }) => `Limits: alert ±${trimmed(alert)} %, danger ±${trimmed(danger)} %`;
+const trimmed = (number) => String(Number(number.toFixed(1)));
 
 /** `Cause: film, since the shaft moves as …`. */
 export function causeSentence(cause) {

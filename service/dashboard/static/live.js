@@ -77,6 +77,7 @@ function agedUnit(unit, details, timeMs, current) {
   const source = { ...told, data_age_s: ageAt(told.received, timeMs) };
   return {
     ...unit,
+    operating_state: current ? unit.operating_state : null,
     source: current ? source : { ...source, state: "unknown", reason: null, since: null },
     bearings: unit.bearings.map((tile) => agedLatest(tile, details?.latest.get(`${unit.id}/${tile.bearing}`), timeMs, current)),
     films: unit.bearings.map(({ film }) => (current ? film : withheldFilm(film))),
@@ -84,12 +85,12 @@ function agedUnit(unit, details, timeMs, current) {
 }
 
 function agedLatest(tile, latest, timeMs, current) {
-  const told = { ...(latest ?? tile), isWhole: latest !== undefined };
+  const told = { ...tile, ...latest, isWhole: latest !== undefined };
   const shown = { ...told, age_s: ageAt(told.received, timeMs) };
   return current ? shown : { ...shown, ...NOTHING_KNOWN, bad_reasons: [], readings: withheld(told.readings) };
 }
 
-const UNREAD = { verdict: "no_reading", change_percent: null };
+const UNREAD = { verdict: "no_reading", change_percent: null, deviation_percent: null, stiffness_n_per_m: null, expected_n_per_m: null };
 
 function withheldFilm(film) {
   return film.why_not === null ? { ...film, x: { ...film.x, ...UNREAD }, y: { ...film.y, ...UNREAD } } : film;

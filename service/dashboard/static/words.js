@@ -16,7 +16,7 @@ const REASONS = {
   no_vortex: ["no vortex", "No line stands out where a part-load vortex would be."],
   outside_band: ["line outside band", "A line below 1× stands out beside the band in which the vortex is looked for; see vortex_band in the plant file."],
   low_coverage: ["gaps in the record", "Samples are missing in the averaged window."],
-  insufficient_excitation: ["not enough excitation", "The motion is too small to tell stiffness from noise."],
+  insufficient_excitation: ["weak signal", "The motion is too small to tell stiffness from noise."],
   poor_fit: ["poor fit", "One constant film does not explain the motion at all frequencies; see the lack of fit."],
   channel_delay: ["channels out of step?", "The bearing channels seem to be late or early against the shaft channels; or the bracket’s mass or a transducer’s response is wrong."],
   estimators_disagree: ["estimators disagree", "Two ways to measure this film differ by more than chance and the stated limits explain: a transducer’s response, runout or bracket may be other than stated."],
@@ -74,7 +74,6 @@ const BRIEF = {
   sensor_failure: "sensor fails",
   standstill: "standstill",
   low_coverage: "gaps",
-  insufficient_excitation: "weak motion",
   swapped_axes: "x, y swapped?",
   speed_implausible: "speed wrong?",
   speed_unknown: "no speed",
@@ -91,7 +90,7 @@ export function reasonSentence(reason) {
 }
 
 const ESTIMATORS = {
-  dynamic: "dynamic",
+  dynamic: "broadband estimate",
   transfer_order1: "transfer at 1×",
   transfer_vortex: "transfer at vortex",
   ratio_order1: "equation (5) at 1×",
@@ -116,13 +115,6 @@ export function runoutWords(runout) {
   if (!runout) return "";
   const [x, y] = ["shaft_x", "shaft_y"].map((shaft) => RUNOUT[runout[shaft]] ?? "");
   return x === y ? x : `x ${x}, y ${y}`;
-}
-
-/** Which estimator the preferred stiffness comes from, in one go if it is the same in both axes. */
-export function preferredOrigin({ estimators }) {
-  const chosen = Object.entries(estimators ?? {}).filter(([, name]) => name !== null);
-  if (new Set(chosen.map(([, name]) => name)).size === 1 && chosen.length === 2) return estimatorWords(chosen[0][1]);
-  return chosen.map(([axes, name]) => `${axes} ${estimatorWords(name)}`).join(", ");
 }
 
 const SPEED_SOURCES = {

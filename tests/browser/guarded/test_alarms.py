@@ -41,7 +41,7 @@ async def test_an_alarm_is_acknowledged_shelved_and_brought_back_by_keys_alone(
     await expect(row.locator(".mark")).to_have_text("Alert")
     head = page.locator("#alarms .mark")
     await expect(head).to_contain_text("1 alarm, 1 not acknowledged")
-    await expect(head).to_have_attribute("data-look", "uncertain")
+    await expect(head).to_have_attribute("data-look", "alert")
     await expect(page.locator(".unjudged summary")).to_contain_text("cannot be judged now")
     await page.keyboard.press("Tab")
     await expect(page.get_by_text("Skip to the numbers")).to_be_focused()

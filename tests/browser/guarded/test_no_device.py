@@ -12,7 +12,7 @@ LOST = re.compile("not connected|No samples come")
 async def test_where_no_device_answers_every_page_says_so_and_what_to_do(plant, page) -> None:
     await page.goto(plant.url + "#/units/U1/bearings/LJB")
     await expect(page.locator(".state .mark")).to_have_text("Bad: not connected")
-    for chart in await page.locator("figure").all():
+    for chart in await page.locator(".charts figure").all():
         await expect(chart.locator(".sentence")).to_contain_text(LOST)
         await expect(chart.locator(".chart")).to_be_hidden()
     assert await page.evaluate(NO_NUMBER)

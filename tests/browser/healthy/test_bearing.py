@@ -65,7 +65,7 @@ async def test_the_keyboard_leads_from_the_plant_to_a_unit_its_bearing_and_its_c
     await expect(page.locator("h1")).to_contain_text(", UJB")
     await tab_to(page, SAYS, "900")
     await page.keyboard.press("ArrowRight")
-    await expect(page.get_by_role("radio", name="1 h")).to_be_checked()
+    await expect(page.locator(".choices").get_by_role("radio", name="1 h")).to_be_checked()
 
 
 async def test_an_unknown_unit_or_bearing_is_named_and_leads_back(plant, page) -> None:

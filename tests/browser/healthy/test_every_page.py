@@ -62,6 +62,7 @@ async def unfold(page: Page, address: str) -> None:
         await page.get_by_role("button", name="Details").click()
     if address == BEARING:
         await await_charts(page)
+        await page.locator(".fold summary").click()
         await page.locator(".estimators button.spread:visible").first.click()
         await expect(page.locator(".estimators .budget tbody tr").first).to_be_visible()
     if address.endswith("/waterfall"):

@@ -9,8 +9,8 @@ FILM = "#/units/U1/bearings/UJB/film"
 BEARING = "#/units/U1/bearings/UJB"
 PLOTS = ("against-eccentricity_ratio", "against-oil_temperature_c")
 WORDS = re.compile(
-    "Normal|Alert|Danger|Gathering evidence|No baseline|Not enough excitation|Reading doubted"
-    "|Not settled"
+    "Normal|Alert|Danger|Gathering evidence|No baseline|Weak signal|Reading doubted"
+    "|Not settled|Change not confirmed yet"
 )
 
 
@@ -89,7 +89,7 @@ async def test_overview_and_bearing_page_have_the_verdict_and_lead_to_the_film(p
     await expect(brief).to_contain_text(WORDS)
     await page.locator("[data-bearing=UJB] a").click()
     await expect(page.locator(".film-verdict .mark").first).to_contain_text(WORDS)
-    await page.get_by_role("radio", name="30 d", exact=True).check()
+    await page.locator(".choices").get_by_role("radio", name="30 d", exact=True).check()
     caption = page.locator("[data-chart=stiffness-trend] figcaption")
     await expect(caption).to_contain_text("are simulated, not measured")
     await page.get_by_role("link", name="Baseline, map and history").click()
@@ -164,10 +164,10 @@ async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(
     oils = [bearing["readings"]["oil_temperature_c"]["value"] for bearing in bearings]
     await expect(oil).to_have_text([f"{value:.1f}" for value in oils])
     heads = await table.get_by_role("columnheader").all_inner_texts()
-    assert heads == ["UJB", "LJB", "TJB"]
+    assert heads == ["UJB upper guide", "LJB lower guide", "TJB turbine guide"]
     await expect(page.locator(".operating-state")).to_contain_text("oad")
     await expect(table.locator(".centre-picture").first).to_be_visible()
-    await expect(table.locator(".film-line .mark").first).to_be_visible()
+    await expect(table.locator(".film-brief .mark").first).to_be_visible()
     await expect(page.locator(".unit-alarms")).not_to_contain_text("Asking the service.")
     await expect(page.locator(".unit-recordings")).not_to_contain_text("Asking the service.")
     ways = await table.locator(".ways a").evaluate_all(HREFS)

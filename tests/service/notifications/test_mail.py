@@ -30,8 +30,8 @@ MESSAGE: Message = {
     "priority": "danger",
     "is_active": True, "state": "unacknowledged", "occurrence": 1, "actor": "",
     "time": "2026-01-01T00:00:04.000Z", "raised": "2026-01-01T00:00:04.000Z",
-    "reason": "film", "value": -0.2, "uncertainty": 0.01, "limit": 0.1, "value_unit": "1",
-    "value_is": "ln_change", "operating_state": "full_load",
+    "reason": "film", "value": -18.1, "uncertainty": None, "limit": -10.0, "value_unit": "%",
+    "operating_state": "full_load",
     "condition": {"oil_temperature_c": {"label": "Oil temperature", "value": 48.25, "unit": "°C",
                                         "uncertainty": None}},
 }  # fmt: skip
@@ -123,8 +123,7 @@ async def test_a_mail_says_what_where_since_when_by_how_much_and_under_which_con
     text = mail.get_content()
     assert "Itaipu, U1 UJB (Unit 1)" in text
     assert "Since:     2026-01-01T00:00:04.000Z" in text
-    assert "-18.1 ± 1.6 (95 %) % against the baseline at the same condition" in text
-    assert "limit -9.5 %" in text
+    assert "Confirmed: -18.1 % of the expected stiffness, on average; limit -10 %" in text
     assert "Operation: full load" in text
     assert "Oil temperature:     48.25 °C" in text
     assert "https://padwatch.example/#/alarms" in text

@@ -1,12 +1,15 @@
-/** One bearing: its numbers large, its charts, and what they rest on. */
+/** One bearing: the verdict first, then stiffness and condition, then charts, then details. */
 
 import { bearingCharts } from "./bearing_charts.js";
-import { bearingNumbers } from "./bearing_numbers.js";
+import { keyNumbers, moreNumbers } from "./bearing_numbers.js";
+import { changeChart } from "./change_chart.js";
 import { element, setText } from "../dom.js";
 import { formatAge, formatTime } from "../format.js";
 import { bearingAlarms } from "../parts/alarm_brief.js";
+import { filmBrief } from "../parts/film_brief.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { sourceView } from "../parts/source.js";
+import { openAlarms } from "../parts/unit_alarm_mark.js";
 import { wayLinks } from "../parts/ways.js";
 import { bearingAddress, unitAddress } from "../route.js";
 import { qualityOf, reasonSentence } from "../words.js";
@@ -21,10 +24,14 @@ export function bearingPage(main, unitId, bearingId) {
   const content = element("div", { class: "bearing", hidden: "" });
   main.append(missing, content);
   const path = ["units", unitId, "bearings", bearingId];
-  const summary = filmSummary(path, unitId, bearingId);
-  const numbers = [bearingNumbers(path), summary, estimatorTable(path), filmMatrices(path)];
-  const parts = [headPart(unitId, bearingId), bearingAlarms(unitId, bearingId), ...numbers, bearingCharts(path), windowFacts()];
-  content.append(...parts.map((part) => part.node));
+  const [head, key, change] = [headPart(unitId, bearingId), keyNumbers(path), changeChart(path)];
+  const [summary, charts] = [filmSummary(path, unitId, bearingId, change.update), bearingCharts(path)];
+  const alarms = bearingAlarms(unitId, bearingId);
+  const details = [moreNumbers(path), estimatorTable(path), filmMatrices(path), windowFacts(), sourcePart()];
+  const parts = [head, alarms, summary, key, change, charts, ...details];
+  const first = element("div", { class: "first" }, element("div", { class: "column" }, summary.node, key.node), change.node);
+  const folded = element("details", { class: "fold" }, element("summary", {}, "All numbers, estimators, averaged window and data source"), ...details.map((part) => part.node));
+  content.append(head.node, alarms.node, first, charts.node, folded);
   return {
     draw(view) {
       const unit = view.units.find((one) => one.id === unitId);
@@ -48,27 +55,34 @@ function missingSentence(view, unit, unitId, bearingId) {
 
 const overviewLink = () => element("a", { href: "#/" }, "Overview");
 
-/** Where we are, how good it is, how old it is. */
+/** Where we are, the verdict, and how good and old the data are. */
 function headPart(unitId, bearingId) {
-  const title = element("h1", {}, `${unitId} ${bearingId}`);
+  const title = element("h1", { dir: "auto" }, `${unitId} ${bearingId}`);
   const siblings = element("nav", { class: "siblings", "aria-label": "Bearings of this unit" }, overviewLink());
+  const alarms = openAlarms();
+  const verdict = filmBrief();
   const quality = mark();
   const why = element("span", { class: "why-sentence" });
   const age = element("span", { class: "data-age" });
-  const source = sourceView();
-  const state = element("div", { class: "state" }, quality.node, why, age);
+  const state = element("div", { class: "state" }, element("span", {}, "Data quality:"), quality.node, why, age);
   return {
-    node: element("header", { class: "bearing-head" }, siblings, title, state, source.node, wayLinks(unitId, bearingId, bearingAddress(unitId, bearingId))),
+    node: element("header", { class: "bearing-head" }, siblings, title, verdict.node, state, wayLinks(unitId, bearingId, bearingAddress(unitId, bearingId))),
     draw(latest, unit) {
       drawSiblings(siblings, unit, bearingId);
-      setText(title, `${unit.name}, ${bearingId}`);
+      setText(title, [`${unit.name}, ${bearingId}`, latest.name].filter(Boolean).join(" "));
+      verdict.draw(unit.films[unit.bearings.indexOf(latest)], alarms.of(unitId, bearingId));
       const whole = qualityOf(latest);
       drawQuality(quality, whole);
       setText(why, whole.level === "good" ? "" : reasonSentence(whole.reason));
       setText(age, windowAge(latest));
-      source.draw(unit.source);
     },
+    close: alarms.close,
   };
+}
+
+function sourcePart() {
+  const source = sourceView();
+  return { node: element("section", { class: "panel" }, element("h2", {}, "Data source"), source.node), draw: (latest, unit) => source.draw(unit.source) };
 }
 
 function windowAge(latest) {

@@ -1,7 +1,7 @@
 /** The head of a page about one bearing: where we are, and the ways to the other pages about it. */
 
 import { element, setText } from "../dom.js";
-import { bearingAddress, filmAddress, orbitAddress, waterfallAddress } from "../route.js";
+import { bearingAddress, filmAddress, orbitAddress, unitAddress, waterfallAddress } from "../route.js";
 
 const PAGES = [
   ["", (bearing) => `Bearing ${bearing}`, bearingAddress],
@@ -10,13 +10,14 @@ const PAGES = [
   ["film", () => "Film", filmAddress],
 ];
 
-const OF_BEARING = { waterfall: waterfallAddress, orbits: orbitAddress };
+const OF_BEARING = { waterfall: waterfallAddress, orbits: orbitAddress, film: filmAddress };
 
-/** `here` is one of `waterfall` and `orbits`; returns `{ node, draw(view) }`. */
+/** `here` is one of `waterfall`, `orbits` and `film`; returns `{ node, draw(view) }`. */
 export function bearingHead(unitId, bearingId, topic, here) {
   const title = element("h1", {}, `${unitId} ${bearingId}: ${topic}`);
+  const parents = [link("#/", "Overview"), link(unitAddress(unitId), unitId)];
   const pages = PAGES.map(([name, words, address]) => link(address(unitId, bearingId), words(bearingId), name === here));
-  const about = element("nav", { class: "siblings", "aria-label": `Pages about ${bearingId}` }, ...pages);
+  const about = element("nav", { class: "siblings", "aria-label": `Pages about ${bearingId}` }, ...parents, ...pages);
   const others = element("nav", { class: "siblings", "aria-label": "Bearings of this unit" });
   let known = "";
   return {
@@ -24,6 +25,7 @@ export function bearingHead(unitId, bearingId, topic, here) {
     draw(view) {
       const unit = view.units.find((one) => one.id === unitId);
       if (!unit) return;
+      setText(parents[1], unit.name);
       setText(title, `${unit.name}, ${bearingId}: ${topic}`);
       const names = unit.bearings.map(({ bearing }) => bearing);
       if (known === names.join(" ")) return;

@@ -29,7 +29,7 @@ const HEADS = [
   ["Coherence y", ""],
   ["Quality", ""],
 ];
-const DAMPING_INCLUDED = "none: equation (5) gives |k + iωc|";
+const DAMPING_INCLUDED = "not available from equation (5)";
 
 /** Returns `{ node, draw(latest), close() }`. */
 export function estimatorTable(path) {
@@ -64,9 +64,11 @@ function estimatorRow(estimator, { k, c, coherence }, budget) {
   const preferred = element("small");
   const quality = mark();
   const head = element("th", { scope: "row", role: "rowheader" }, estimatorWords(estimator), " ", preferred);
+  const node = element("tr", { role: "row", "data-estimator": estimator }, head, ...cells, cell(quality.node, HEADS.at(-1)));
   return {
-    node: element("tr", { role: "row", "data-estimator": estimator }, head, ...cells, cell(quality.node, HEADS.at(-1))),
+    node,
     draw(latest) {
+      node.hidden = /_vortex$/.test(estimator) && readingOf(latest, "vortex_frequency_hz").reason === "no_vortex";
       const whole = worstOf(names.map((name) => readingOf(latest, name)));
       for (const view of views) view.draw(latest, whole.reason);
       drawQuality(quality, whole, qualityOf(latest).reason);

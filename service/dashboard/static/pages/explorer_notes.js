@@ -3,7 +3,7 @@
 import { tell } from "../api.js";
 import { element, setText } from "../dom.js";
 import { formatTime, formatZone } from "../format.js";
-import { actorField } from "./alarm_actor.js";
+import { actorField, nameField } from "../parts/actor.js";
 import { localSecond } from "./explorer_time.js";
 
 /** Returns `{ node, show(found, [startMs, endMs]) }`; `again` asks for the trends afresh. */
@@ -13,28 +13,29 @@ export function explorerNotes(again) {
   const time = element("input", { type: "datetime-local", step: "1", required: "" });
   const text = element("input", { required: "", maxlength: "500", placeholder: "for example: shims changed" });
   const failure = element("span", { class: "action-failure", role: "alert" });
-  const actor = actorField("act_on_alarms", "add notes", "before you add a note");
+  const actor = actorField("act_on_alarms", "add notes");
+  const who = nameField();
+  who.draw();
   const form = element(
     "form",
     { class: "asking", "aria-label": "Add a note", hidden: "" },
     element("label", {}, "About ", about),
     element("label", {}, `Time (${formatZone(Date.now())}) `, time),
     element("label", {}, "Note ", text),
-    actor.node,
+    who.node,
     element("button", { type: "submit" }, "Add note"),
     failure,
   );
-  const node = element("section", { class: "panel explorer-notes", "aria-label": "Notes" }, element("h2", {}, "Notes"), list, actor.may ? form : actor.node);
+  const node = element("section", { class: "panel explorer-notes", "aria-label": "Notes" }, element("h2", {}, "Notes"), list, actor.node, ...(actor.may ? [form] : []));
 
   form.addEventListener("submit", async (submitted) => {
     submitted.preventDefault();
-    const name = actor.name();
-    if (name === null) return setText(failure, "Give your name first.");
     const [unit, bearing] = about.value.split("/");
-    const body = { actor: name, text: text.value, time: new Date(time.value).toISOString(), bearing: bearing ?? null };
+    const body = { actor: who.take(), text: text.value, time: new Date(time.value).toISOString(), bearing: bearing ?? null };
     try {
       await tell(["units", unit, "notes"], body);
       [failure.textContent, text.value] = ["", ""];
+      for (const one of [who, actor]) one.draw();
       again();
     } catch (refused) {
       setText(failure, refused.message);

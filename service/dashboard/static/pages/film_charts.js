@@ -1,10 +1,11 @@
 /** The baseline map, and stiffness against the condition that it was read under. */
 
-import { NotReachable, ask } from "../api.js";
+import { NotReachable } from "../api.js";
 import { cellsOf, mapCaption, mapLayout, mapTraces } from "../charts/baseline_map.js";
 import { AXES, conditionCaption, conditionLayout, conditionTraces, pointsOf } from "../charts/condition.js";
 import { panel } from "../charts/panel.js";
 import { element } from "../dom.js";
+import { askReadings } from "../film_readings.js";
 import { learningSentence } from "../film_words.js";
 import { choice } from "../parts/choice.js";
 import { poll } from "../poll.js";
@@ -29,8 +30,8 @@ export function filmCharts(path) {
     if (known.nowMs === null || !known.film?.is_watched) return;
     try {
       const [history, today] = await Promise.all([
-        askReadings(path, known.nowMs, span.value() * DAY_S, signal),
-        askReadings(path, known.nowMs, DAY_S, signal),
+        askReadings(path, known.nowMs, span.value() * DAY_S, MAX_POINTS, signal),
+        askReadings(path, known.nowMs, DAY_S, MAX_POINTS, signal),
       ]);
       Object.assign(known, { history, today });
       await show();
@@ -78,11 +79,6 @@ export function filmCharts(path) {
 }
 
 const titleOf = (against) => `Stiffness against ${against === "eccentricity_ratio" ? "eccentricity" : "oil temperature"}`;
-
-function askReadings(path, nowMs, spanS, signal) {
-  const range = [["start", new Date(nowMs - spanS * 1000).toISOString()], ["end", new Date(nowMs).toISOString()]];
-  return ask([...path, "film", "readings"], [...range, ["max_points", String(MAX_POINTS)]], signal);
-}
 
 /** Why there is no baseline to draw, or null. */
 function absence({ film, baselines, baseline }, direction) {

@@ -1,4 +1,4 @@
-/** The film's full 2×2 stiffness and damping by `dynamic`, and what the fit rests on. */
+/** The film's full 2×2 stiffness and damping by the broadband estimate, and what the fit rests on. */
 
 import { element } from "../dom.js";
 import { budgetPanel } from "../parts/budget.js";
@@ -22,7 +22,7 @@ export function filmMatrices(path) {
   const fit = pairView(["dynamic_lack_of_fit_x", "dynamic_lack_of_fit_y"], ["x", "y"]);
   const facts = element("dl", { class: "facts" }, fact("Spectral lines", lines), fact("Lack of fit", fit));
   const parts = [stiffness, damping, lines, fit];
-  const head = element("div", { class: "panel-head" }, element("h2", {}, "Film matrices by dynamic"), quality.node);
+  const head = element("div", { class: "panel-head" }, element("h2", {}, "Film coefficients (broadband estimate)"), quality.node);
   const body = element("div", { class: "matrices" }, stiffness.node, damping.node, facts);
   return {
     node: element("section", { class: "panel film" }, head, body, element("p", { class: "help" }, HELP), budget.node),

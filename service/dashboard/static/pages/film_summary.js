@@ -8,11 +8,11 @@ import { verdictPanel } from "./film_verdict.js";
 
 const PERIOD_S = 5;
 
-/** Returns `{ node, draw(), close() }`. */
-export function filmSummary(path, unit, bearing) {
+/** Returns `{ node, draw(), close() }`; `onAnswer` receives every answer. */
+export function filmSummary(path, unit, bearing, onAnswer) {
   const link = element("a", { class: "more", href: filmAddress(unit, bearing) }, "Baseline, map and history");
   const panel = verdictPanel(link);
-  const questions = askFilm(path, panel);
+  const questions = askFilm(path, panel, onAnswer);
   return { node: panel.node, draw() {}, close: questions.stop };
 }
 

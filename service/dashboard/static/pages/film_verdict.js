@@ -1,7 +1,7 @@
 /** What is said of a film now, in words: verdict, change with its uncertainty, cause, condition. */
 
 import { element, setText } from "../dom.js";
-import { changeSentence, causeSentence, conditionWords, lastSentence, pendingSentence, verdictMark, whyUnjudged } from "../film_words.js";
+import { changeSentence, causeSentence, conditionWords, limitWords, nowSentence, pendingSentence, verdictMark, whyUnjudged } from "../film_words.js";
 import { formatTime } from "../format.js";
 import { mark } from "../parts/mark.js";
 import { estimatorWords } from "../words.js";
@@ -11,10 +11,10 @@ export function verdictPanel(link = "") {
   const sentence = element("p", { class: "sentence", role: "status" }, "Asking the service.");
   const rows = ["x", "y"].map(directionRow);
   const facts = element("p", { class: "film-facts" });
-  const condition = element("span");
+  const [limits, condition] = [element("span"), element("span")];
   const compared = element("span");
   const due = element("span");
-  facts.append(condition, compared, due);
+  facts.append(limits, condition, compared, due);
   const verdicts = element("div", { class: "verdicts", hidden: "" }, ...rows.map((row) => row.node));
   const head = element("div", { class: "panel-head" }, element("h2", {}, "Film against its baseline"), link);
   facts.hidden = true;
@@ -27,6 +27,7 @@ export function verdictPanel(link = "") {
       if (!film.is_watched) return;
       rows[0].draw(film.x, film.limits);
       rows[1].draw(film.y, film.limits);
+      setText(limits, `${limitWords(film.limits)}.`);
       setText(condition, conditionWords(film.condition));
       setText(compared, comparedWords(film));
       setText(due, dueWords(film));
@@ -47,14 +48,14 @@ function directionRow(direction) {
     node: element("div", { class: "verdict", "data-direction": direction }, element("span", { class: "axis" }, direction), verdict.node, element("span", {}, change, " ", said)),
     draw(found, limits) {
       verdict.draw(...verdictMark(found));
-      setText(change, changeSentence(found, limits));
-      setText(said, [whyUnjudged(found), pendingSentence(found, limits), causeSentence(found.cause), lastSentence(found, limits)].filter(Boolean).join(" "));
+      setText(change, nowSentence({ ...found, deviation_percent: found.deviation?.percent ?? null }));
+      setText(said, [whyUnjudged(found), changeSentence(found), pendingSentence(found, limits), causeSentence(found.cause)].filter(Boolean).join(" "));
     },
   };
 }
 
 function comparedWords({ baseline_version: version, estimator }) {
-  const by = `Stiffness by ${estimatorWords(estimator)}`;
+  const by = `Stiffness: ${estimatorWords(estimator)}`;
   return version === null ? `${by}; no baseline in force.` : `${by}, compared with baseline version ${version}.`;
 }
 

@@ -1,27 +1,42 @@
-/** The plant at a glance: every unit, every bearing, worst state in words on top. */
+/** The plant at a glance: every unit, every bearing, verdicts on top. */
 
 import { element, setText } from "../dom.js";
+import { askReadings } from "../film_readings.js";
 import { alarmsToAcknowledge } from "../parts/alarm_brief.js";
 import { mark } from "../parts/mark.js";
-import { unitAlarmMarks } from "../parts/unit_alarm_mark.js";
-import { lookOf, qualityOf } from "../words.js";
+import { openAlarms } from "../parts/unit_alarm_mark.js";
+import { poll } from "../poll.js";
+import { serviceTimeMs } from "../server_time.js";
+import { bearingVerdict } from "../verdict_words.js";
+import { qualityOf } from "../words.js";
 import { unitCard } from "./unit_card.js";
-import { tileLegend, unitTile } from "./unit_tile.js";
+import { TILE_LEGEND, unitTile } from "./unit_tile.js";
 
 /** With more units than these, each is a tile: numbers that matter, all on one screen. */
-export const N_CARDS = 4;
+const N_CARDS = 4;
+
+const [TREND_PERIOD_S, TREND_SPAN_S, TREND_POINTS] = [60, 8 * 3600, 96];
 
 /** Returns `{ draw(view), close() }`. */
 export function overviewPage(main) {
   const summary = element("p", { class: "summary" });
-  const legend = element("p", { class: "help" });
   const units = element("div");
   const unseen = alarmsToAcknowledge();
-  main.append(element("h1", { class: "hidden" }, "Plant overview"), summary, unseen.node, legend, units);
+  main.append(element("h1", { class: "hidden" }, "Plant overview"), summary, element("p", { class: "help", hidden: "" }, TILE_LEGEND), units, unseen.node);
   const tally = tallyView(summary);
-  const alarms = unitAlarmMarks();
+  const alarms = openAlarms();
+  const histories = new Map();
   let shape = null;
   let drawn = [];
+  let films = [];
+
+  const trends = poll(async (signal) => {
+    const give = (failure) => (signal.aborted ? Promise.reject(failure) : null); // the row has no trend then, and all else
+    for (const [unit, bearing] of films) {
+      const path = ["units", unit, "bearings", bearing];
+      histories.set(`${unit}/${bearing}`, await askReadings(path, serviceTimeMs(), TREND_SPAN_S, TREND_POINTS, signal).catch(give));
+    }
+  }, () => TREND_PERIOD_S);
 
   function build(view) {
     const isLarge = view.units.length > N_CARDS;
@@ -29,54 +44,67 @@ export function overviewPage(main) {
     drawn = view.units.map((unit) => viewOf(unit, alarms.markOf(unit.id)));
     units.className = isLarge ? "unit-tiles" : "units";
     units.replaceChildren(...drawn.map((one) => one.node));
-    legend.hidden = !isLarge;
-    setText(legend, tileLegend());
+    summary.nextSibling.hidden = !isLarge;
+    const watched = view.units.flatMap((unit) => unit.bearings.filter((_, n) => unit.films[n].why_not === null).map(({ bearing }) => [unit.id, bearing]));
+    films = isLarge ? [] : watched;
+    trends.again();
   }
 
   return {
     draw(view) {
-      const wanted = JSON.stringify(view.units.map((unit) => [unit.id, unit.name, unit.bearings.map((b) => b.bearing)]));
+      const wanted = JSON.stringify(view.units.map((unit) => [unit.id, unit.name, unit.bearings.map((b) => [b.bearing, b.name])]));
       if (wanted !== shape) build(view);
       shape = wanted;
-      tally.draw(view);
-      drawn.forEach((one, index) => one.draw(view.units[index]));
+      tally.draw(view, alarms);
+      drawn.forEach((one, n) => {
+        const { id } = view.units[n];
+        one.draw(view.units[n], (bearing) => alarms.of(id, bearing), (bearing) => histories.get(`${id}/${bearing}`) ?? null);
+      });
     },
     close() {
       alarms.close();
       unseen.close();
+      trends.stop();
     },
   };
 }
 
-const LOOK_WORDS = { bad: "bad", uncertain: "uncertain", absent: "without full result", good: "good" };
+const VERDICTS = { danger: "danger", alert: "alert", normal: "normal", quiet: "not judged" };
 
 function tallyView(node) {
   const words = element("span");
-  const store = mark();
-  const captures = mark();
-  const marks = Object.fromEntries(Object.keys(LOOK_WORDS).map((look) => [look, mark()]));
-  node.append(words, ...Object.values(marks).map((one) => one.node), store.node, captures.node);
+  const [store, captures, data] = [mark(), mark(), mark()];
+  const marks = Object.fromEntries(Object.keys(VERDICTS).map((look) => [look, mark()]));
+  node.append(words, ...[...Object.values(marks), data, store, captures].map((one) => one.node));
   return {
-    draw(view) {
-      const qualities = view.units.flatMap((unit) => unit.bearings.map(qualityOf));
-      const looks = qualities.map(({ level, reason }) => lookOf(level, reason));
-      const n = (look) => looks.filter((one) => one === look).length;
+    draw(view, alarms) {
       store.node.hidden = view.storeError === null;
       store.draw("bad", `Results are not being stored: ${view.storeError}`);
       captures.node.hidden = view.captureError === null;
       captures.draw("uncertain", `Samples around alarms are not kept: ${view.captureError}`);
-      setText(words, tallyWords(view, looks.length));
+      setText(words, emptyWords(view));
+      words.hidden = words.textContent === "";
+      const looks = view.units.flatMap(({ id, bearings, films }) => bearings.map(({ bearing }, n) => bearingVerdict(films[n], alarms.of(id, bearing))[0]));
       for (const [look, one] of Object.entries(marks)) {
-        one.node.hidden = n(look) === 0;
-        one.draw(look, `${n(look)} ${LOOK_WORDS[look]}`);
+        const n = looks.filter((each) => each === look).length;
+        one.node.hidden = n === 0;
+        one.draw(look, `${n} ${VERDICTS[look]}`);
       }
+      drawData(data, view);
     },
   };
 }
 
-function tallyWords(view, nBearings) {
+/** How many bearings have good data, apart from what the data say. */
+function drawData(data, view) {
+  const levels = view.units.flatMap((unit) => unit.bearings.map((bearing) => qualityOf(bearing).level));
+  const n = levels.filter((level) => level === "good").length;
+  data.node.hidden = levels.length === 0;
+  const worst = ["bad", "uncertain", "good"].find((level) => levels.includes(level)) ?? "good";
+  data.draw(worst, `Data: ${n === levels.length ? "all good" : `${n} of ${levels.length} bearings good`}`);
+}
+
+function emptyWords(view) {
   if (view.silenceS === null) return "No numbers yet: the service has not answered.";
-  if (view.units.length === 0) return "The plant file names no units.";
-  const connected = view.units.filter((unit) => unit.source.state === "connected").length;
-  return `${connected} of ${view.units.length} units connected. ${nBearings} bearings:`;
+  return view.units.length === 0 ? "The plant file names no units." : "";
 }

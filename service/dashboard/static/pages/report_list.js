@@ -1,6 +1,6 @@
 /** Reports of alarms: every time one was raised, with its page to print and its evidence to take away. */
 
-import { placeWords, valueWords, whatWords } from "../alarm_words.js";
+import { levelMark, placeWords, valueWords, whatWords } from "../alarm_words.js";
 import { NotReachable, Refused, ask } from "../api.js";
 import { element, setText } from "../dom.js";
 import { formatTime } from "../format.js";
@@ -73,7 +73,7 @@ async function askOccurrences(alarm, signal) {
 
 function reportRow({ event }) {
   const level = mark();
-  level.draw(...(event.level === "danger" ? ["bad", "Danger"] : ["uncertain", "Alert"]));
+  level.draw(...levelMark({ level: event.level, is_active: true }));
   const links = evidenceLinks();
   links.draw(event.alarm, event.occurrence);
   const state = element("span", { class: "from" });

@@ -1,92 +1,107 @@
-/** One generating unit on the overview: its state, and a row for each bearing. */
+/** One generating unit on the overview: how it runs, and a row for each bearing with its verdict. */
 
-import { amplitudeUnit } from "../amplitudes.js";
-import { element, setText } from "../dom.js";
+import { element, setAttribute, setText } from "../dom.js";
+import { signedPercent } from "../film_words.js";
 import { formatAge } from "../format.js";
 import { filmBrief } from "../parts/film_brief.js";
 import { drawQuality, mark } from "../parts/mark.js";
-import { pairView, readingView } from "../parts/reading.js";
-import { runningView } from "../parts/running.js";
-import { sourceView } from "../parts/source.js";
-import { stiffnessBrief } from "../parts/stiffness_brief.js";
+import { pairView, readingOf, readingView } from "../parts/reading.js";
+import { runningWords } from "../parts/running.js";
+import { sparkline } from "../parts/sparkline.js";
 import { bearingAddress, unitAddress } from "../route.js";
-import { qualityOf } from "../words.js";
+import { qualityOf, sourceState } from "../words.js";
 
-const NO_SPREAD = () => null;
-const PAIR = (head, unit, names, labels) => ({ head, unit, view: () => pairView(names, labels, "", NO_SPREAD) });
-const SINGLE = (head, unit, name) => ({ head, unit, view: () => readingView(name, "", "", null) });
-
-const columns = () => [
-  { head: "Stiffness ± 95 %", unit: "GN/m, preferred estimator", view: stiffnessBrief },
-  PAIR("Shaft 1×", amplitudeUnit(), ["order1_shaft_x_um_pk", "order1_shaft_y_um_pk"], ["x", "y"]),
-  PAIR("Bearing 1×", amplitudeUnit(), ["order1_bearing_x_um_pk", "order1_bearing_y_um_pk"], ["x", "y"]),
-  PAIR("k_eff 1×", "GN/m, eq. (5)", ["order1_k_eff_xx_n_per_m", "order1_k_eff_yy_n_per_m"], ["xx", "yy"]),
-  PAIR("k_eff vortex", "GN/m, eq. (5)", ["vortex_k_eff_xx_n_per_m", "vortex_k_eff_yy_n_per_m"], ["xx", "yy"]),
-  SINGLE("Eccentricity", "ratio", "eccentricity_ratio"),
-  SINGLE("Oil", "°C", "oil_temperature_c"),
+const HEADS = [
+  ["Bearing", ""],
+  ["Film stiffness", "GN/m"],
+  ["Change", "from expected"],
+  ["Trend", ""],
+  ["Eccentricity", ""],
+  ["Oil", "°C"],
+  ["Verdict", ""],
+  ["Data", ""],
 ];
+const STIFFNESS = ["stiffness_xx_n_per_m", "stiffness_yy_n_per_m"];
+const NO_SPREAD = () => null;
 
-const [FILM, FILM_UNIT] = ["Film", "against its baseline"];
-
-/** Returns `{ node, draw(unit) }`; `alarm` is the unit's mark of open alarms. */
+/** Returns `{ node, draw(unit, alarmsOf, historyOf) }`; `alarm` is the unit's mark of open alarms. */
 export function unitCard(unit, alarm) {
-  const running = runningView();
-  const source = sourceView();
-  const shown = columns();
-  const rows = unit.bearings.map((latest) => bearingRow(unit.id, latest.bearing, shown));
-  const head = element("div", { class: "unit-head" }, element("h2", {}, element("a", { href: unitAddress(unit.id) }, unit.name)), running.node, alarm.node, source.node);
+  const running = element("span", { class: "running" });
+  const link = mark();
+  const rows = unit.bearings.map((one) => bearingRow(unit.id, one));
+  const title = element("h2", { dir: "auto" }, element("a", { href: unitAddress(unit.id) }, unit.name));
+  const head = element("div", { class: "unit-head" }, title, running, alarm.node, link.node);
+  const node = element("section", { class: "unit-card", "data-unit": unit.id }, head, table(unit, rows));
   return {
-    node: element("section", { class: "unit-card", "data-unit": unit.id }, head, table(unit, shown, rows)),
-    draw(now) {
-      running.draw(now);
-      source.draw(now.source);
+    node,
+    draw(now, alarmsOf, historyOf) {
+      setText(running, runningWords(now));
+      drawLink(link, now.source);
       alarm.draw();
-      rows.forEach((row, index) => row.draw(now.bearings[index], now.films[index]));
+      setAttribute(node, "data-worst", alarm.node.dataset.look ?? null);
+      rows.forEach((row, n) => row.draw(now.bearings[n], now.films[n], alarmsOf(now.bearings[n].bearing), historyOf(now.bearings[n].bearing)));
     },
   };
 }
 
-function table(unit, shown, rows) {
-  const heads = shown.map(({ head, unit: unitOf }) =>
-    element("th", { scope: "col", role: "columnheader" }, head, element("small", {}, unitOf)),
-  );
-  const first = element("th", { scope: "col", role: "columnheader" }, "Bearing");
-  const last = element("th", { scope: "col", role: "columnheader" }, "Quality", element("small", {}, "and data age"));
-  const film = element("th", { scope: "col", role: "columnheader" }, FILM, element("small", {}, FILM_UNIT));
-  const headRow = element("tr", { role: "row" }, first, ...heads, film, last);
+/** The link to the data source, while something is wrong with it. */
+export function drawLink(link, source) {
+  const { level, words } = sourceState(source.state);
+  link.node.hidden = level === "good";
+  link.draw(level, source.reason ? `${words}: ${source.reason}` : words);
+}
+
+function table(unit, rows) {
+  const heads = HEADS.map(([head, of]) => element("th", { scope: "col", role: "columnheader" }, head, " ", element("small", {}, of)));
   return element(
     "table",
     { role: "table", "aria-label": `Bearings of ${unit.name}` },
-    element("thead", { role: "rowgroup" }, headRow),
+    element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...heads)),
     element("tbody", { role: "rowgroup" }, ...rows.map((row) => row.node)),
   );
 }
 
-function bearingRow(unit, bearing, shown) {
-  const cells = shown.map((column) => column.view());
-  const quality = mark();
+function bearingRow(unit, { bearing, name }) {
+  const stiffness = pairView(STIFFNESS, ["x", "y"], "", NO_SPREAD);
+  const changes = ["x", "y"].map(() => element("span"));
+  const trend = sparkline();
+  const eccentricity = readingView("eccentricity_ratio", "", "", null);
+  const oil = readingView("oil_temperature_c", "", "", null);
   const film = filmBrief();
+  const quality = mark();
   const age = element("span", { class: "data-age" });
+  const data = element("span", { class: "quality" }, quality.node, age);
+  const change = element("span", { class: "pair change" }, ...changes);
+  const nodes = [stiffness.node, change, trend.node, eccentricity.node, oil.node, film.node, data];
+  const cells = nodes.map((node, n) => element("td", { role: "cell", "data-head": HEADS[n + 1].join(" ") }, node));
   const link = element("a", { href: bearingAddress(unit, bearing) }, bearing);
-  const boxes = cells.map((cell, index) =>
-    element("td", { role: "cell", "data-head": `${shown[index].head}, ${shown[index].unit}` }, cell.node),
-  );
-  const node = element(
-    "tr",
-    { role: "row", "data-bearing": bearing },
-    element("th", { scope: "row", role: "rowheader" }, link),
-    ...boxes,
-    element("td", { role: "cell", class: "film-cell", "data-head": `${FILM}, ${FILM_UNIT}` }, film.node),
-    element("td", { role: "cell", class: "quality" }, quality.node, age),
-  );
+  const title = element("th", { scope: "row", role: "rowheader" }, link, " ", element("small", { dir: "auto" }, name ?? ""));
   return {
-    node,
-    draw(latest, itsFilm) {
+    node: element("tr", { role: "row", "data-bearing": bearing }, title, ...cells),
+    draw(latest, itsFilm, alarms, history) {
       const whole = qualityOf(latest);
-      film.draw(itsFilm);
-      for (const cell of cells) cell.draw(latest, whole.reason);
+      stiffness.draw(asCompared(latest, itsFilm), whole.reason);
+      changes.forEach((node, n) => setText(node, changeOf(itsFilm["xy"[n]])));
+      trend.draw(history);
+      for (const view of [eccentricity, oil]) view.draw(latest, whole.reason);
+      film.draw(itsFilm, alarms);
+      quality.node.hidden = whole.level === "good";
       drawQuality(quality, whole);
-      setText(age, latest.age_s === null ? "no data yet" : `${formatAge(latest.age_s)} old`);
+      setText(age, whole.level === "good" || latest.age_s === null ? "" : `${formatAge(latest.age_s)} old`);
     },
   };
+}
+
+/** Newest deviation from what the baseline expects, in percent; nothing while there is none. */
+export const changeOf = (film) => (film?.deviation_percent == null ? "" : signedPercent(film.deviation_percent, 0));
+
+/** A result with the stiffness that was compared with the baseline in place of the newest: one belongs to the change. */
+export function asCompared(latest, film) {
+  const readings = { ...latest.readings };
+  STIFFNESS.forEach((name, n) => {
+    const value = film["xy"[n]]?.stiffness_n_per_m ?? null;
+    const newest = readingOf(latest, name);
+    if (value !== null && newest.value !== null) readings[name] = { ...newest, value };
+  });
+  return { ...latest, readings };
 }

@@ -1,30 +1,30 @@
 /** Where we are, how the unit runs, and whether its samples arrive. */
 
 import { element, setAttribute, setText } from "../dom.js";
-import { stateWords } from "../film_words.js";
-import { runningView } from "../parts/running.js";
+import { runningWords } from "../parts/running.js";
 import { sourceView } from "../parts/source.js";
 import { SOURCES_ADDRESS, unitAddress } from "../route.js";
+import { speedOrigin } from "../words.js";
 
-/** Returns `{ node, draw(unit, view, films) }`. */
+/** Returns `{ node, draw(unit, view) }`. */
 export function unitHead(unitId) {
   const title = element("h1", {}, unitId);
   const nav = element("nav", { class: "siblings", "aria-label": "Units of this plant" });
   const state = element("span", { class: "operating-state" });
-  const running = runningView();
+  const origin = element("span", { class: "from" });
   const source = sourceView();
   const more = element("a", { class: "more", href: SOURCES_ADDRESS }, "Source health");
   source.node.append(more);
   let drawn = "";
   return {
-    node: element("header", { class: "bearing-head" }, nav, title, element("div", { class: "state" }, state, running.node), source.node),
-    draw(unit, view, films) {
+    node: element("header", { class: "bearing-head" }, nav, title, element("div", { class: "state" }, state, origin), source.node),
+    draw(unit, view) {
       const wanted = JSON.stringify(view.units.map((one) => [one.id, one.name]));
       if (wanted !== drawn) nav.replaceChildren(element("a", { href: "#/" }, "Overview"), ...view.units.map((one) => unitLink(one, unitId)));
       drawn = wanted;
       setText(title, unit.name);
-      setText(state, view.current ? operatingState(films) : "Operating state not known");
-      running.draw(unit);
+      setText(state, runningWords(unit) || "Operating state not known");
+      setText(origin, speedOrigin(unit.bearings[0]) && `Speed ${speedOrigin(unit.bearings[0])}`);
       source.draw(unit.source);
     },
   };
@@ -34,12 +34,4 @@ function unitLink({ id, name }, here) {
   const link = element("a", { href: unitAddress(id) }, name);
   setAttribute(link, "aria-current", id === here ? "page" : null);
   return link;
-}
-
-/** Of the first bearing whose film knows it: it is the same for the whole unit. */
-function operatingState(films) {
-  const condition = [...films.values()].find((film) => film?.condition)?.condition;
-  if (!condition) return "Operating state not known";
-  const words = stateWords(condition.operating_state);
-  return `${words.charAt(0).toUpperCase()}${words.slice(1)}, ${condition.is_settled ? "settled" : "not settled yet"}`;
 }

@@ -2,12 +2,12 @@
 
 import { amplitudeUnit } from "../amplitudes.js";
 import { element, setText } from "../dom.js";
-import { changeBrief, limitWords, verdictMark, whyUnjudged } from "../film_words.js";
+import { nowSentence } from "../film_words.js";
 import { formatAge } from "../format.js";
 import { centrePicture } from "../parts/centre_picture.js";
+import { filmBrief } from "../parts/film_brief.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { pairView, readingView } from "../parts/reading.js";
-import { stiffnessBrief } from "../parts/stiffness_brief.js";
 import { wayLinks } from "../parts/ways.js";
 import { bearingAddress } from "../route.js";
 import { qualityOf, reasonSentence } from "../words.js";
@@ -15,10 +15,10 @@ import { qualityOf, reasonSentence } from "../words.js";
 const NO_SPREAD = () => null;
 const pair = (names, labels, unit) => () => readingCell(pairView(names, labels, unit, NO_SPREAD));
 
-/** Each row: its head, its unit, and a view that draws `(latest, film, brief)`. */
+/** Each row: its head, its unit, and a view that draws `(latest, film)`. */
 const rows = () => [
-  ["Film", "against its baseline", filmCell],
-  ["Film stiffness", "GN/m ± 95 %", () => readingCell(stiffnessBrief())],
+  ["Verdict", "on the film against its baseline", filmCell],
+  ["Film stiffness", "GN/m ± 95 %", () => readingCell(pairView(["stiffness_xx_n_per_m", "stiffness_yy_n_per_m"], ["xx", "yy"], ""))],
   ["Shaft vibration, 1×", amplitudeUnit(), pair(["order1_shaft_x_um_pk", "order1_shaft_y_um_pk"], ["x", "y"], "")],
   ["Shaft vibration, broad-band", "µm pk-pk", pair(["overall_shaft_x_um_pp", "overall_shaft_y_um_pp"], ["x", "y"], "")],
   ["Bearing velocity, broad-band", "mm/s rms", pair(["overall_bearing_x_mm_s_rms", "overall_bearing_y_mm_s_rms"], ["x", "y"], "")],
@@ -28,12 +28,12 @@ const rows = () => [
   ["Open", "", null],
 ];
 
-/** Returns `{ node, draw(unit, view, films) }`. */
+/** Returns `{ node, draw(unit) }`. */
 export function unitTable(unit) {
   const bearings = unit.bearings.map(({ bearing }) => bearing);
   const drawn = rows().map((row) => tableRow(unit.id, bearings, row));
-  const heads = bearings.map((bearing) =>
-    element("th", { scope: "col", role: "columnheader" }, element("a", { href: bearingAddress(unit.id, bearing) }, bearing)),
+  const heads = unit.bearings.map(({ bearing, name }) =>
+    element("th", { scope: "col", role: "columnheader" }, element("a", { href: bearingAddress(unit.id, bearing) }, bearing), " ", element("small", { dir: "auto" }, name ?? "")),
   );
   const corner = element("td", { role: "cell" });
   const table = element(
@@ -44,11 +44,8 @@ export function unitTable(unit) {
   );
   return {
     node: element("section", { class: "panel side-by-side" }, table),
-    draw(now, view, films) {
-      bearings.forEach((bearing, n) => {
-        const film = view.current ? films.get(bearing) : null;
-        for (const row of drawn) row.cells[n]?.draw(now.bearings[n], film ?? null, now.films[n]);
-      });
+    draw(now) {
+      bearings.forEach((_, n) => drawn.forEach((row) => row.cells[n].draw(now.bearings[n], now.films[n])));
     },
   };
 }
@@ -65,39 +62,15 @@ function readingCell(view) {
   return { node: view.node, draw: (latest) => view.draw(latest, qualityOf(latest).reason) };
 }
 
-/** The verdict in x and y with the change behind it, and the limits of the change. */
+/** The verdict, and in x and y what is measured and expected. */
 function filmCell() {
-  const none = element("span", { class: "from" });
-  const limits = element("span", { class: "from" });
-  const lines = ["x", "y"].map(filmLine);
+  const verdict = filmBrief();
+  const lines = ["x", "y"].map(() => element("span", { class: "from" }));
   return {
-    node: element("div", { class: "film-lines" }, none, ...lines.map((line) => line.node), limits),
-    draw(latest, film, brief) {
-      setText(none, brief.why_not ? `Not watched: ${brief.why_not}` : "");
-      setText(limits, film?.is_watched ? `limit ${limitWords(film.limits)}` : "");
-      const found = lines.map((line) => film?.[line.direction] ?? null);
-      const said = found.map((one) => (one ? whyUnjudged(one) : ""));
-      if (said[0] === said[1]) said[0] = "";
-      lines.forEach((line, n) => line.draw(brief[line.direction], found[n], said[n]));
-    },
-  };
-}
-
-function filmLine(direction) {
-  const verdict = mark();
-  const change = element("span", { class: "change" });
-  const said = element("span", { class: "from" });
-  const node = element("div", { class: "film-line", "data-direction": direction }, verdict.node, change, said);
-  return {
-    node,
-    direction,
-    draw(brief, found, why) {
-      node.hidden = brief === null;
-      if (brief === null) return;
-      const [look, words] = verdictMark(brief);
-      verdict.draw(look, `${direction} ${words.charAt(0).toLowerCase()}${words.slice(1)}`);
-      setText(change, found ? changeBrief(found) : "");
-      setText(said, why);
+    node: element("div", {}, verdict.node, ...lines),
+    draw(latest, film) {
+      verdict.draw(film, null);
+      lines.forEach((line, n) => setText(line, film["xy"[n]]?.stiffness_n_per_m == null ? "" : `${"xy"[n]}: ${nowSentence(film["xy"[n]])}`));
     },
   };
 }

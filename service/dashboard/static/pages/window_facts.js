@@ -6,7 +6,7 @@ import { runoutWords } from "../words.js";
 
 const FACTS = [
   ["Segments averaged", (w) => `${w.n_segments} of ${w.n_segments_wanted} wanted`],
-  ["Segments voided by gaps", (w) => formatCount(w.n_voided)],
+  ["Segments lost to gaps", (w) => formatCount(w.n_voided)],
   ["Coverage", (w) => `${formatFixed(w.coverage * 100, 1)} %`],
   ["Length", (w) => formatAge(w.duration_s)],
   ["First sample index", (w) => formatCount(w.first_index)],

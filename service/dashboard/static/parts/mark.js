@@ -1,4 +1,9 @@
-/** A quality mark: shape, colour and words, each sufficient alone. Looks are those of `lookOf`. */
+/**
+ * A mark: shape, colour and words, each sufficient alone.
+ *
+ * Round shapes are about data, with the looks of `lookOf`; angular ones about the machine, with the
+ * looks `danger`, `alert`, `normal`, and `quiet` for all that is none of these.
+ */
 
 import { element, setAttribute, setText, shape } from "../dom.js";
 import { lookOf, reasonWords } from "../words.js";
@@ -12,13 +17,23 @@ const SHAPES = {
     shape("path", { d: "M4.2 11.8l7.6-7.6", class: "stroke" }),
   ],
   uncertain: () => [
+    shape("circle", { cx: 8, cy: 8, r: 6 }),
+    shape("path", { d: "M6 6.4a2 2 0 1 1 2.9 1.8q-.9.5-.9 1.5M8 10.9v1.2", class: "stroke" }),
+  ],
+  bad: () => [
+    shape("circle", { cx: 8, cy: 8, r: 7 }),
+    shape("path", { d: "M5 5l6 6m0-6l-6 6", class: "stroke" }),
+  ],
+  danger: () => [
+    shape("rect", { x: 1.5, y: 1.5, width: 13, height: 13 }),
+    shape("path", { d: "M8 4v5M8 10.6v1.6", class: "stroke" }),
+  ],
+  alert: () => [
     shape("path", { d: "M8 1.5 15 14.5H1Z" }),
     shape("path", { d: "M8 6v4.2M8 11.7v1.2", class: "stroke" }),
   ],
-  bad: () => [
-    shape("rect", { x: 1.5, y: 1.5, width: 13, height: 13 }),
-    shape("path", { d: "M4.5 4.5l7 7m0-7l-7 7", class: "stroke" }),
-  ],
+  normal: () => [shape("path", { d: "M2.5 8.5l3.5 3.5 7.5-8", class: "stroke" })],
+  quiet: () => [shape("path", { d: "M3 8h10", class: "stroke" })],
 };
 
 /** The shape alone, hidden from screen readers: words must stand beside it. */

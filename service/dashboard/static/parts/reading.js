@@ -52,7 +52,7 @@ function drawReason(why, reading, saidReason) {
   why.replaceChildren(...(silent ? [] : said ? [words] : [markShape(look), words]));
 }
 
-/** Two readings in one cell; when both are missing for one reason, one dash stands for both. */
+/** Readings in one cell; when all are missing for one reason, one dash stands for all. */
 export function pairView(names, labels, unit, spreadOf = spreadView) {
   const views = names.map((name, index) => readingView(name, labels[index], unit, spreadOf(name)));
   const node = element("span", { class: "pair" }, ...views.map((view) => view.node));
@@ -65,8 +65,9 @@ export function pairView(names, labels, unit, spreadOf = spreadView) {
   };
 }
 
-/** Whether both of two readings are missing for one and the same reason. */
+/** Whether several readings are missing for one and the same reason. */
 export function missingAlike(latest, names) {
-  const [first, second] = names.map((name) => readingOf(latest, name));
-  return first.value === null && second.value === null && first.reason === second.reason;
+  const [first, ...others] = names.map((name) => readingOf(latest, name));
+  const isAlike = ({ value, reason }) => value === null && reason === first.reason;
+  return others.length > 0 && first.value === null && others.every(isAlike);
 }

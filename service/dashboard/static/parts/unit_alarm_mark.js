@@ -1,4 +1,4 @@
-/** The open alarms of each unit as one mark, from the alarm list. */
+/** The open alarms of the plant, from the alarm list: those of a bearing, and a mark for each unit. */
 
 import { isHidden } from "../alarm_words.js";
 import { ask } from "../api.js";
@@ -9,8 +9,12 @@ import { mark } from "./mark.js";
 
 const PERIOD_S = 2;
 
-/** Asks for the list. Returns `{ markOf(unit), close() }`; `markOf` gives `{ node, draw() }`. */
-export function unitAlarmMarks() {
+/**
+ * Asks for the list. Returns `{ of(unit, bearing), markOf(unit), close() }`.
+ *
+ * `of` gives the open alarms, null if they are not known; `markOf` gives `{ node, draw() }`.
+ */
+export function openAlarms() {
   let alarms = null;
   let receivedAt = null;
   const questions = poll(async (signal) => {
@@ -21,8 +25,15 @@ export function unitAlarmMarks() {
       // the head of the page says that alarms are not known
     }
   }, () => PERIOD_S);
-  const isCurrent = () => receivedAt !== null && secondsBetween(receivedAt, moment()) <= CURRENT_LIMIT_S;
-  return { markOf: (unit) => unitMark(() => (isCurrent() ? alarms.filter((alarm) => isAbout(alarm, unit)) : null)), close: questions.stop };
+  function open(isWanted) {
+    const isCurrent = receivedAt !== null && secondsBetween(receivedAt, moment()) <= CURRENT_LIMIT_S;
+    return isCurrent ? alarms.filter((alarm) => !isHidden(alarm) && isWanted(alarm)) : null;
+  }
+  return {
+    of: (unit, bearing) => open((alarm) => alarm.unit === unit && alarm.subject === bearing),
+    markOf: (unit) => unitMark(() => open((alarm) => isAbout(alarm, unit))),
+    close: questions.stop,
+  };
 }
 
 function unitMark(find) {
@@ -30,19 +41,16 @@ function unitMark(find) {
   return {
     node: shown.node,
     draw() {
-      const open = find()?.filter((alarm) => !isHidden(alarm)) ?? null;
-      shown.node.hidden = open !== null && open.length === 0;
-      shown.draw(...(open === null ? ["uncertain", "Alarms unknown"] : wordsOf(open)));
+      const open = find();
+      shown.node.hidden = open?.length === 0;
+      if (!shown.node.hidden) shown.draw(...(open === null ? ["uncertain", "Alarms unknown"] : wordsOf(open)));
     },
   };
 }
 
 function wordsOf(open) {
-  const danger = open.filter((alarm) => alarm.is_active && alarm.level === "danger").length;
-  const returned = open.filter((alarm) => !alarm.is_active).length;
-  const look = danger ? "bad" : returned === open.length ? "absent" : "uncertain";
-  const parts = [`${open.length} ${open.length === 1 ? "alarm" : "alarms"}`];
-  if (danger) parts.push(`${danger} danger`);
-  if (returned) parts.push(`${returned} returned`);
-  return [look, parts.join(", ")];
+  const n = { danger: 0, alert: 0, returned: 0 };
+  for (const { is_active: active, level } of open) n[active ? level : "returned"] += 1;
+  const parts = Object.entries(n).filter(([, count]) => count > 0);
+  return [parts[0][0] === "returned" ? "quiet" : parts[0][0], parts.map(([name, count]) => `${count} ${name}`).join(", ")];
 }

@@ -1,5 +1,6 @@
 """Films watched result by result: the same verdicts as over their whole history."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -162,8 +163,10 @@ def test_what_is_not_judged_is_neither_an_alarm_nor_a_return(rules, verdict):
 def test_an_alarm_says_by_how_much_and_which_limit(rules):
     alert = alarm_condition(FilmFinding(Verdict.ALERT, AlarmLevel.ALERT, -0.1), rules.change)
     danger = alarm_condition(FilmFinding(Verdict.DANGER, AlarmLevel.DANGER, 0.3), rules.change)
-    assert (alert.level, alert.value, alert.limit) == (1, -0.1, rules.change.alert_change)
-    assert (danger.level, danger.value, danger.limit) == (2, 0.3, rules.change.danger_change)
+    assert (alert.level, alert.limit) == (1, pytest.approx(-100.0 * rules.change.alert_change))
+    assert (danger.level, danger.limit) == (2, pytest.approx(100.0 * rules.change.danger_change))
+    assert alert.value == pytest.approx(100.0 * (math.exp(-0.1) - 1.0))
+    assert danger.value == pytest.approx(100.0 * (math.exp(0.3) - 1.0))
     assert alarm_condition(FilmFinding(Verdict.NORMAL), rules.change).level is None
 
 

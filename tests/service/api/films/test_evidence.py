@@ -92,7 +92,7 @@ async def require_a_document_of_what_the_film_was_compared_with(service: Any) ->
     assert [scale["time_scale_h"] for scale in compared["time_scales"]]
     finding = found["bearings"][0]["film"]["findings"][0]
     assert finding["level"] in ("alert", "danger")
-    assert finding["change"] < -0.1
+    assert finding["change_percent"] < -10.0
     assert found["limits"]["films"]["change"]["alert_change"] == 0.035
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 from typing import Any
 
 import numpy as np
@@ -24,9 +25,8 @@ async def test_a_film_as_it_was_learned_is_normal_and_tells_its_condition(servic
     assert (found["is_watched"], found["is_current"], found["estimator"]) == (True, True, "dynamic")
     assert found["baseline_version"] == 1
     change = found["x"]["change"]
-    assert change["low_95"] < change["percent"] < change["high_95"]
     assert abs(change["percent"]) < 4.0
-    assert found["limits"] == {"alert": 0.035, "danger": 0.15}
+    assert found["limits"] == {"alert_percent": 3.5, "danger_percent": 15.0}
 
     machine.run(2, eccentricity_ratio=0.37, oil_temperature_c=46.1)
     found = await service.json(FILM)
@@ -49,12 +49,17 @@ async def test_a_softer_film_is_told_with_interval_time_scale_and_cause(service,
 
     assert (softer["verdict"], softer["level"], softer["reason"]) == ("danger", "danger", "ok")
     change = softer["change"]
-    assert change["low_95"] < change["percent"] < change["high_95"] < -15.0
-    assert change["ln"] < 0.0
+    assert change["percent"] < -15.0
     assert change["time_scale_h"] in (4.0, 16.0)
     assert change["significance"] > change["significance_wanted"] >= 3.0
     assert change["as_of"] == (await service.json(FILM))["time"]
-    assert softer["deviation"]["percent"] == pytest.approx(-25.9, abs=0.1)
+    deviation = softer["deviation"]
+    assert deviation["percent"] == pytest.approx(-25.9, abs=0.1)
+    assert deviation["low_95"] < 100.0 * math.expm1(-0.3) < deviation["high_95"]
+    ratio = softer["stiffness_n_per_m"] / softer["expected_n_per_m"]
+    assert 100.0 * (ratio - 1.0) == pytest.approx(deviation["percent"])
+    [alarm] = [one for one in alarms if one["id"] == "U1:UJB:stiffness_x"]
+    assert alarm["value_unit"] == "%"
     assert softer["cause"]["cause"] == "unknown"  # nobody has learned how the shaft answers
     assert "response" in softer["cause"]["reason"]
     require_a_word_for_every_film(*units)
@@ -65,6 +70,8 @@ def require_a_word_for_every_film(first: Any, second: Any) -> None:
     films = [bearing["film"] for bearing in first["bearings"]]
     assert films[0]["x"]["verdict"] == "danger"
     assert films[0]["x"]["change_percent"] < -10.0
+    assert films[0]["x"]["deviation_percent"] == pytest.approx(-25.9, abs=0.1)
+    assert (first["operating_state"], first["is_settled"]) == ("full_load", True)
     assert films[1]["x"]["verdict"] == "no_baseline"
     assert {bearing["film"]["x"] for bearing in second["bearings"]} == {None}
 

@@ -1,0 +1,71 @@
+/** The verdict on a bearing in a line: what is wrong with it, since when, and by how much. */
+
+import { ALARM_KINDS } from "./alarm_kinds.js";
+import { kindWords } from "./alarm_words.js";
+import { signedPercent, verdictMark } from "./film_words.js";
+import { formatQuantity, formatTime } from "./format.js";
+
+const CAUSES = {
+  all_films_changed: "all films alike: oil or cooling",
+  bracket_or_transducer_changed: "bracket or transducer",
+  changed_cause_unknown: "cause unclear",
+};
+
+const RANKS = ["danger", "alert", "quiet", "normal"];
+const MOST_OTHERS = 2;
+
+/**
+ * Look, words, and a few words of the verdict on a bearing: `DANGER since 22:10: film softer, both directions`.
+ *
+ * `film` is the summary of its film; `alarms` are its open alarms, null if they are not known.
+ */
+export function bearingVerdict(film, alarms) {
+  const active = (alarms ?? []).filter((alarm) => alarm.is_active);
+  if (active.length === 0) return filmVerdict(film);
+  const look = active.some(({ level }) => level === "danger") ? "danger" : "alert";
+  const since = Math.min(...active.filter(({ level }) => level === look).map(({ raised }) => Date.parse(raised)));
+  const isFilm = ({ kind }) => ALARM_KINDS[kind]?.rule === "films";
+  const others = active.filter((alarm) => !isFilm(alarm)).map(({ kind }) => kindWords(kind).toLowerCase());
+  const films = active.filter(isFilm);
+  const words = [...(films.length ? [changeWords(films)] : []), ...others.slice(0, MOST_OTHERS)];
+  if (others.length > MOST_OTHERS) words.push(`${others.length - MOST_OTHERS} more`);
+  const brief = `${look.toUpperCase()} since ${sinceWords(since)}`;
+  return [look, `${brief}: ${words.join("; ")}`, brief];
+}
+
+/** The worse verdict of x and y, without alarms. */
+function filmVerdict(film) {
+  if (film.why_not !== null) return ["quiet", "Not watched", "not watched"];
+  const marks = [film.x, film.y].map((one) => (isAhead(one, film.limits) ? ["quiet", "Change not confirmed yet"] : verdictMark(one)));
+  const [look, words] = marks.toSorted(([a], [b]) => RANKS.indexOf(a) - RANKS.indexOf(b))[0];
+  return [look, words, words.toLowerCase()];
+}
+
+/** Whether the newest reading is beyond the limit of danger, and the mean that the verdict is about is not yet. */
+function isAhead({ verdict, level, deviation_percent: deviation }, { danger_percent: limit }) {
+  return verdict === "normal" && level === null && Math.abs(deviation ?? 0) > limit;
+}
+
+function changeWords(films) {
+  const said = films.map(({ kind, value }) => [kind.at(-1), value === null ? "changed" : value < 0 ? "softer" : "stiffer"]);
+  const [[axis, how]] = said;
+  const both = said.every((one) => one[1] === how) ? `film ${how}, both directions` : `film ${said.map((one) => one.join(" ")).join(", ")}`;
+  const cause = films.map(({ condition_reason: reason }) => CAUSES[reason]).find(Boolean);
+  return (said.length === 1 ? `film ${how} in ${axis}` : both) + (cause ? ` (${cause})` : "");
+}
+
+/** `22:10` of today, else with the date. */
+function sinceWords(timeMs) {
+  const [time, today] = [timeMs, Date.now()].map(formatTime);
+  return time.slice(0, 10) === today.slice(0, 10) ? time.slice(11, 16) : time.slice(0, 16);
+}
+
+/** `expected 0.330 GN/m; confirmed −12 %` of the direction that has changed more; nothing without an alarm level. */
+export function confirmedWords(film) {
+  const held = [film.x, film.y].filter((one) => one?.level && one.change_percent !== null);
+  if (held.length === 0) return "";
+  const worst = held.reduce((a, b) => (Math.abs(b.change_percent) > Math.abs(a.change_percent) ? b : a));
+  const { expected_n_per_m: expected, change_percent: change } = worst;
+  const before = expected === null ? "" : `${worst === film.x ? "x" : "y"} expected ${formatQuantity("stiffness_xx_n_per_m", expected)} GN/m; `;
+  return `${before}confirmed ${signedPercent(change, 0)}`;
+}
