@@ -68,6 +68,7 @@ td.n { font-variant-numeric: tabular-nums; }
 footer { border-top: .6pt solid #888; margin-top: 1.4mm; padding-top: .8mm; font-size: 6.6pt;
   color: #555; overflow-wrap: anywhere; line-height: 1.25; }
 @media screen { body { padding: 6mm; } }
+@media print { nav { display: none; } }
 """
 
 
