@@ -25,8 +25,8 @@ def update(
 
     While the condition is unknown, the level does not change and the delays are paused. Level,
     value, limit and directions of an unknown condition are the last known ones. A direction that
-    exceeds the limit later is a new occurrence, except within `SAME_EVENT_NS` of an occurrence
-    that nobody has acknowledged yet.
+    exceeds the limit later belongs to an unacknowledged occurrence for `SAME_EVENT_NS`; after an
+    acknowledgement or that time, it starts a new occurrence.
     """
     events: list[AlarmEvent] = []
 

@@ -209,10 +209,9 @@ def story(case: Case) -> str:
     """Return a description of the stiffness change and its cause; empty for other alarms."""
     found = finding(case)
     film = None if case.bearing is None else case.bearing.film
-    if case.evidence.alarm.kind != FILM_STIFFNESS or film is None or found is None:
-        return ""
-    moved = [each for each in film.findings if each.level and each.change is not None]
-    if not moved:
+    findings = () if film is None else film.findings
+    moved = [each for each in findings if each.level and each.change is not None]
+    if case.evidence.alarm.kind != FILM_STIFFNESS or found is None or not moved:
         return ""
     hours = (
         ""

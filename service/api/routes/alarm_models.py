@@ -330,8 +330,7 @@ def is_raised_within(
 ) -> bool:
     """Return whether an alarm was raised in one of the states, and within ranges by quantity."""
     at = alarm.raised_at
-    is_inside = not states or (at is not None and at.operating_state in states)
-    return is_inside and all(
+    return (not states or (at is not None and at.operating_state in states)) and all(
         wanted == ValueRange() or (at is not None and wanted.includes(getattr(at, name)))
         for name, wanted in ranges.items()
     )

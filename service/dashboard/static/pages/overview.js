@@ -41,10 +41,7 @@ export function overviewPage(main) {
       tally.draw(view);
       drawn.forEach((one, index) => one.draw(view.units[index]));
     },
-    close() {
-      alarms.close();
-      unseen.close();
-    },
+    close: () => [alarms, unseen].forEach((one) => one.close()),
   };
 }
 
