@@ -200,11 +200,6 @@ class DelayTimer:
     opposed_ns: int = 0
     last_ns: int | None = None
 
-    @property
-    def is_changing(self) -> bool:
-        """Whether the condition differs from `is_on`, and its delay has not elapsed."""
-        return self not in (INACTIVE, ON)
-
     def step(
         self,
         wanted: bool,

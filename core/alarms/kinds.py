@@ -12,11 +12,8 @@ from core.limits import AlarmLevel, Judgement
 from core.machine.unit import Unit
 from core.quality import Reading
 
-CHANNEL_NOT_OK, LINK_LOST = "channel_not_ok", "link_lost"
+CHANNEL_NOT_OK, LINK_LOST, FILM_STIFFNESS = "channel_not_ok", "link_lost", "film_stiffness"
 """Names of alarm kinds that other modules refer to."""
-
-FILM_STIFFNESS = "film_stiffness"
-"""Name of the kind of alarms of a film, one alarm for both directions."""
 
 OIL_TEMPERATURE, TIME_STAMPS = "oil_temperature", "time_stamps"
 """Names of alarm kinds that are also the names of their rules."""

@@ -25,8 +25,8 @@ def update(
 
     While the condition is unknown, the level does not change and the delays are paused. Level,
     value, limit and directions of an unknown condition are the last known ones. A direction that
-    exceeds the limit later is a new occurrence, except within `SAME_EVENT_NS` of an occurrence
-    that nobody has acknowledged yet.
+    exceeds the limit later belongs to an unacknowledged occurrence for `SAME_EVENT_NS`; after an
+    acknowledgement or that time, it starts a new occurrence.
     """
     events: list[AlarmEvent] = []
 
@@ -98,10 +98,11 @@ def next_level(held: AlarmLevel | None, timers: Iterable[Timers]) -> AlarmLevel 
     `timers` are those of the alarm, or of the directions of a film.
     """
     pairs = [pair for each in timers for pair in zip(AlarmLevel, each, strict=True)]
-    rising = [level for level, timer in pairs if timer.is_changing and not timer.is_on]
-    if max(rising, default=0) > (held or 0):
-        return max(rising)
-    if not any(timer.is_changing and timer.is_on for _, timer in pairs):
+    pending = [(level, timer.is_on) for level, timer in pairs if timer not in (INACTIVE, ON)]
+    rising = max((level for level, is_on in pending if not is_on), default=None)
+    if rising is not None and rising > (held or 0):
+        return rising
+    if not any(is_on for _, is_on in pending):
         return held
     return max((level for level, timer in pairs if timer == ON), default=None)
 

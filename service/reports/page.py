@@ -67,6 +67,7 @@ td.n { font-variant-numeric: tabular-nums; }
 footer { border-top: .6pt solid #888; margin-top: 1.4mm; padding-top: .8mm; font-size: 6.6pt;
   color: #555; overflow-wrap: anywhere; line-height: 1.25; }
 @media screen { body { padding: 6mm; } }
+@media print { nav { display: none; } }
 """
 
 
@@ -202,10 +203,9 @@ def story(case: Case) -> str:
     """Return a description of the stiffness change and its cause; empty for other alarms."""
     found = finding(case)
     film = None if case.bearing is None else case.bearing.film
-    if case.evidence.alarm.kind != FILM_STIFFNESS or film is None or found is None:
-        return ""
-    moved = [each for each in film.findings if each.level and each.change_percent is not None]
-    if not moved:
+    findings = () if film is None else film.findings
+    moved = [each for each in findings if each.level and each.change_percent is not None]
+    if case.evidence.alarm.kind != FILM_STIFFNESS or found is None or not moved:
         return ""
     hours = (
         ""

@@ -169,6 +169,9 @@ class EvidenceService:
         return report_page(case, self._clock.now_ns())
 
 
+BACK = '<nav><a href="/#/alarms">Alarm list</a></nav>'
+
+
 def is_there(found: Occurrence) -> bool:
     """Return whether an occurrence has a complete bundle."""
     return found.state is EvidenceState.COMPLETE
@@ -247,6 +250,7 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
             page = await held.report(found)
         except (DamagedEvidenceError, TableError, OSError) as error:
             raise _damaged(error) from error
+        page = page.replace("<body>", f"<body>{BACK}", 1)  # the copy in a bundle has no link
         return HTMLResponse(page, headers={"Content-Security-Policy": POLICY, **SAFE})
 
     @router.get(

@@ -1,11 +1,11 @@
 """API models of alarms and alarm events."""
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState
+from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmState
 from core.alarms.kinds import FILM_STIFFNESS
 from core.alarms.life_cycle import next_level
 from core.change.film_judge import FilmNews
@@ -26,35 +26,12 @@ from service.settings.alarm_kinds import LEVEL_NAMES, AlarmKindName, AlarmLevelN
 from service.settings.storage import Origin
 from service.store.port import StoredEvent, ValueRange
 
-AlarmStateName = Literal[
-    "normal",
-    "unacknowledged",
-    "acknowledged",
-    "returned_unacknowledged",
-    "shelved",
-    "suppressed",
-    "out_of_service",
-]
-
-AlarmChangeName = Literal[
-    "raised",
-    "escalated",
-    "eased",
-    "returned",
-    "latched",
-    "reset",
-    "acknowledged",
-    "shelved",
-    "unshelved",
-    "suppressed",
-    "unsuppressed",
-    "taken_out_of_service",
-    "returned_to_service",
-    "commented",
-    "condition_unknown",
-    "condition_known",
-]
-
+if TYPE_CHECKING:
+    AlarmStateName = AlarmChangeName = str
+else:
+    AlarmStateName = Literal[tuple(state.value for state in AlarmState)]
+    AlarmChangeName = Literal[tuple(change.value for change in AlarmChange)]
+"""Names of the states and changes of alarms, validated by pydantic."""
 
 ConditionName = Literal["active", "within_limits", "unknown"]
 
@@ -353,8 +330,7 @@ def is_raised_within(
 ) -> bool:
     """Return whether an alarm was raised in one of the states, and within ranges by quantity."""
     at = alarm.raised_at
-    is_inside = not states or (at is not None and at.operating_state in states)
-    return is_inside and all(
+    return (not states or (at is not None and at.operating_state in states)) and all(
         wanted == ValueRange() or (at is not None and wanted.includes(getattr(at, name)))
         for name, wanted in ranges.items()
     )

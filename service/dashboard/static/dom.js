@@ -29,7 +29,7 @@ export function keepingFocus(fallback, draw) {
   const row = focused.closest("tr, li");
   draw();
   if (focused.isConnected && !focused.closest("[hidden]")) return;
-  const next = row?.isConnected ? [...row.querySelectorAll("button, a")].find((one) => !one.closest("[hidden]")) : null;
+  const next = row?.isConnected ? [...row.querySelectorAll("button"), ...row.querySelectorAll("a")].find((one) => !one.closest("[hidden]")) : null;
   (next ?? fallback).focus();
 }
 

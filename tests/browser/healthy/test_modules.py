@@ -44,6 +44,22 @@ async def test_an_alarm_leads_to_where_most_is_told_about_it(plant, page: Page) 
     assert words == "full load, eccentricity 0.37, oil 46.2 °C"
 
 
+async def test_an_alarm_says_its_directions_and_what_it_waits_for(plant, page: Page) -> None:
+    await page.goto(plant.url + EMPTY)
+    film = {"kind": "film_stiffness", "directions": "xy", "waits_for": "danger"}
+    gap = {"kind": "gap_x", "directions": "", "waits_for": "normal"}
+    for alarm, what, waits in (
+        (film, "Film stiffness changed, x and y", "Danger once it is certain and has lasted"),
+        (film | {"directions": "y"}, "Film stiffness changed, y", None),
+        (gap, "Probe gap x", "Returns if it lasts for its delay"),
+        (gap | {"waits_for": "alert"}, "Probe gap x", "Eases to alert if it lasts for its delay"),
+        (gap | {"waits_for": None}, "Probe gap x", ""),
+    ):
+        assert await page.evaluate(CALL, ["alarm_words", "whatWords", alarm]) == what
+        if waits is not None:
+            assert await page.evaluate(CALL, ["alarm_words", "waitWords", alarm]) == waits
+
+
 async def test_before_and_after_are_told_in_words_and_a_broken_chain_is_seen(plant, page) -> None:
     await page.goto(plant.url + EMPTY)
     shelved = {

@@ -40,8 +40,9 @@ async def test_a_silent_daq_takes_every_number_away_and_raises_an_alarm_until_it
         await expect(row).to_have_attribute("data-state", "unacknowledged")
 
     await expect(row).to_have_attribute("data-state", "returned_unacknowledged")
-    await page.get_by_label("Your name").fill("A. Name")
     await row.get_by_role("button", name="Acknowledge").click()
+    await row.get_by_role("textbox", name="Your name").fill("A. Name")
+    await page.keyboard.press("Enter")
     await expect(row).to_have_count(0)
     history = page.get_by_role("table", name="History")
     await expect(history.get_by_role("cell", name="returned", exact=True).first).to_be_visible()

@@ -3,7 +3,7 @@
 import pytest
 
 from core.alarms.alarm import AlarmState
-from core.alarms.life_cycle import restored
+from core.alarms.life_cycle import next_level, restored
 from core.alarms.operation import (
     Acknowledge,
     ActionRefusedError,
@@ -14,7 +14,7 @@ from core.alarms.operation import (
     Unshelve,
     expire,
 )
-from core.limits import WITHIN, AlarmLevel, Judgement, unknown
+from core.limits import INACTIVE, ON, WITHIN, AlarmLevel, DelayTimer, Judgement, unknown
 from core.units import NS_PER_S
 
 ALERT = Judgement(AlarmLevel.ALERT, value=160.0, limit=150.0, reason="above_limit")
@@ -169,3 +169,23 @@ def test_out_of_service_hides_more_than_the_shelf_and_ends_only_by_hand(life):
     assert alarm.alarm.state is AlarmState.OUT_OF_SERVICE
     assert alarm.ask(ReturnToService("B. Name"), 70) == ["returned_to_service"]
     assert alarm.alarm.state is AlarmState.UNACKNOWLEDGED
+
+
+PENDING_ON, PENDING_OFF = DelayTimer(False, 5, 1), DelayTimer(True, 5, 1)
+
+
+@pytest.mark.parametrize(
+    ("held", "timers", "expected"),
+    [
+        (None, [(INACTIVE, INACTIVE)], None),
+        (None, [(PENDING_ON, INACTIVE)], 1),
+        (1, [(ON, PENDING_ON)], 2),
+        (1, [(PENDING_OFF, INACTIVE)], None),
+        (2, [(ON, PENDING_OFF)], 1),
+        (2, [(PENDING_OFF, PENDING_OFF)], None),
+        (2, [(ON, ON), (ON, PENDING_OFF)], 2),
+        (1, [(ON, INACTIVE), (PENDING_ON, INACTIVE)], 1),
+    ],
+)
+def test_the_next_level_is_that_after_all_delays_that_are_running(held, timers, expected):
+    assert next_level(held, timers) == expected

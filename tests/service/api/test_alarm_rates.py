@@ -2,15 +2,13 @@
 
 import asyncio
 from dataclasses import replace
-from typing import Any, get_args
+from typing import Any
 
 import pytest
 
-from core.alarms.alarm import AlarmChange, AlarmState
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
-from service.api.routes.alarm_models import AlarmChangeName, AlarmStateName
 
 RATES = "/api/v1/alarms/rates"
 LINK = "U1:link:link_lost"
@@ -29,11 +27,6 @@ async def lose_link(service: Any, n_times: int, every_s: float) -> None:
         service.alarms.link("U1", True)
         service.clock.step(round((every_s - 11.0) * SECOND))
     await asyncio.wait_for(service.recorder.stored(), 30)
-
-
-def test_the_words_of_the_api_are_those_of_alarms():
-    assert set(get_args(AlarmChangeName)) == {change.value for change in AlarmChange}
-    assert set(get_args(AlarmStateName)) == {state.value for state in AlarmState}
 
 
 async def test_a_link_that_comes_and_goes_is_counted_and_called_chattering(service):

@@ -338,3 +338,48 @@ async def test_what_waits_for_somebody_who_has_left_the_plant_file_is_not_forgot
         "time": "2033-05-18T03:33:20.000Z",
     }
     assert desk["last_delivered"] == "2065-01-24T05:20:00.000Z"
+
+
+@pytest.mark.parametrize(
+    ("within", "outside"),
+    [
+        ({"state": "full_load"}, {"state": "part_load"}),
+        ({"eccentricity_min": 0.35, "eccentricity_max": 0.4}, {"eccentricity_min": 0.4}),
+        ({"oil_temperature_max": 47.5}, {"oil_temperature_min": 47.5}),
+        ({"attitude_min": 47.0}, {"attitude_max": 46.9}),
+    ],
+)
+async def test_the_alarm_list_is_filtered_by_the_condition_at_raising(
+    service, probes, within, outside
+):
+    place = {"eccentricity_ratio": 0.37, "attitude_angle_deg": 47.0, "oil_temperature_c": 46.2}
+    settled = BearingCondition(OperatingState.FULL_LOAD, True, None)
+    probes.send(3, Reason.SENSOR_FAILURE, [replace(assessment(**place), condition=settled)])
+
+    found, none = [await service.json(ALARMS, **each) for each in (within, outside)]
+
+    assert [alarm["id"] for alarm in found["alarms"]] == [PROBE]
+    assert found["unjudged"] == []  # was never raised
+    assert none["alarms"] == []
+    await service.problem(ALARMS, 422, eccentricity_min=0.4, eccentricity_max=0.3)
+
+
+async def test_events_are_filtered_by_subject_and_level(service, probes):
+    probes.send(2, Reason.SENSOR_FAILURE)
+    await probes.stored()
+
+    events = f"{ALARMS}/events"
+    [event] = (await service.json(events, subject="ujb_shaft_x", level="alert"))["events"]
+    assert (event["alarm"], event["directions"]) == (PROBE, "")
+    assert (await service.json(events, subject="LJB"))["events"] == []
+    assert (await service.json(events, level="danger"))["events"] == []
+
+
+async def test_an_alarm_says_what_it_waits_for(service, probes):
+    probes.send(2, Reason.SENSOR_FAILURE)
+    [active] = (await service.json(ALARMS))["alarms"]
+    probes.send(2)  # well again, for less than the off-delay
+    [returning] = (await service.json(ALARMS))["alarms"]
+
+    assert (active["waits_for"], returning["waits_for"]) == (None, "normal")
+    assert returning["is_active"]

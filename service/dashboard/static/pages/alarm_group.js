@@ -9,7 +9,7 @@ import { may } from "../session.js";
 export function groupAcknowledge(again) {
   let wanted = [];
   const failure = element("span", { class: "action-failure", role: "alert" });
-  const button = operation("Acknowledge all", [], async (name) => {
+  const button = operation("Acknowledge", [], async (name) => {
     const refused = [];
     const alarms = wanted; // the occurrences that are on the screen now
     for (const alarm of alarms) {

@@ -62,8 +62,7 @@ export function overviewPage(main) {
       });
     },
     close() {
-      alarms.close();
-      unseen.close();
+      [alarms, unseen].forEach((one) => one.close());
       trends.stop();
     },
   };

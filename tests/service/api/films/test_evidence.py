@@ -103,6 +103,7 @@ async def require_a_report_of_everything_without_a_script(service: Any) -> None:
     assert answer.headers["content-type"] == "text/html; charset=utf-8"
     assert "default-src 'none'" in answer.headers["content-security-policy"]
     page = Tags(answer.text)
+    assert 'href="/#/alarms"' in answer.text
     assert not page.tags & {"script", "img", "iframe", "link", "object", "form"}
     assert not {name for name in page.attributes if name.startswith("on")}
     for words in (
