@@ -68,11 +68,11 @@ function marks(name, found, wordsOf, look) {
 }
 
 /** Traces of the stiffness that the baseline expects, and of the limits of its change; none for another quantity. */
-export function expectedTraces({ film, readings }, name, label, colour, hasLimits = true) {
+export function expectedTraces({ film, readings }, name, colour, hasLimits = true) {
   const series = readings?.[DIRECTIONS[name]];
   const expected = readings?.time.map((timeS, n) => [timeS, series ? expectedGn(series, n) : null]) ?? [];
   if (!expected.some(([, gn]) => gn !== null)) return [];
-  const traces = [level(`${label} expected`, [expected], { color: colour, dash: "longdash" })];
+  const traces = [level("expected", [expected], { color: colour, dash: "longdash" })];
   if (!hasLimits) return traces;
   const { alert, danger } = film.limits;
   traces.push(level("alert limit", [-alert, alert].map((ln) => scaled(expected, ln)), { color: DOUBT_COLOUR, dash: "dash" }));

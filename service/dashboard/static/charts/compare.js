@@ -31,9 +31,9 @@ export function compareTraces(lines, colour) {
 export function besideTraces(lines, found) {
   const marks = found.flatMap(({ bearing, beside }) => markTraces(beside, found.length > 1 ? `${bearing.join(" ")}: ` : ""));
   const hasLimits = lines.length <= MOST_WITH_LIMITS;
-  const levels = lines.flatMap(({ trends, name, label, number, scale }) => {
+  const levels = lines.flatMap(({ trends, name, number, scale }) => {
     const { beside } = found.find((one) => one.trends === trends);
-    return expectedTraces(beside, name, label, colourOf(number), hasLimits).map((trace) => ({ ...trace, yaxis: scale }));
+    return expectedTraces(beside, name, colourOf(number), hasLimits).map((trace) => ({ ...trace, yaxis: scale }));
   });
   return namedOnce([...levels, ...marks]);
 }

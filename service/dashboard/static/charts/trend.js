@@ -155,11 +155,14 @@ export function trendLayout(trends, title, revision, valueRange) {
   });
 }
 
-/** Of an axis that few good values set, the share at each end that does not. */
+/** Where hardly any value is good, the share at each end that does not set the axis. */
 const TRIMMED = 0.05;
 
+/** Uncertain values set the axis up to this share of a value beyond the good ones, or up to their spread. */
+const REACH = 0.25;
+
 /**
- * From the smallest to the largest value that sets the axis: uncertain ones do so only where hardly any is good.
+ * From the smallest to the largest value that sets the axis: good ones, and uncertain ones that are not far from these.
  *
  * `beside` are traces drawn with the curves that must be seen, too; `fromZero` begins at zero.
  */
@@ -169,7 +172,11 @@ export function valueRange(allPieces, beside = [], fromZero = false) {
   const isFew = good.length < TRIMMED * all.length;
   const values = (isFew ? all : good).flatMap(({ minimum, maximum }) => [minimum, maximum]).sort((a, b) => a - b);
   const n = isFew ? Math.floor(TRIMMED * values.length) : 0;
-  const shown = [...beside.filter(({ name }) => name !== "danger limit").flatMap(({ y }) => y.filter((gn) => gn !== null)), values[n], values.at(-1 - n)];
+  const ends = [values[n], values.at(-1 - n)];
+  const reach = Math.max(ends[1] - ends[0], REACH * Math.max(...ends.map(Math.abs)));
+  const near = all.map(({ mean }) => mean).filter((mean) => mean > ends[0] - reach && mean < ends[1] + reach);
+  const levels = beside.filter(({ name }) => name !== "danger limit").flatMap(({ y }) => y.filter((gn) => gn !== null));
+  const shown = [...ends, ...near, ...levels];
   const [low, high] = [shown.reduce((a, b) => Math.min(a, b)), shown.reduce((a, b) => Math.max(a, b))];
   const margin = 0.08 * (high - low) || 0.05 * Math.abs(high) || 1;
   return [fromZero ? Math.min(low, 0) : low - margin, high + margin];

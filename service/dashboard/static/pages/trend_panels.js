@@ -7,6 +7,7 @@ import { panel } from "../charts/panel.js";
 import { X_COLOUR, Y_COLOUR } from "../charts/style.js";
 import { doubtTrace, nOutside, piecesOf, simulatedSentence, trendCaption, trendLayout, trendTraces, valueRange } from "../charts/trend.js";
 import { element, setAttribute } from "../dom.js";
+import { formatTime } from "../format.js";
 import { choice } from "../parts/choice.js";
 import { readingOf } from "../parts/reading.js";
 import { poll } from "../poll.js";
@@ -53,6 +54,7 @@ export function trendPanels(path) {
   let view = null;
   let latest = null;
   let trends = null;
+  let beside = null;
   const refresh = () => {
     aim();
     questions.again();
@@ -80,12 +82,16 @@ export function trendPanels(path) {
       const lines = [stiffnessLines(which.value()), amplitudeLines(order.value())];
       const endMs = Math.ceil(view.serviceTimeMs / WHOLE_MS) * WHOLE_MS;
       const range = [endMs - span.value() * 1000, endMs];
-      const [found, beside] = await Promise.all([askTrends(path, lines.flat(), range, signal), askBeside([path[1], path[3]], lines[0].map(([name]) => name), range, signal)]);
-      trends = found;
-      const asked = { trends, beside, refreshS: view.refreshS, span, scale: scale.value(), latest };
+      const names = lines[0].map(([name]) => name);
+      const key = [...names, ...range].join();
+      if (beside?.key !== key) beside = { key, answer: askBeside([path[1], path[3]], names, range, signal) }; // once a minute
+      const [newest, marked] = await Promise.all([askTrends(path, lines.flat(), range, signal), beside.answer]);
+      trends = newest;
+      const asked = { trends, beside: marked, view, span, scale: scale.value(), latest };
       await showTrends(stiffness, asked, lines[0], "Film stiffness, GN/m");
       await showTrends(amplitude, asked, lines[1], `Vibration amplitude, ${amplitudeUnit()}`);
     } catch (failure) {
+      beside = null;
       if (signal.aborted) return;
       const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
       for (const box of boxes) box.trouble(words);
@@ -119,8 +125,8 @@ function askTrends(path, lines, [startMs, endMs], signal) {
   return ask([...path, "trends"], query, signal);
 }
 
-async function showTrends(box, { trends, beside, refreshS, span, scale, latest }, lines, title) {
-  const all = lines.map(([name]) => piecesOf(trends, name, refreshS));
+async function showTrends(box, { trends, beside, view, span, scale, latest }, lines, title) {
+  const all = lines.map(([name]) => piecesOf(trends, name, view.refreshS));
   if (all.flat().length === 0) {
     const { value, reason } = readingOf(latest, lines[0][0]);
     const now = value === null ? `Now: ${reasonWords(reason)}.` : "The first will appear shortly.";
@@ -130,10 +136,11 @@ async function showTrends(box, { trends, beside, refreshS, span, scale, latest }
   const traces = lines.flatMap(([name, label, letter, changes], index) =>
     trendTraces(all[index], name, label, letter, changes),
   );
-  const levels = lines.flatMap(([name, label, letter]) => expectedTraces(beside, name, label, letter === "x" ? X_COLOUR : Y_COLOUR));
+  const levels = lines.flatMap(([name, , letter]) => expectedTraces(beside, name, letter === "x" ? X_COLOUR : Y_COLOUR));
   const added = namedOnce([...levels, ...markTraces(beside)]);
   const range = valueRange(all, levels, scale === "tozero");
   const layout = trendLayout(trends, title, `${span.value()} ${scale} ${title}`, range);
+  if (view.origin === "replay") layout.xaxis.range[0] = formatTime(1000 * all.flat(2).reduce((least, { timeS }) => Math.min(least, timeS), Infinity));
   const words = trendCaption(all, nOutside(all, range)) + simulatedSentence(trends) + besideWords(added, beside.film);
   await box.show([...traces, doubtTrace(all), ...added], layout, words);
 }
