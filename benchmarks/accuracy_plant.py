@@ -31,6 +31,7 @@ from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCa
 from core.samples.ring import Ring
 from core.spectra.cross_spectrum import CrossSpectrum, average
 from core.spectra.segments import SegmentTransform
+from core.units import rad_s_from_rpm
 
 RATE_HZ = 600.0
 START_NS = 1_790_000_000_000_000_000
@@ -108,6 +109,8 @@ class BearingSpectra:
         At the lines of the segments.
     orders
         At exactly 1× and the vortex.
+    film
+        Constant coefficients of the film at the running speed.
     n_integrations
         From the measurands of v_x and v_y to displacement.
     order1_um_pk
@@ -252,7 +255,7 @@ def _of_bearing(
     return BearingSpectra(
         bins=average(transform.frequency_hz, bins, usable),
         orders=average(orders_hz.mean(axis=0), orders, usable),
-        film=scenario.bearings[bearing.id].film,
+        film=scenario.bearings[bearing.id].film.at(rad_s_from_rpm(scenario.speed_rpm)),
         bracket=BracketDynamics(bearing.bracket_stiffness_n_per_m, model.mass_kg),
         turn_hz=(float(orders_hz[:, 0].min()), float(orders_hz[:, 0].max())),
         n_integrations=(

@@ -2,14 +2,30 @@
 
 import math
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from core.arrays import FloatArray
+from core.arrays import ComplexArray, FloatArray
 
 DAMPING_OVER_STIFFNESS_S = 0.0125
 """Factor α in s of proportional damping c = α k (Brito et al., section 2.2.1, after Cardinali)."""
+
+
+class TiltLag(NamedTuple):
+    """Part of a film's force that depends on whirl frequency, because a pad tilts with a lag.
+
+    With lag τ, it is ``n_per_m (iωτ)² / (1 + iωτ)`` along the direction of the pad's pivot.
+    """
+
+    angle_rad: float
+    n_per_m: float
+    lag_s: float
+
+    @property
+    def along(self) -> FloatArray:
+        """Unit vector towards the pivot, (2,)."""
+        return np.array([math.cos(self.angle_rad), math.sin(self.angle_rad)])
 
 
 @dataclass(frozen=True)
@@ -17,7 +33,7 @@ class Film:
     """Stiffness and damping of one oil film, linear about the mean position of the shaft.
 
     The force on the bracket is ``k u + c du/dt`` with u the displacement of the shaft relative to
-    the bracket (Brito et al., equation 1).
+    the bracket (Brito et al., equation 1). With `lags` these are the coefficients at slow whirl.
     """
 
     k_xx_n_per_m: float
@@ -28,6 +44,7 @@ class Film:
     c_xy_n_s_per_m: float
     c_yx_n_s_per_m: float
     c_yy_n_s_per_m: float
+    lags: tuple[TiltLag, ...] = ()
 
     @classmethod
     def proportional(
@@ -67,15 +84,26 @@ class Film:
             [[self.c_xx_n_s_per_m, self.c_xy_n_s_per_m], [self.c_yx_n_s_per_m, self.c_yy_n_s_per_m]]
         )
 
+    def dynamic_stiffness_n_per_m(self, frequency_rad_s: float) -> ComplexArray:
+        """Return the force per displacement ``K + iωC`` at a whirl frequency, (2, 2)."""
+        total = self.stiffness_n_per_m + 1j * frequency_rad_s * self.damping_n_s_per_m
+        for lag in self.lags:
+            turn = 1j * frequency_rad_s * lag.lag_s
+            total += lag.n_per_m * turn**2 / (1.0 + turn) * np.outer(lag.along, lag.along)
+        return total
+
+    def at(self, frequency_rad_s: float) -> "Film":
+        """Return the film of constant coefficients with the same force at a whirl frequency."""
+        whole = self.dynamic_stiffness_n_per_m(frequency_rad_s)
+        return Film(*np.concatenate([whole.real, whole.imag / frequency_rad_s], None).tolist())
+
     def effective_stiffness_n_per_m(self, frequency_rad_s: float) -> tuple[float, float]:
         """Return the magnitudes ``|k_xx + iωc_xx|`` and ``|k_yy + iωc_yy|``.
 
         In N/m. Equation (5) of Brito et al. estimates them if cross-coupling is negligible.
         """
-        return (
-            math.hypot(self.k_xx_n_per_m, frequency_rad_s * self.c_xx_n_s_per_m),
-            math.hypot(self.k_yy_n_per_m, frequency_rad_s * self.c_yy_n_s_per_m),
-        )
+        x, y = abs(np.diag(self.dynamic_stiffness_n_per_m(frequency_rad_s))).tolist()
+        return x, y
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +184,11 @@ class PadRing:
         ValueError
             If the shaft touches a pad.
         """
-        strength = 2.0 * self._strength(viscosity_pa_s, speed_rpm)  # dF/dh = 2 F/h
+        # force times the square of the film thickness is constant, dF/dh = 2 F/h; the mean of cos²
+        # around the shaft is a half
+        oil = viscosity_pa_s / self.viscosity_pa_s * (speed_rpm / self.speed_rpm)
+        pad_n_per_um = 1e-6 * self.stiffness_n_per_m * 2.0 / self.n_pads
+        strength = pad_n_per_um * self.clearance_um**3 * oil
         k_xx, k_xy, k_yy = (np.zeros(centre_um.shape[1]) for _ in range(3))
         for clearance_um, angle in zip(pad_clearance_um, self.pad_angles_rad, strict=True):
             cos, sin = math.cos(angle), math.sin(angle)
@@ -167,30 +199,6 @@ class PadRing:
             k_yy += sin * sin * cubed
         strength *= 1e6  # per µm to per m
         return FilmColumns(strength * k_xx, strength * k_xy, strength * k_yy)
-
-    def force_n(
-        self,
-        pad_clearance_um: FloatArray,
-        centre_um: FloatArray,
-        viscosity_pa_s: FloatArray,
-        speed_rpm: FloatArray,
-    ) -> FloatArray:
-        """Return the mean force (x, y) of the films on the pads, (2, n); parameters as in `film`.
-
-        This force is the static load that holds the shaft in this position.
-        """
-        total = np.zeros((2, centre_um.shape[1]))
-        for clearance_um, angle in zip(pad_clearance_um, self.pad_angles_rad, strict=True):
-            cos, sin = math.cos(angle), math.sin(angle)
-            squared = _thickness_um(clearance_um, centre_um, cos, sin) ** -2.0
-            total += np.outer((cos, sin), squared)
-        return self._strength(viscosity_pa_s, speed_rpm) * total
-
-    def _strength(self, viscosity_pa_s: FloatArray, speed_rpm: FloatArray) -> FloatArray:
-        """Return the force of one pad times the square of its film thickness, in N µm²."""
-        pad_n_per_um = 1e-6 * self.stiffness_n_per_m * 2.0 / self.n_pads  # mean of cos² is a half
-        oil = viscosity_pa_s / self.viscosity_pa_s * (speed_rpm / self.speed_rpm)
-        return np.asarray(0.5 * pad_n_per_um * self.clearance_um**3 * oil)
 
 
 def _thickness_um(

@@ -8,13 +8,14 @@ import numpy as np
 
 from acquisition.errors import ConfigError
 from acquisition.simulated.plant.excitation import force_planes
-from acquisition.simulated.plant.films import Film
+from acquisition.simulated.plant.films import Film, TiltLag
 from acquisition.simulated.plant.probes import output_map
 from acquisition.simulated.plant.rotor import force_map, rotor_matrices
 from acquisition.simulated.plant.rotor_steps import LiftedRotor, discretize, lift, simulate
 from acquisition.simulated.plant.scenario import Scenario
 from core.arrays import FloatArray
 from core.machine.unit import Unit
+from core.units import rad_s_from_rpm
 
 LIFTED_STEPS = 32
 
@@ -72,16 +73,17 @@ class MovingRotor:
 
 
 def _coefficients(scenario: Scenario) -> FloatArray:
-    """Return the coefficients of all films and brackets, and the speed, (n_bearings + 1, 5)."""
-    return np.array([*_rows(scenario), 5 * (scenario.speed_rpm,)])
+    """Return the coefficients of all films and brackets, and the speed, (n_bearings + 1, 9)."""
+    return np.array([*_rows(scenario), 9 * (scenario.speed_rpm,)])
 
 
 def _rows(scenario: Scenario) -> Iterator[tuple[float, ...]]:
     for bearing in scenario.bearings.values():
-        film = bearing.film
+        film, omega = bearing.film, rad_s_from_rpm(scenario.speed_rpm)
         k_n_per_m = max(abs(film.k_xx_n_per_m), abs(film.k_yy_n_per_m))
         yield (
-            *(film.k_xx_n_per_m, film.k_xy_n_per_m, film.k_yx_n_per_m, film.k_yy_n_per_m),
+            *film.stiffness_n_per_m.ravel().tolist(),
+            *(omega * film.damping_n_s_per_m).ravel().tolist(),
             k_n_per_m * bearing.bracket_stiffness_factor,
         )
 
@@ -111,10 +113,14 @@ def _between(start: Scenario, stop: Scenario, share: float) -> Scenario:
 
 
 def _film_between(start: Film, stop: Film, share: float) -> Film:
-    mixed = (
-        (1.0 - share) * getattr(start, f.name) + share * getattr(stop, f.name) for f in fields(Film)
-    )
-    return Film(*mixed)
+    """Return a film between two, which have the same pads."""
+    mixed = {
+        f.name: (1.0 - share) * np.array(getattr(start, f.name))
+        + share * np.array(getattr(stop, f.name))
+        for f in fields(Film)
+    }
+    lags = tuple(TiltLag(*lag) for lag in mixed.pop("lags").tolist())
+    return Film(**{name: float(value) for name, value in mixed.items()}, lags=lags)
 
 
 def _lifted_rotor(machine: Unit, scenario: Scenario) -> LiftedRotor:

@@ -162,18 +162,18 @@ def output_map(machine: Unit, parameters: RotorParameters, matrices: RotorMatric
 def _motion_maps(
     parameters: RotorParameters, matrices: RotorMatrices
 ) -> dict[tuple[str, Measurand], FloatArray]:
-    """Return the matrices from the state to the signals of Table 3 (Brito et al.), (6, 20) each."""
+    """Return the matrices from the state to the signals of Brito et al., Table 3, (6, n_states)."""
     shaft, bracket = relative_motion(parameters), bracket_motion(parameters)
-    still = np.zeros_like(shaft)
-    shaft_um = 1e6 * np.hstack([shaft, still])
+    still, lags = np.zeros_like(shaft), np.zeros((len(shaft), matrices.lag_s.size))
+    shaft_um = 1e6 * np.hstack([shaft, still, lags])
     return {
         (SHAFT, Measurand.GAP_UM): shaft_um,
         (SHAFT, Measurand.DISPLACEMENT_UM): shaft_um,
-        (BEARING, Measurand.DISPLACEMENT_UM): 1e6 * np.hstack([bracket, still]),
-        (BEARING, Measurand.VELOCITY_MM_S): 1e3 * np.hstack([still, bracket]),
+        (BEARING, Measurand.DISPLACEMENT_UM): 1e6 * np.hstack([bracket, still, lags]),
+        (BEARING, Measurand.VELOCITY_MM_S): 1e3 * np.hstack([still, bracket, lags]),
         # No force acts on a bracket directly, so its acceleration follows from the state alone.
         (BEARING, Measurand.ACCELERATION_M_S2): bracket
-        @ state_matrix(matrices)[parameters.n_coordinates :],
+        @ state_matrix(matrices)[parameters.n_coordinates : 2 * parameters.n_coordinates],
     }
 
 

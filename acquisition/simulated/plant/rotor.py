@@ -103,7 +103,14 @@ def unbalance_force_n(grade_mm_s: float, speed_rpm: float) -> float:
 class RotorMatrices:
     """Matrices of ``M x'' + (C + Ω G) x' + K x = F`` (Brito et al., eq. 6), (10, 10) in SI units.
 
-    `gyroscopic` is G without the factor Ω.
+    `gyroscopic` is G without the factor Ω. `stiffness` and `damping` are those of pads that do not
+    tilt with the whirl. Each `TiltLag` of a film adds ``R w`` to the forces along its row of
+    `lag_map`, where ``τ w' + w`` is the motion along that row.
+
+    Parameters
+    ----------
+    lag_map, lag_n_per_m, lag_s
+        (n_lags, 10) maps from coordinates to motion towards pivots, (n_lags,) R and (n_lags,) τ.
     """
 
     mass: FloatArray
@@ -111,6 +118,9 @@ class RotorMatrices:
     gyroscopic: FloatArray
     stiffness: FloatArray
     speed_rad_s: float
+    lag_map: FloatArray
+    lag_n_per_m: FloatArray
+    lag_s: FloatArray
 
 
 def rotor_matrices(
@@ -130,13 +140,27 @@ def rotor_matrices(
     """
     ordered = [films[bracket.bearing] for bracket in parameters.brackets]
     relative = relative_motion(parameters)
+    lags = [
+        (lag.along @ relative[2 * row : 2 * row + 2], lag.n_per_m, lag.lag_s)
+        for row, film in enumerate(ordered)
+        for lag in film.lags
+    ]
+    lag_map = np.array([row for row, _, _ in lags]).reshape(-1, parameters.n_coordinates)
+    lag_n_per_m, lag_s = np.array([sizes for _, *sizes in lags]).reshape(-1, 2).T
+    damping = relative.T @ _block_diagonal([f.damping_n_s_per_m for f in ordered]) @ relative
+    films_n_per_m = relative.T @ _block_diagonal([f.stiffness_n_per_m for f in ordered]) @ relative
     return RotorMatrices(
         mass=_mass(parameters),
-        damping=relative.T @ _block_diagonal([f.damping_n_s_per_m for f in ordered]) @ relative,
+        # (iωτ)² / (1 + iωτ) = 1/(1 + iωτ) − 1 + iωτ
+        damping=damping + (lag_map.T * lag_n_per_m * lag_s) @ lag_map,
         gyroscopic=_gyroscopic(parameters),
         stiffness=_structure_stiffness(parameters)
-        + relative.T @ _block_diagonal([f.stiffness_n_per_m for f in ordered]) @ relative,
+        + films_n_per_m
+        - (lag_map.T * lag_n_per_m) @ lag_map,
         speed_rad_s=rad_s_from_rpm(speed_rpm),
+        lag_map=lag_map,
+        lag_n_per_m=lag_n_per_m,
+        lag_s=lag_s,
     )
 
 
@@ -176,6 +200,8 @@ def receptance(matrices: RotorMatrices, frequency_hz: float) -> ComplexArray:
     omega_rad_s = 2.0 * math.pi * frequency_hz
     damping = matrices.damping + matrices.speed_rad_s * matrices.gyroscopic
     dynamic = matrices.stiffness - omega_rad_s**2 * matrices.mass + 1j * omega_rad_s * damping
+    lagging = matrices.lag_n_per_m / (1.0 + 1j * omega_rad_s * matrices.lag_s)
+    dynamic += (matrices.lag_map.T * lagging) @ matrices.lag_map
     return np.linalg.inv(dynamic).astype(np.complex128, copy=False)
 
 

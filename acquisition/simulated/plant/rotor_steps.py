@@ -13,7 +13,7 @@ from core.arrays import FloatArray
 class DiscreteRotor:
     """Discrete state space: ``s[n+1] = A s[n] + B f[n]``, ``y[n] = C s[n] + D f[n]``.
 
-    Forces are linear between samples. The state s is (x, dx/dt) minus a multiple of the force.
+    Forces are linear between samples. The state s is (x, dx/dt, w) minus a multiple of the force.
 
     Parameters
     ----------
@@ -29,16 +29,22 @@ class DiscreteRotor:
 
 
 def state_matrix(matrices: RotorMatrices) -> FloatArray:
-    """Return the continuous state matrix of (x, dx/dt), (20, 20) (Brito et al., equation 7)."""
+    """Return the continuous state matrix of (x, dx/dt, w) (Brito et al., equation 7).
+
+    It is (20 + n_lags, 20 + n_lags); w are the lagging motions of `RotorMatrices`.
+    """
     damping = matrices.damping + matrices.speed_rad_s * matrices.gyroscopic
-    n = matrices.mass.shape[0]
+    lagging = -matrices.lag_map.T * matrices.lag_n_per_m
+    (n_lags, n), rate = matrices.lag_map.shape, 1.0 / matrices.lag_s[:, np.newaxis]
     return np.block(
         [
-            [np.zeros((n, n)), np.eye(n)],
+            [np.zeros((n, n)), np.eye(n), np.zeros((n, n_lags))],
             [
                 -np.linalg.solve(matrices.mass, matrices.stiffness),
                 -np.linalg.solve(matrices.mass, damping),
+                np.linalg.solve(matrices.mass, lagging),
             ],
+            [rate * matrices.lag_map, np.zeros((n_lags, n)), -rate * np.eye(n_lags)],
         ]
     )
 
@@ -60,7 +66,7 @@ def discretize(
     force_map
         (10, n_forces) generalized force per unit of each force.
     output_map
-        (n_outputs, 20) map from displacement and velocity to the outputs.
+        (n_outputs, n_states) map from the state to the outputs.
 
     Raises
     ------
@@ -80,14 +86,12 @@ def _step(
     matrices: RotorMatrices, force_map: FloatArray, rate_hz: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the transition matrix and the step responses to a constant and to a ramp force."""
-    n_states, n_forces = 2 * matrices.mass.shape[0], force_map.shape[1]
+    (n, n_forces), n_states = force_map.shape, 2 * force_map.shape[0] + matrices.lag_s.size
     held, ramped = n_states + n_forces, n_states + 2 * n_forces
     # the exponential of A bordered by B and integrators contains its integrals (Van Loan, 1978)
     bordered = np.zeros((ramped, ramped))
     bordered[:n_states, :n_states] = state_matrix(matrices) / rate_hz
-    bordered[n_states // 2 : n_states, n_states:held] = (
-        np.linalg.solve(matrices.mass, force_map) / rate_hz
-    )
+    bordered[n : 2 * n, n_states:held] = np.linalg.solve(matrices.mass, force_map) / rate_hz
     bordered[n_states:held, held:] = np.eye(n_forces)
     step = scipy.linalg.expm(bordered)[:n_states]
     return step[:, :n_states], step[:, n_states:held], step[:, held:]

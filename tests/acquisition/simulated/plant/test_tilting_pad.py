@@ -71,18 +71,22 @@ def test_many_pads_come_to_the_integral_around_the_shaft(ratio: float) -> None:
     assert pushed.k_yy_n_per_m[0] / 6.67e9 == pytest.approx(across, rel=1e-6)
 
 
-def test_stiffness_is_how_the_force_grows() -> None:
-    pads_um: FloatArray = 200.0 + 20.0 * np.random.default_rng(5).standard_normal((16, 1))
-    centre_um, step_um = np.array([[40.0], [-70.0]]), 1e-3
-    oil = np.array([0.03]), np.array([90.0])
+def test_stiffness_of_uneven_pads_is_how_their_force_grows() -> None:
+    pads_um: FloatArray = 200.0 + 20.0 * np.random.default_rng(5).standard_normal(16)
+    angles, step_um = RING.pad_angles_rad, 1e-3
+    towards = np.array([np.cos(angles), np.sin(angles)])
 
     def force_n(dx_um: float, dy_um: float) -> FloatArray:
-        return RING.force_n(pads_um, centre_um + np.array([[dx_um], [dy_um]]), *oil)[:, 0]
+        gaps_um = pads_um - np.array([40.0 + dx_um, -70.0 + dy_um]) @ towards
+        oil = 0.03 / 0.034 * 90.0 / 92.3
+        # one of 16 pads has an eighth of the centred stiffness at 200 µm; force as 1 / h²
+        return np.asarray(towards @ (0.5 * 6.67e3 / 8.0 * 200.0**3 * oil / gaps_um**2))
 
     by_x = (force_n(step_um, 0.0) - force_n(-step_um, 0.0)) / (2e-6 * step_um)
     by_y = (force_n(0.0, step_um) - force_n(0.0, -step_um)) / (2e-6 * step_um)
 
-    found = RING.film(pads_um, centre_um, *oil).at(0)
+    centre_um, oil = np.array([[40.0], [-70.0]]), (np.array([0.03]), np.array([90.0]))
+    found = RING.film(pads_um[:, np.newaxis], centre_um, *oil).at(0)
     np.testing.assert_allclose(np.column_stack([by_x, by_y]), found.stiffness_n_per_m, rtol=1e-6)
 
 
