@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from core.machine.unit import Estimator
-from core.quality import Reading, Reason, missing, worst
+from core.quality import Reading, Reason, missing, uncertain, worst
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,8 @@ def preferred_stiffness(
 
     Values with few segments are not used: in a single segment, any noise is coherent. If an earlier
     estimator is not good for one of `MODEL_DOUBTS`, the chosen stiffness gets the same quality,
-    because the cause may affect both. `axes` is "xx" or "yy".
+    because the cause may affect both. A value beside estimators with reason `polarity` is
+    uncertain for this reason, also if its estimator uses amplitudes only. `axes` is "xx" or "yy".
 
     Returns
     -------
@@ -107,7 +108,9 @@ def preferred_stiffness(
     if numbers:
         reading, estimator = min(numbers, key=lambda choice: choice[0].quality.level)
         before = itertools.takewhile(lambda choice: choice[1] is not estimator, numbers)
-        doubts = (r.quality for r, _ in before if r.quality.reason in MODEL_DOUBTS)
+        doubts = [r.quality for r, _ in before if r.quality.reason in MODEL_DOUBTS]
+        if any(r.quality.reason is Reason.POLARITY for r, _ in found):
+            doubts.append(uncertain(Reason.POLARITY))
         return replace(reading, quality=worst((reading.quality, *doubts))), estimator
     return missing(found[0][0].quality.reason), None
 

@@ -31,7 +31,7 @@ class Picture:
 
 PAGES = (
     Picture("overview", "#/", "[data-unit]"),
-    Picture("unit", UNIT, ".film-line"),
+    Picture("unit", UNIT, ".film-brief"),
     Picture("bearing", BEARING, "[data-chart=spectrum] path.js-line"),
     Picture("film", f"{BEARING}/film", "[data-chart=baseline-map] .heatmaplayer"),
     Picture("alarms", "#/alarms", "[data-alarm]"),

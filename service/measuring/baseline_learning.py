@@ -10,7 +10,7 @@ from core.baseline.agreement import far_readings, learning_drift, mean_differenc
 from core.baseline.baseline import BearingBaseline, Origin
 from core.baseline.history import StiffnessHistory
 from core.baseline.learning import learn
-from core.change.settings import FilmRules
+from core.change.settings import FilmRules, percent_of
 from core.change.shaft_response import ShaftResponse, learn_response
 from core.units import DAY_NS
 from service.live.commands import FilmPlace
@@ -144,10 +144,10 @@ class Learner:
         first = self._store.baseline(origin.unit, origin.bearing, versions.first_accepted)
         if first is None or first.origin.estimator != origin.estimator:
             return "learned with another estimator than the first accepted version"
-        worst = max(mean_difference(first, baseline).values(), key=abs, default=0.0)
-        if abs(worst) < self._settings.change.alert_change:
+        worst = percent_of(max(mean_difference(first, baseline).values(), key=abs, default=0.0))
+        if abs(worst) < 100.0 * self._settings.change.alert_change:
             return None
-        return f"{100 * worst:+.1f} % from version {versions.first_accepted} under like conditions"
+        return f"{worst:+.1f} % from version {versions.first_accepted} under like conditions"
 
 
 def drifted(
@@ -158,13 +158,15 @@ def drifted(
 ) -> str | None:
     """Describe a stiffness change during learning; None if below ``limit`` or not significant.
 
-    A significant change may be a fault of the bearing. ``limit`` is a change of ln(stiffness).
+    A significant change may be a fault of the bearing. ``limit`` is a fraction of the stiffness.
     """
     for quantity in baseline.quantities:
         found = learning_drift(history, is_healthy, quantity)
-        if found and abs(found.change) >= max(limit, SURE * found.std):
+        if found is None or abs(found.change) < SURE * found.std:
+            continue
+        if abs(percent_of(found.change)) >= 100.0 * limit:
             return (
-                f"{quantity.direction} changed by {100 * found.change:+.1f} %"
+                f"{quantity.direction} changed by {percent_of(found.change):+.1f} %"
                 f" ± {200 * found.std:.1f} % under like conditions during learning"
             )
     return None

@@ -15,7 +15,7 @@ from core.machine.unit import Estimator, Unit
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import BY_NAME
 from core.monitor.monitor import UnitMonitor
-from core.quality import Level, Reason, bad, missing
+from core.quality import Level, Reason, bad, missing, uncertain
 from core.stiffness.estimators import ESTIMATORS, is_reversed
 from service.measuring.simulated_sources import scenario_of
 from service.settings.core_values import analysis_of, calibration_of, machine_of
@@ -130,6 +130,8 @@ def test_a_reversed_transducer_is_a_reason_and_equation_5_stays(plant: PlantFile
             preferred = assessment.readings[f"stiffness_{axes}_n_per_m"]
             assert preferred.value is not None
             assert preferred.value > 0.0
+            is_doubted = preferred.quality == uncertain(Reason.POLARITY)
+            assert is_doubted == (axes in wrong)
             assert (dynamic == missing(Reason.POLARITY)) == (axes in wrong)
             assert is_reversed(assessment.readings, axes) is (axes in wrong)
             chosen = str(assessment.estimators[axes])

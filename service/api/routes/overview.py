@@ -7,6 +7,7 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
 from core.quality import Level, Reading
+from core.stiffness.estimators import is_reversed
 from service.api.auth.declared import subject_router
 from service.api.context import Context
 from service.api.routes.alarm_models import AlarmCountModel
@@ -98,6 +99,10 @@ class TileModel(ResultModel):
 
     bad_reasons: Annotated[list[str], Field(examples=[["no_vortex"]])]
     """Distinct reasons of all readings of the bearing whose level is bad."""
+
+    doubtful_signs: Annotated[list[str], Field(examples=[["ujb_shaft_x", "ujb_bearing_x"]])]
+    """Channels of a direction in which stiffness or damping reads negative: the sign of one of them
+    is wrong."""
 
     film: FilmBriefModel
     """Summary of the film of the bearing."""
@@ -226,6 +231,12 @@ class Overview:
             result_model(current, bearing, readings),
             name=settings.name,
             bad_reasons=list(dict.fromkeys(quality.reason.value for quality in bad)),
+            doubtful_signs=[
+                getattr(settings, f"{place}_{axis}")
+                for axis in "xy"
+                if is_reversed(current.readings, axis * 2)
+                for place in ("shaft", "bearing")
+            ],
             film=film_brief(self._context, unit, bearing),
         )
 

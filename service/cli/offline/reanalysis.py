@@ -7,7 +7,7 @@ from acquisition.source import SampleSource
 from core.monitor.assessment import Assessment, AveragingWindow
 from core.monitor.monitor import UnitMonitor
 from core.monitor.refresh import Refresh
-from core.quality import Level
+from core.quality import Level, Reason
 from core.samples.calibration import UnitCalibration
 from service.api.routes.bearings import estimator_names, runout_names
 from service.api.values import QualityModel, reading_model, window_model
@@ -46,8 +46,11 @@ def stiffness_lines(assessment: Assessment) -> Iterator[str]:
             words += f" ± {(high - low) / 2.0 / N_PER_GN:.3f} GN/m (95 %)"
         else:
             words += " GN/m, uncertainty unknown"
+        reason = reading.quality.reason
+        signs = f"check the sign of shaft_{axis[0]} or bearing_{axis[0]}"
+        doubt = signs if reason is Reason.POLARITY else reason.value
         is_good = reading.quality.level is Level.GOOD
-        yield words if is_good else f"{words}, uncertain: {reading.quality.reason.value}"
+        yield words if is_good else f"{words}, uncertain: {doubt}"
 
 
 async def refreshes(

@@ -87,7 +87,7 @@ function agedUnit(unit, details, timeMs, current) {
 function agedLatest(tile, latest, timeMs, current) {
   const told = { ...tile, ...latest, isWhole: latest !== undefined };
   const shown = { ...told, age_s: ageAt(told.received, timeMs) };
-  return current ? shown : { ...shown, ...NOTHING_KNOWN, bad_reasons: [], readings: withheld(told.readings) };
+  return current ? shown : { ...shown, ...NOTHING_KNOWN, bad_reasons: [], doubtful_signs: [], readings: withheld(told.readings) };
 }
 
 const UNREAD = { verdict: "no_reading", change_percent: null, deviation_percent: null, stiffness_n_per_m: null, expected_n_per_m: null };

@@ -24,7 +24,7 @@ const REASONS = {
   dead: ["no signal", "A transducer’s output rests at zero while the machine turns; its cable or supply may be broken."],
   stuck: ["signal stuck", "A transducer’s output does not move while the machine turns."],
   swapped_axes: ["x and y swapped?", "The shaft seems to whirl against its rotation: two probes may be exchanged, or one may count the wrong way."],
-  polarity: ["polarity reversed", "The film’s stiffness or damping reads negative: a shaft or bearing transducer of this direction counts the wrong way. Check its type, its direction and its wiring."],
+  polarity: ["wrong sign?", "The film’s stiffness or damping reads negative: a shaft or bearing transducer of this direction counts the wrong way. Check its type, its direction and its wiring."],
   speed_implausible: ["speed implausible", "The measured speed does not agree with the vibration or with the rated speed."],
   non_stationary: ["operation changing", "Speed or load moved during the averaged window."],
   power_unknown: ["power unknown", "The power is not known, so that the load may have changed during the averaged window."],
@@ -56,8 +56,9 @@ export function lookOf(level, reason) {
  * The quality of a bearing as a whole, or of its first reading that is bad for no ordinary reason:
  * a broken sensor must not hide behind a quiet absence.
  */
-export function qualityOf({ quality, readings, bad_reasons: reasons }) {
+export function qualityOf({ quality, readings, bad_reasons: reasons, doubtful_signs: signs }) {
   if (quality.level === "bad" && lookOf(quality.level, quality.reason) === "bad") return quality;
+  if (signs?.length) return { level: "uncertain", reason: "polarity", words: `check the sign of ${signs.join(" or ")}` };
   const found = reasons?.map((reason) => ({ level: "bad", reason })) ?? Object.values(readings);
   return found.find(({ level, reason }) => lookOf(level, reason) === "bad") ?? quality;
 }

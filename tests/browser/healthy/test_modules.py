@@ -84,6 +84,48 @@ async def test_before_and_after_are_told_in_words_and_a_broken_chain_is_seen(pla
         assert found["look"] == look
 
 
+async def test_a_wrong_sign_is_never_good_and_names_the_channels(plant, page: Page) -> None:
+    await page.goto(plant.url + EMPTY)
+    good = {"quality": {"level": "good", "reason": "ok"}, "readings": {}, "bad_reasons": []}
+    for signs, level in (([], "good"), (["b_shaft_x", "b_bearing_x"], "uncertain")):
+        latest = good | {"doubtful_signs": signs}
+        found = await page.evaluate(CALL, ["words", "qualityOf", latest])
+        assert found["level"] == level
+    assert found["words"] == "check the sign of b_shaft_x or b_bearing_x"
+
+
+async def test_a_verdict_says_since_when_and_in_which_directions(plant, page: Page) -> None:
+    await page.goto(plant.url + EMPTY)
+    alarm = {"is_active": True, "raised": "2026-01-01T10:00:00Z", "value": -12.0}
+    alarm |= {"level": "danger", "kind": "stiffness_x", "condition_reason": "film_changed"}
+    other = alarm | {"kind": "stiffness_y", "level": "alert", "raised": "2026-01-02T10:00:00Z"}
+    stiffer = other | {"value": 5.0}
+    film = {"why_not": "no baseline", "x": None, "y": None}
+    for alarms, look, said in [
+        ([alarm, other], "danger", "film softer, both directions"),
+        ([alarm, stiffer], "danger", "film x softer, y stiffer"),
+        ([other], "alert", "film softer in y"),
+        ([other | {"is_active": False}], "quiet", "Not watched"),
+        (None, "quiet", "Not watched"),
+    ]:
+        found = await page.evaluate(CALL, ["verdict_words", "bearingVerdict", film, alarms])
+        assert found[0] == look
+        assert found[1].endswith(said), found
+    words = {"verdict": "danger", "level": "danger", "change_percent": -12.4}
+    words |= {"deviation_percent": -29.8, "stiffness_n_per_m": 0.231e9, "expected_n_per_m": 0.33e9}
+    confirmed = await page.evaluate(
+        CALL, ["verdict_words", "confirmedWords", {"x": words, "y": None}]
+    )
+    assert confirmed == "x expected 0.330 GN/m; confirmed −12 %"
+    now = await page.evaluate(CALL, ["film_words", "nowSentence", words])
+    assert now == "Now 0.231, expected 0.330 GN/m (−29.8 %)."
+    ahead = words | {"verdict": "normal", "level": None}
+    limits = {"alert_percent": 3.5, "danger_percent": 15.0}
+    film = {"why_not": None, "limits": limits, "x": ahead, "y": ahead}
+    found = await page.evaluate(CALL, ["verdict_words", "bearingVerdict", film, []])
+    assert found[:2] == ["quiet", "Change not confirmed yet"]  # never normal at −30 %
+
+
 async def test_the_worst_about_a_source_is_told_with_what_to_do(plant, page) -> None:
     await page.goto(plant.url + EMPTY)
     for changes, alarms, lost, rank, look, said in [

@@ -1,5 +1,6 @@
 """Films against their baselines, the audit trail, bearings side by side, and pages on a phone."""
 
+import copy
 import re
 
 from on_screen import A_NUMBER, FILES, assert_fits, await_charts, await_spectra, freeze
@@ -92,6 +93,47 @@ async def test_overview_and_bearing_page_have_the_verdict_and_lead_to_the_film(p
     await expect(caption).to_contain_text("are simulated, not measured")
     await page.get_by_role("link", name="Baseline, map and history").click()
     await expect(page.locator("h1")).to_contain_text("film against its baseline")
+
+
+UNWELL = {"verdict": "danger", "level": "danger", "change_percent": -12.4}
+UNWELL |= {"deviation_percent": -29.8, "stiffness_n_per_m": 0.231e9, "expected_n_per_m": 0.33e9}
+ALARM = {"unit": "U2", "subject": "LJB", "level": "danger", "is_active": True, "value": -12.4}
+ALARM |= {"raised": "2026-01-01T22:10:00Z", "condition_reason": "film_changed", "state": "normal"}
+MAX_WORDS = 150
+COUNT_WORDS = "document.querySelector('#main').innerText.split(/\\s+/).filter(Boolean).length"
+LOOKS = "marks => marks.map((mark) => mark.dataset.look)"
+
+
+async def test_the_first_screen_says_which_bearing_is_unwell_by_how_much_since_when_and_why(
+    plant, page, phone_page
+) -> None:
+    for shown in (page, phone_page):
+        overview = await freeze(shown, plant.url)
+        other = copy.deepcopy(overview["units"][0]) | {"id": "U2", "name": "Unit 2"}
+        film = other["bearings"][1]["film"]
+        film |= {"x": film["x"] | UNWELL, "y": film["y"] | UNWELL}
+        overview["units"].append(other)
+        alarms = [ALARM | {"kind": f"stiffness_{axis}"} for axis in "xy"]
+        answer = {"alarms": alarms, "unjudged": []}
+        await shown.route(
+            "**/api/v1/alarms", lambda route, answer=answer: route.fulfill(json=answer)
+        )
+        await shown.goto(plant.url)
+        row = shown.locator("[data-unit=U2] [data-bearing=LJB]")
+        verdict = row.locator(".film-brief")
+        await expect(verdict).to_contain_text("DANGER since 2026-01-0")
+        await expect(verdict).to_contain_text("film softer, both directions")
+        await expect(verdict).to_contain_text("expected 0.330 GN/m; confirmed −12 %")
+        await expect(row.locator(".number").first).to_have_text("0.231")
+        await expect(row.locator(".change")).to_contain_text("−30 %")
+        for place in (verdict, row.locator(".change")):
+            await expect(place).to_be_in_viewport(ratio=1.0)
+        await expect(row.locator("th")).to_have_text("LJB lower guide")
+        assert await shown.evaluate(COUNT_WORDS) <= MAX_WORDS
+        verdicts = await shown.locator(".film-brief .mark").evaluate_all(LOOKS)
+        data = await shown.locator(".quality .mark").evaluate_all(LOOKS)
+        assert "danger" in verdicts
+        assert not set(verdicts) & set(data)
 
 
 async def test_a_time_without_spectra_says_why_and_since_when_there_are_some(plant, page) -> None:

@@ -63,7 +63,7 @@ export function mark() {
  *
  * Where a number is missing for the reason that the page's head shouts already, its mark stays quiet.
  */
-export function drawQuality(one, { level, reason }, saidReason = null) {
+export function drawQuality(one, { level, reason, words = reasonWords(reason) }, saidReason = null) {
   const look = level === "bad" && reason === saidReason ? "absent" : lookOf(level, reason);
-  one.draw(look, look === "good" ? WORDS.good : `${WORDS[look]}: ${reasonWords(reason)}`);
+  one.draw(look, look === "good" ? WORDS.good : `${WORDS[look]}: ${words}`);
 }

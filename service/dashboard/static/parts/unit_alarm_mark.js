@@ -52,5 +52,5 @@ function wordsOf(open) {
   const n = { danger: 0, alert: 0, returned: 0 };
   for (const { is_active: active, level } of open) n[active ? level : "returned"] += 1;
   const parts = Object.entries(n).filter(([, count]) => count > 0);
-  return [parts[0][0] === "returned" ? "quiet" : parts[0][0], parts.map(([name, count]) => `${count} ${name}`).join(", ")];
+  return [parts[0][0] === "returned" ? "quiet" : parts[0][0], parts.map(([name, count]) => `${count} ${name === "alert" && count > 1 ? "alerts" : name}`).join(", ")];
 }
