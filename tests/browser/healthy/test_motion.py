@@ -53,6 +53,45 @@ async def test_spectra_over_time_are_a_map_or_lines_and_a_moment_is_chosen_by_ke
     assert complaints == []
 
 
+async def test_a_cursor_has_harmonics_and_the_address_holds_what_is_chosen(
+    plant, page, complaints
+) -> None:
+    await page.goto(f"{plant.url}{SPECTRA}?axis=cpm&picture=lines")
+    cursor, rows = page.get_by_label("Cursor"), page.locator(".readings").first.locator("tbody tr")
+    await expect(page.get_by_role("radio", name="cpm", exact=True)).to_be_checked()
+    await expect(page.locator("[data-chart=full-spectrum] .xtitle")).to_contain_text("forward")
+    await expect(page.locator(".cursor .hint")).to_contain_text("Hann window")
+    await cursor.fill("92.3")
+    await cursor.press("Enter")
+
+    await expect(rows).to_have_count(6)
+    await expect(rows.nth(1)).to_contain_text("184.6")
+    await cursor.press("ArrowUp")  # by a line of 600 / 4096 Hz
+    await expect(rows.first).to_contain_text("101.1")
+    await page.get_by_role("radio", name="× speed", exact=True).check()
+    await expect(cursor).to_have_value(re.compile(r"^1\.09"))
+    await page.reload()
+    await expect(page.get_by_role("radio", name="× speed", exact=True)).to_be_checked()
+    await expect(page.get_by_role("radio", name="Lines", exact=True)).to_be_checked()
+    await expect(rows).to_have_count(6)
+    await page.get_by_role("button", name="No cursor").click()
+    await expect(rows).to_have_count(0)
+    assert "cursor" not in page.url
+    assert complaints == []
+
+
+async def test_a_map_has_the_colours_of_its_legend(plant, page) -> None:
+    await page.goto(plant.url + SPECTRA)
+    await await_spectra(page)
+    chart = page.locator("[data-chart=waterfall] .chart")
+    strokes = "paths => paths.map((path) => getComputedStyle(path).stroke)"
+    drawn = await chart.locator(".scatterlayer path.js-line").evaluate_all(strokes)
+    assert drawn
+    assert set(drawn) == set(
+        await chart.locator(".legend path.legendlines, .legend .js-line").evaluate_all(strokes)
+    )
+
+
 async def test_an_orbit_plays_pauses_and_steps_by_keyboard(plant, page, complaints) -> None:
     await page.goto(plant.url + ORBITS)
     await await_orbit(page)
