@@ -39,12 +39,12 @@ export function momentLayout({ row, axis: along, toUpper, isLog, revision, top }
   });
 }
 
-function marker(x, color = INK, width = 1, dash = "dot") {
+export function marker(x, color = INK, width = 1, dash = "dot") {
   return { type: "line", x0: x, x1: x, yref: "paper", y0: 0, y1: 1, line: { color, width, dash } };
 }
 
 /** One below the other: on a narrow screen they would lie on each other. */
-const label = (text, x, n) => ({ x, y: n ? 0.9 : 1, yref: "paper", xanchor: "left", yanchor: "top", text, showarrow: false });
+export const label = (text, x, n) => ({ x, y: n ? 0.9 : 1, yref: "paper", xanchor: "left", yanchor: "top", text, showarrow: false });
 
 /** When, at what speed and load, and what the spectrum stands on. */
 export function momentCaption({ spectra, index }) {

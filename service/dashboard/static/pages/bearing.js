@@ -6,9 +6,10 @@ import { element, setText } from "../dom.js";
 import { formatAge, formatTime } from "../format.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { sourceView } from "../parts/source.js";
-import { wayLinks } from "../parts/ways.js";
-import { bearingAddress, unitAddress } from "../route.js";
+import { linkTo } from "../parts/ways.js";
+import { bearingAddress } from "../route.js";
 import { qualityOf, reasonSentence } from "../words.js";
+import { bearingHead } from "./bearing_head.js";
 import { estimatorTable } from "./estimator_table.js";
 import { filmMatrices } from "./film_matrices.js";
 import { filmSummary } from "./film_summary.js";
@@ -31,7 +32,7 @@ export function bearingPage(main, unitId, bearingId) {
       content.hidden = !latest;
       missing.hidden = Boolean(latest);
       if (latest) for (const part of parts) part.draw(latest, unit, view);
-      else missing.replaceChildren(missingSentence(view, unit, unitId, bearingId), " ", overviewLink());
+      else missing.replaceChildren(missingSentence(view, unit, unitId, bearingId), " ", linkTo("#/", "Overview"));
     },
     close() {
       for (const part of parts) part.close?.();
@@ -45,22 +46,18 @@ function missingSentence(view, unit, unitId, bearingId) {
   return `This plant has no bearing ${bearingId} on a unit ${unitId}.`;
 }
 
-const overviewLink = () => element("a", { href: "#/" }, "Overview");
-
 /** Where we are, how good it is, how old it is. */
 function headPart(unitId, bearingId) {
-  const title = element("h1", {}, `${unitId} ${bearingId}`);
-  const siblings = element("nav", { class: "siblings", "aria-label": "Bearings of this unit" }, overviewLink());
   const quality = mark();
   const why = element("span", { class: "why-sentence" });
   const age = element("span", { class: "data-age" });
   const source = sourceView();
   const state = element("div", { class: "state" }, quality.node, why, age);
+  const head = bearingHead(unitId, bearingId, "", bearingAddress, state, source.node);
   return {
-    node: element("header", { class: "bearing-head" }, siblings, title, state, source.node, wayLinks(unitId, bearingId, bearingAddress(unitId, bearingId))),
-    draw(latest, unit) {
-      drawSiblings(siblings, unit, bearingId);
-      setText(title, `${unit.name}, ${bearingId}`);
+    node: head.node,
+    draw(latest, unit, view) {
+      head.draw(view);
       const whole = qualityOf(latest);
       drawQuality(quality, whole);
       setText(why, whole.level === "good" ? "" : reasonSentence(whole.reason));
@@ -73,11 +70,4 @@ function headPart(unitId, bearingId) {
 function windowAge(latest) {
   if (latest.age_s === null) return "No segment has been analysed yet.";
   return `Newest result ${formatAge(latest.age_s)} old, samples up to ${formatTime(Date.parse(latest.time))}`;
-}
-
-function drawSiblings(nav, unit, bearingId) {
-  if (nav.childElementCount === unit.bearings.length + 2) return;
-  const links = unit.bearings.map(({ bearing }) => element("a", { href: bearingAddress(unit.id, bearing) }, bearing));
-  links.find((link) => link.textContent === bearingId).setAttribute("aria-current", "page");
-  nav.replaceChildren(overviewLink(), element("a", { href: unitAddress(unit.id) }, unit.name), ...links);
 }

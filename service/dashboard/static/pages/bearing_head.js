@@ -1,40 +1,26 @@
-/** The head of a page about one bearing: where we are, and the ways to the other pages about it. */
+/** The head of a page about one bearing: the way from the plant down to it, its neighbours, its pages. */
 
 import { element, setText } from "../dom.js";
-import { bearingAddress, filmAddress, orbitAddress, waterfallAddress } from "../route.js";
+import { linkTo, wayLinks } from "../parts/ways.js";
+import { unitAddress } from "../route.js";
 
-const PAGES = [
-  ["", (bearing) => `Bearing ${bearing}`, bearingAddress],
-  ["waterfall", () => "Spectra over time", waterfallAddress],
-  ["orbits", () => "Orbit player", orbitAddress],
-  ["film", () => "Film", filmAddress],
-];
-
-const OF_BEARING = { waterfall: waterfallAddress, orbits: orbitAddress };
-
-/** `here` is one of `waterfall` and `orbits`; returns `{ node, draw(view) }`. */
-export function bearingHead(unitId, bearingId, topic, here) {
-  const title = element("h1", {}, `${unitId} ${bearingId}: ${topic}`);
-  const pages = PAGES.map(([name, words, address]) => link(address(unitId, bearingId), words(bearingId), name === here));
-  const about = element("nav", { class: "siblings", "aria-label": `Pages about ${bearingId}` }, ...pages);
-  const others = element("nav", { class: "siblings", "aria-label": "Bearings of this unit" });
+/** `addressOf(unit, bearing)` is that of the page; `more` stands below the title. Returns `{ node, draw(view) }`. */
+export function bearingHead(unitId, bearingId, topic, addressOf, ...more) {
+  const title = element("h1", {}, `${unitId} ${bearingId}${topic}`);
+  const nav = element("nav", { class: "siblings", "aria-label": "Plant, unit and its bearings" }, linkTo("#/", "Overview"));
+  const ways = wayLinks(unitId, bearingId, addressOf(unitId, bearingId));
   let known = "";
   return {
-    node: element("header", { class: "bearing-head" }, about, title, others),
-    draw(view) {
-      const unit = view.units.find((one) => one.id === unitId);
+    node: element("header", { class: "bearing-head" }, nav, title, ...more, element("nav", { "aria-label": `Pages about ${bearingId}` }, ways)),
+    draw({ units }) {
+      const unit = units.find(({ id }) => id === unitId);
       if (!unit) return;
-      setText(title, `${unit.name}, ${bearingId}: ${topic}`);
+      setText(title, `${unit.name}, ${bearingId}${topic}`);
       const names = unit.bearings.map(({ bearing }) => bearing);
       if (known === names.join(" ")) return;
       known = names.join(" ");
-      others.replaceChildren(...names.map((name) => link(OF_BEARING[here](unitId, name), name, name === bearingId)));
+      const bearings = names.map((name) => linkTo(addressOf(unitId, name), name, name === bearingId));
+      nav.replaceChildren(linkTo("#/", "Overview"), linkTo(unitAddress(unitId), unit.name), ...bearings);
     },
   };
-}
-
-function link(href, words, isHere) {
-  const made = element("a", { href }, words);
-  if (isHere) made.setAttribute("aria-current", "page");
-  return made;
 }

@@ -1,11 +1,12 @@
 /** One film: the verdict, the baseline as a map, readings against their condition, versions. */
 
 import { ask } from "../api.js";
-import { element, setText } from "../dom.js";
+import { element } from "../dom.js";
 import { poll } from "../poll.js";
-import { bearingAddress, filmAddress } from "../route.js";
+import { filmAddress } from "../route.js";
 import { actorField } from "./alarm_actor.js";
 import { baselineTable } from "./baseline_table.js";
+import { bearingHead } from "./bearing_head.js";
 import { filmCharts } from "./film_charts.js";
 import { askFilm } from "./film_summary.js";
 import { verdictPanel } from "./film_verdict.js";
@@ -15,7 +16,7 @@ const PERIOD_S = 10;
 /** Returns `{ draw(view), close() }`. */
 export function filmPage(main, unitId, bearingId) {
   const path = ["units", unitId, "bearings", bearingId];
-  const head = headPart(unitId, bearingId);
+  const head = bearingHead(unitId, bearingId, ": film against its baseline", filmAddress);
   const actor = actorField("change_measuring", "change baselines", "before you change a baseline");
   const verdict = verdictPanel();
   const charts = filmCharts(path);
@@ -54,33 +55,4 @@ async function shownBaseline(path, { in_force: inForce, versions }, shown, signa
   const about = versions.find((one) => one.version === version);
   if (shown?.about.version === version) return { ...shown, about };
   return ask([...path, "baselines", String(version)], [], signal);
-}
-
-/** Where we are, and the way to the other films of the unit. */
-function headPart(unitId, bearingId) {
-  const title = element("h1", {}, `${unitId} ${bearingId}: film`);
-  const nav = element("nav", { class: "siblings", "aria-label": "Films of this unit" });
-  let links = "";
-  return {
-    node: element("header", { class: "bearing-head" }, nav, title),
-    draw(view) {
-      const unit = view.units.find((one) => one.id === unitId);
-      if (!unit) return;
-      setText(title, `${unit.name}, ${bearingId}: film against its baseline`);
-      const wanted = unit.bearings.map((one) => one.bearing).join(" ");
-      if (wanted === links) return;
-      links = wanted;
-      nav.replaceChildren(
-        element("a", { href: "#/" }, "Overview"),
-        element("a", { href: bearingAddress(unitId, bearingId) }, `Bearing ${bearingId}`),
-        ...unit.bearings.map(({ bearing }) => siblingLink(unitId, bearing, bearing === bearingId)),
-      );
-    },
-  };
-}
-
-function siblingLink(unit, bearing, isHere) {
-  const link = element("a", { href: filmAddress(unit, bearing) }, `Film ${bearing}`);
-  if (isHere) link.setAttribute("aria-current", "page");
-  return link;
 }

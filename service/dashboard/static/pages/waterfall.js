@@ -12,6 +12,7 @@ import { element } from "../dom.js";
 import { formatTime } from "../format.js";
 import { spectrumCursor } from "../parts/spectrum_cursor.js";
 import { poll } from "../poll.js";
+import { waterfallAddress } from "../route.js";
 import { onTheme } from "../theme.js";
 import { bearingHead } from "./bearing_head.js";
 import { momentSlider } from "./waterfall_moment.js";
@@ -25,7 +26,7 @@ const LEAST_ROOM_S = 30;
 /** Returns `{ draw(view), close() }`. */
 export function waterfallPage(main, unit, bearing) {
   const path = ["units", unit, "bearings", bearing];
-  const head = bearingHead(unit, bearing, "spectra over time", "waterfall");
+  const head = bearingHead(unit, bearing, ": spectra over time", waterfallAddress);
   const choices = waterfallChoices(() => questions.again(), redraw);
   const map = panel("Spectra over time", "waterfall");
   const single = panel("Spectrum of the moment", "moment");
