@@ -13,7 +13,7 @@ SPHINX := --fail-on-warning --keep-going --nitpicky --fresh-env
 WORKERS ?= 4
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
-.PHONY: install develop run axe test test-long mutants check lint types contracts docs screenshots bench fuzz accuracy torture soak \
+.PHONY: install develop run axe test test-long mutants check lint types contracts docs screenshots drawings bench fuzz accuracy torture soak \
   format lock clean
 
 $(STAMP): requirements/run.txt requirements/build.txt pyproject.toml
@@ -81,6 +81,9 @@ fuzz: develop
 
 screenshots: develop
 	PYTHONPATH=benchmarks $(BIN)/python docs/_tools/take_pictures.py
+
+drawings: develop
+	$(BIN)/python docs/_tools/drawings.py
 
 accuracy: develop
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/accuracy.py --workers 2

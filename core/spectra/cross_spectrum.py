@@ -41,6 +41,16 @@ class CrossSpectrum:
         amplitude: FloatArray = np.sqrt(self.power[:, channel, channel])
         return amplitude
 
+    def rotating_um_pk(self, x: int, y: int) -> FloatArray:
+        """Return the amplitudes of motion from x to y and from y to x in µm 0-pk, (2, n_lines).
+
+        At each line, the path of the channels x and y is the sum of two circles of these radii, one
+        in each direction (Goldman and Muszynska 1999, full spectrum).
+        """
+        both = self.power[:, x, y] + self.power[:, y, x]
+        turn = 2.0 * self.matrix[:, x, y].imag
+        return np.sqrt(np.maximum(np.stack([both + turn, both - turn]), 0.0)) / 2.0
+
     def amplitude_ratio(self, numerator: int, denominator: int) -> FloatArray:
         """Return the ratio of two channels' amplitudes over their common segments, (n_lines,).
 

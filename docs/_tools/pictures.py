@@ -6,7 +6,7 @@ SCREEN = (1280, 800)
 PHONE = (360, 780)
 
 UNIT = "#/units/U2"
-BEARING = f"{UNIT}/bearings/LJB"
+BEARING = f"{UNIT}/bearings/UJB"
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ PAGES = (
     Picture("bearing", BEARING, "[data-chart=spectrum] path.js-line"),
     Picture("film", f"{BEARING}/film", "[data-chart=baseline-map] .heatmaplayer"),
     Picture("alarms", "#/alarms", "[data-alarm]"),
-    Picture("trends", "#/trends?b=U2%2FLJB&b=U1%2FLJB", "path.js-line"),
+    Picture("trends", "#/trends?b=U2%2FUJB&b=U1%2FUJB", "path.js-line"),
     Picture("waterfall", f"{BEARING}/waterfall", "[data-chart] svg, [data-chart] canvas"),
     Picture("orbits", f"{BEARING}/orbits", ".orbit-pictures canvas"),
     Picture("sources", "#/sources", "[data-source]"),

@@ -213,9 +213,7 @@ def story(case: Case) -> str:
         else f", averaged over {found.time_scale_h:g} running hours"
     )
     changes = "; ".join(f"in {each.direction} {change_words(each)}" for each in moved)
-    sentence = (
-        f"Stiffness of the film against the baseline under this condition: {changes}{hours}."
-    )
+    sentence = f"Stiffness of the film against the baseline under this condition: {changes}{hours}."
     cause = found.attribution
     if cause is None:
         return sentence

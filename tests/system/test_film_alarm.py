@@ -2,7 +2,7 @@
 
 The plant is that of `padwatch demo`: a simulated DAQ, a process of its own, behind Modbus TCP; a
 service that reads it in real time; and a year of readings from which a baseline was learned. Two
-minutes after the start the film of U2's LJB loses 30 % of its stiffness (`deploy/demo-life.toml`).
+minutes after the start the film of U2's UJB loses 30 % of its stiffness (`deploy/demo-life.toml`).
 """
 
 import asyncio
@@ -18,7 +18,7 @@ from .conftest import Program, Start
 
 ROOT = Path(__file__).parents[2]
 LOSS = 0.3
-SOFTENED = {"U2:LJB:film_stiffness"}
+SOFTENED = {"U2:UJB:film_stiffness"}
 PATIENCE_S = 1200.0
 """The year before the start is simulated within a minute; the alarms come 5 to 6 minutes after it,
 as averages are over two and a half. A busy machine takes several times as long."""
@@ -77,12 +77,13 @@ async def test_a_film_that_loses_stiffness_in_the_machine_is_an_alarm_at_the_api
             assert alarm["raised_at"]["oil_temperature_c"] < cell["oil_temperature_high_c"]
     await program.until("/api/v1/alarms", in_danger, PATIENCE_S)  # as the tutorial says
     await program.until("/api/v1/alarms", in_both_directions, PATIENCE_S)
-    film = await program.get("/api/v1/units/U2/bearings/LJB/film")
+    film = await program.get("/api/v1/units/U2/bearings/UJB/film")
     for direction in ("x", "y"):
         assert film[direction]["deviation"]["percent"] == pytest.approx(-100.0 * LOSS, abs=6.0)
+        assert film[direction]["cause"]["cause"] == "film"
     chosen = {"kind": "film_stiffness", "unit": "U2", "state": "full_load"}
     *_, first = (await program.get("/api/v1/alarms/events", **chosen))["events"]
-    assert (first["alarm"], first["change"]) == ("U2:LJB:film_stiffness", "raised")
+    assert (first["alarm"], first["change"]) == ("U2:UJB:film_stiffness", "raised")
     assert (await program.get("/api/v1/alarms/events", **chosen, oil_temperature_max=0.0))[
         "events"
     ] == []

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from core.arrays import FloatArray
 from core.monitor.assessment import Assessment
+from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.stiffness.order_line import marked_hz
 from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
@@ -29,6 +30,7 @@ from service.api.values import (
     PlaceName,
     Time,
 )
+from service.settings.core_values import machine_of
 from service.store.spectra import SpectraQuery, StoredSpectrum
 
 
@@ -106,6 +108,19 @@ class SpectrumChannelModel(ApiModel):
     """Amplitude at each frequency; null if the channel is not usable."""
 
 
+class FullSpectrumModel(ApiModel):
+    """Full spectrum of a pair of channels: the two circles whose sum is the path at a frequency."""
+
+    unit: Literal["um_pk"]
+    """Unit of the amplitudes: µm of displacement, radius of the circle."""
+
+    forward: list[float]
+    """Amplitude in the direction of rotation of the shaft at each frequency."""
+
+    backward: list[float]
+    """Amplitude against the direction of rotation of the shaft at each frequency."""
+
+
 class SpectrumModel(ApiModel):
     """Averaged amplitude spectra of a bearing; all amplitudes are displacements."""
 
@@ -117,6 +132,9 @@ class SpectrumModel(ApiModel):
 
     channels: dict[str, SpectrumChannelModel]
     """Spectra by channel: shaft_x, shaft_y, bearing_x and bearing_y."""
+
+    full: dict[Literal["shaft", "bearing"], FullSpectrumModel | None]
+    """Full spectra of shaft and bearing; null if a channel of the pair is not usable."""
 
     lines: dict[str, float | None]
     """Frequencies of 1× ("order1") and of the vortex ("vortex"), Hz; null if unknown."""
@@ -158,8 +176,19 @@ def _place(shown: Sequence[StoredSpectrum], place: PlaceName, n_lines: int) -> P
     return PlaceSpectraModel(unit="um_pk", amplitude=amplitude)
 
 
-def spectrum_model(assessment: Assessment) -> SpectrumModel:
-    """Return the API model of the averaged amplitude spectra of a result."""
+def _full(spectrum: CrossSpectrum, x: int, y: int, sense: int) -> FullSpectrumModel | None:
+    if not spectrum.n_segments[x, y]:
+        return None
+    forward, backward = spectrum.rotating_um_pk(x, y)[::sense]
+    return FullSpectrumModel(
+        unit="um_pk",
+        forward=np.round(forward, DECIMALS).tolist(),
+        backward=np.round(backward, DECIMALS).tolist(),
+    )
+
+
+def spectrum_model(assessment: Assessment, rotation_sense: int) -> SpectrumModel:
+    """Return the API model of the averaged spectra of a result; +1 is rotation from x to y."""
     spectrum, readings = assessment.spectrum, assessment.readings
     return SpectrumModel.of(
         time=assessment.time_ns,
@@ -172,6 +201,10 @@ def spectrum_model(assessment: Assessment) -> SpectrumModel:
                 else None,
             )
             for name, place in PLACES.items()
+        },
+        full={
+            "shaft": _full(spectrum, SHAFT_X, SHAFT_Y, rotation_sense),
+            "bearing": _full(spectrum, BEARING_X, BEARING_Y, rotation_sense),
         },
         lines={name: marked_hz(readings, name) for name in ("order1", "vortex")},
     )
@@ -194,7 +227,9 @@ def spectra_router(context: Context) -> APIRouter:
     )
     async def spectrum(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the averaged amplitude spectra of the newest result, all as displacement."""
-        return await newest_answer(context, request, unit, bearing, spectrum_model)
+        sense = machine_of(context.unit(unit)).rotation_sense
+        make = partial(spectrum_model, rotation_sense=sense)
+        return await newest_answer(context, request, unit, bearing, make)
 
     @router.get("/{bearing}/spectra", summary="Spectra over time", response_model=SpectraModel)
     async def spectra(

@@ -1,5 +1,7 @@
 """Modules of the dashboard: run without a page, and loaded all at once, again or offline."""
 
+import numpy as np
+import pytest
 from on_screen import FILES
 from playwright.async_api import Browser, Page, Request, Route, expect
 
@@ -146,6 +148,28 @@ async def test_the_worst_about_a_source_is_told_with_what_to_do(plant, page) -> 
         )
         assert (found["rank"], found["look"]) == (rank, look), found
         assert said in found["advice"]
+
+
+async def test_peaks_and_harmonics_are_read_between_the_lines_of_a_hann_window(plant, page) -> None:
+    await page.goto(plant.url + EMPTY)
+    n, bin_hz = 4096, 0.1
+    at = np.arange(n) / n
+    tones = {15.383: 30.0, 30.766: 4.0, 77.5: 2.0}  # in bins, the last one midway
+    wave = sum(um * np.cos(2.0 * np.pi * bins * at + bins) for bins, um in tones.items())
+    tapered = np.fft.rfft(wave * (1.0 - np.cos(2.0 * np.pi * at)))
+    amplitude = np.abs(2.0 / n * tapered[1:201]) + 0.01
+    lines = [(bin_hz * np.arange(1, 201)).tolist(), amplitude.tolist()]
+
+    peaks = await page.evaluate(CALL, ["charts/spectrum_reading", "peaksOf", *lines, 0.2])
+    harmonics = await page.evaluate(CALL, ["charts/spectrum_reading", "harmonicsOf", *lines, 1.538])
+
+    for (bins, um), peak in zip(tones.items(), peaks, strict=True):
+        assert peak["hz"] == pytest.approx(bins * bin_hz, abs=0.005 * bin_hz)
+        assert peak["um"] == pytest.approx(um, rel=0.01)
+    assert [one["um"] for one in harmonics][:2] == pytest.approx([30.0, 4.0], rel=0.01)
+    assert [one["hz"] for one in harmonics] == pytest.approx([1.538 * k for k in range(1, 7)])
+    orders = await page.evaluate(CALL, ["charts/spectrum_reading", "peaksOf", *lines, 2.0])
+    assert len(orders) == 2  # no peak below where it is looked for
 
 
 async def test_an_orbit_may_be_drawn_before_its_place_on_the_page_has_a_size(plant, page) -> None:

@@ -190,3 +190,14 @@ def test_coherence_is_one_for_a_common_cause_small_for_none_and_zero_for_nothing
     assert not spectrum.n_segments.any()
     assert not spectrum.coherence(0, 2).any()
     assert not spectrum.amplitude_ratio(2, 0).any()
+
+
+def test_a_path_is_the_two_circles_it_is_made_of():
+    time_s = np.arange(1024) / RATE_HZ
+    turn = 2.0 * np.pi * 40 * RATE_HZ / 1024 * time_s
+    path = 7.0 * np.exp(1j * turn) + 3.0 * np.exp(-1j * (turn + 0.4))  # from x to y, and back
+    phasors = bin_phasors(tapered(np.stack([path.real, path.imag])), 100)
+    spectrum = average(np.arange(1, 101.0), phasors[np.newaxis], np.ones((1, 2), np.bool_))
+    forward, backward = spectrum.rotating_um_pk(0, 1)
+    assert (forward[39], backward[39]) == pytest.approx((7.0, 3.0))
+    assert max(forward[60:].max(), backward[60:].max()) < 1e-9

@@ -8,6 +8,7 @@ import pytest
 
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
+from service.api.routes.spectra import spectrum_model
 from service.live.status import LinkState
 from service.runtime.times import rfc3339
 from service.store.references import GapReference, ReferenceSource
@@ -168,6 +169,12 @@ async def test_the_spectrum_shows_the_lines_of_the_readings_and_the_orbit_is_the
         near = np.abs(frequency - line) <= 2 * frequency[0]
         assert shaft[near].max() > 10 * np.median(shaft)
     assert shaft.tolist() == newest.spectrum.amplitude_um_pk(0).tolist()
+    full = {name: np.array(body["full"]["shaft"][name]) for name in ("forward", "backward")}
+    other = np.array(body["channels"]["shaft_y"]["amplitude"])
+    squares = full["forward"] ** 2 + full["backward"] ** 2
+    np.testing.assert_allclose(squares, (shaft**2 + other**2) / 2.0, rtol=1e-3)
+    line = np.argmin(np.abs(frequency - body["lines"]["order1"]))
+    assert full["forward"][line] > 2.0 * full["backward"][line]
 
     orbit, body = newest.orbit, await read_only.json(f"{UJB}/orbit")
     assert orbit is not None
@@ -177,14 +184,23 @@ async def test_the_spectrum_shows_the_lines_of_the_readings_and_the_orbit_is_the
     assert body["duration_s"] == pytest.approx(3 * 60 / 92.3, abs=1 / 600)  # three turns
 
 
+def test_forward_is_with_the_shaft_whichever_way_it_turns(found):
+    one, other = (spectrum_model(found[-1], sense).full["shaft"] for sense in (1, -1))
+    assert one is not None
+    assert other is not None
+    assert (one.forward, one.backward) == (other.backward, other.forward)
+
+
 async def test_a_channel_that_failed_has_no_spectrum(running, found):
     n_segments = found[-1].spectrum.n_segments.copy()
     n_segments[2, :] = n_segments[:, 2] = 0
     spectrum = replace(found[-1].spectrum, n_segments=n_segments)
     running.live.set_assessment(replace(found[-1], spectrum=spectrum))
 
-    channels = (await running.json(f"{UJB}/spectrum"))["channels"]
+    body = await running.json(f"{UJB}/spectrum")
 
+    channels = body["channels"]
+    assert (body["full"]["bearing"], body["full"]["shaft"] is None) == (None, False)
     assert channels["bearing_x"]["amplitude"] is None
     assert len(channels["bearing_y"]["amplitude"]) > 100
 

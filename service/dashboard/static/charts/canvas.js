@@ -27,7 +27,7 @@ export function canvas(name, label) {
 export function palette() {
   const of = (name) => colourOf(`--${name}`);
   const [ink, soft, plot, grid, faint] = ["ink", "soft", "plot", "chart-grid", "chart-faint"].map(of);
-  return { ink, soft, plot, grid, faint, x: of("chart-x"), y: of("chart-y") };
+  return { ink, soft, plot, grid, faint, x: of("chart-x"), y: of("chart-y"), mark: of("chart-mark") };
 }
 
 /** A round step that parts a length into about so many pieces. */

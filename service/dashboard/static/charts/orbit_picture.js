@@ -11,7 +11,7 @@ const PIECES = 12;
 /** A key-phase mark as Bently draws it: the line is blank before the dot. */
 const BLANK_SHARE = 0.03;
 
-/** Returns `{ node, draw(clip, atS, how) }`; `how` is `{ turns, whole, alone, inClearance }`. */
+/** Returns `{ node, draw(clip, atS, how) }`; `how` is `{ turns, whole, alone, inClearance, reference }`. */
 export function orbitPicture() {
   const surface = canvas("orbit-canvas", "Orbit of the shaft");
   return {
@@ -25,6 +25,8 @@ export function orbitPicture() {
       const trail = trailAt(clip, atS, how.turns);
       if (how.whole) drawTrail(pen, plane, clip, trail, colours.x);
       if (how.alone && clip.order1) drawAlone(pen, plane, clip, trailAt(clip, atS, 1), colours.y);
+      if (how.reference) drawReference(pen, plane, how, colours.mark);
+      drawArrow(pen, plane, clip, trail.last, how, colours);
       drawMarks(pen, plane, clip, trail, how, colours);
       drawNow(pen, plane, clip, trail.last, how, colours);
     },
@@ -32,9 +34,10 @@ export function orbitPicture() {
 }
 
 /** How µm become pixels: the same in both directions. */
-function planeOf(clip, { inClearance }, width, height) {
+function planeOf(clip, { inClearance, reference }, width, height) {
   const centre = (inClearance && clip.centre_um) || [0, 0];
-  const reach = inClearance ? Math.max(clip.clearance_um, Math.hypot(...centre) + reachOf(clip)) * 1.06 : 1.15 * reachOf(clip);
+  const far = Math.max(reachOf(clip), reference ? reachOf(reference.clip) : 0);
+  const reach = inClearance ? Math.max(clip.clearance_um, Math.hypot(...centre) + far) * 1.06 : 1.15 * far;
   // a surface that has not got its size yet is smaller than its edges
   const scale = Math.max(Math.min(width, height) / 2 - EDGE_PX, 0) / reach;
   const at = (x, y) => [width / 2 + x * scale, height / 2 - y * scale];
@@ -107,6 +110,35 @@ function drawAlone(pen, plane, { order1 }, { first, last }, colour) {
   pen.setLineDash([7, 4]);
   strokePath(pen, last - first + 1, (n) => plane.of(order1.shaft_x_um[first + n], order1.shaft_y_um[first + n]));
   pen.setLineDash([]);
+}
+
+/** A turn that was kept: at its own place in the clearance, about the same middle to fit. */
+function drawReference(pen, { at }, { reference: { clip, first, last }, inClearance, whole }, colour) {
+  const [x, y] = (inClearance && clip.centre_um) || [0, 0];
+  const traces = whole ? clip : (clip.order1 ?? clip);
+  pen.strokeStyle = colour;
+  pen.lineWidth = 1.5;
+  pen.setLineDash([2, 3]);
+  strokePath(pen, last - first + 1, (n) => {
+    const [u, v] = [traces.shaft_x_um[first + n], traces.shaft_y_um[first + n]];
+    return u === null || v === null ? null : at(x + u, y + v);
+  });
+  pen.setLineDash([]);
+}
+
+/** The way the shaft runs: a head on the path, a third of a turn ago. */
+function drawArrow(pen, plane, clip, last, { whole, alone }, colours) {
+  const nTurn = (clip.turnS ?? 1) * clip.rate_hz;
+  const is1x = alone && clip.order1;
+  const traces = is1x ? clip.order1 : whole ? clip : null;
+  const [from, to] = [0.36, 0.33].map((turns) => Math.round(last - turns * nTurn)).map((n) => traces && plane.of(traces.shaft_x_um[n] ?? null, traces.shaft_y_um[n] ?? null));
+  if (!from || !to) return;
+  pen.save();
+  pen.translate(...to);
+  pen.rotate(Math.atan2(to[1] - from[1], to[0] - from[0]));
+  pen.fillStyle = is1x ? colours.y : colours.x;
+  pen.fill(new Path2D("M 9 0 L -7 6 L -4 0 L -7 -6 Z"));
+  pen.restore();
 }
 
 function drawMarks(pen, plane, clip, trail, { whole, alone }, colours) {

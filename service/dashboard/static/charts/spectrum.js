@@ -2,7 +2,9 @@
 
 import { amplitudeFactor, amplitudeUnit, shownAmplitude } from "../amplitudes.js";
 import { formatFixed } from "../format.js";
-import { INK, X_COLOUR, Y_COLOUR, axis, baseLayout } from "./style.js";
+import { label, marker } from "./moment_spectrum.js";
+import { X_COLOUR, Y_COLOUR, axis, baseLayout } from "./style.js";
+import { SCALE_FROM_HZ } from "./waterfall_scale.js";
 
 const CHANNELS = [
   ["shaft_x", "shaft x", X_COLOUR, "solid", "y"],
@@ -10,9 +12,6 @@ const CHANNELS = [
   ["bearing_x", "bearing x", X_COLOUR, "solid", "y2"],
   ["bearing_y", "bearing y", Y_COLOUR, "dash", "y2"],
 ];
-
-/** Below this, integrated velocity is mostly drift: drawn, but it does not set the scale. */
-const SCALE_FROM_HZ = 0.2;
 
 const LINE_WORDS = { order1: "1×", vortex: "vortex" };
 
@@ -42,7 +41,7 @@ export function spectrumLayout(spectrum, toHz) {
     yaxis: axis(`shaft, ${amplitudeUnit()}`, { domain: [0.54, 1], range: range(["shaft_x", "shaft_y"]) }),
     yaxis2: axis(`bearing, ${amplitudeUnit()}`, { domain: [0, 0.46], range: range(["bearing_x", "bearing_y"]) }),
     shapes: lines.map(([, hz]) => marker(hz)),
-    annotations: lines.map(([name, hz]) => label(LINE_WORDS[name] ?? name, hz)),
+    annotations: lines.map(([name, hz]) => label(LINE_WORDS[name] ?? name, hz, 0)),
     hovermode: "closest",
     margin: { l: 56, r: 12, t: 8, b: 40 },
   });
@@ -53,14 +52,6 @@ function largest(spectrum, ids, toHz) {
   const amplitudes = ids.flatMap((id) => spectrum.channels[id]?.amplitude ?? []);
   const n = spectrum.frequency_hz.length;
   return amplitudes.reduce((most, um, index) => (seen(spectrum.frequency_hz[index % n]) ? Math.max(most, um) : most), 0.01);
-}
-
-function marker(hz) {
-  return { type: "line", x0: hz, x1: hz, yref: "paper", y0: 0, y1: 1, line: { color: INK, width: 1, dash: "dot" } };
-}
-
-function label(words, hz) {
-  return { x: hz, y: 1, yref: "paper", xanchor: "left", yanchor: "top", text: words, showarrow: false };
 }
 
 export function spectrumCaption(spectrum) {

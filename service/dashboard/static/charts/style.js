@@ -14,6 +14,8 @@ export const X_BAND = "var(--chart-x-band)";
 export const Y_BAND = "var(--chart-y-band)";
 export const DOUBT_COLOUR = "var(--chart-doubt)";
 export const FAINT = "var(--chart-faint)";
+/** Marks over a map, whether it is light or dark there. */
+export const MARK = "var(--chart-mark)";
 export const PLOT = "var(--plot)";
 const GRID = "var(--chart-grid)";
 

@@ -2,9 +2,9 @@
 
 import { amplitudeUnit, shownAmplitude } from "../amplitudes.js";
 import { colourOf } from "../theme.js";
-import { DOUBT_COLOUR, INK, PLOT, X_COLOUR, Y_COLOUR, axis, baseLayout } from "./style.js";
+import { DOUBT_COLOUR, INK, MARK, PLOT, axis, baseLayout } from "./style.js";
 import { localMs, withHoles } from "./waterfall_rows.js";
-import { scaleOf } from "./waterfall_scale.js";
+import { contrastOf, scaleOf } from "./waterfall_scale.js";
 
 /** Most lines one behind the other; more could not be told apart. */
 const MOST_LINES = 60;
@@ -15,7 +15,7 @@ const REACH = 0.16;
 /** A map; every cell is one spectrum's line. */
 export function mapTraces(drawn) {
   const rows = withHoles(drawn.rows);
-  const scale = scaleOf(drawn);
+  const scale = contrastOf(drawn);
   const shades = ["--plot", "--chart-x", "--ink"].map(colourOf);
   const ticks = ticksOf(scale, drawn.isLog);
   return [
@@ -30,17 +30,21 @@ export function mapTraces(drawn) {
       colorbar: { thickness: 12, outlinewidth: 0, title: { text: amplitudeUnit(), side: "right" }, ...ticks },
       hoverongaps: false,
       customdata: rows.map(({ amplitude }) => drawn.abscissa.map((_, n) => (amplitude ? shownAmplitude(amplitude[n]) : null))),
-      hovertemplate: `%{customdata:.3~g} ${amplitudeUnit()} at %{x:.3f} ${drawn.unit}<br>%{y|%Y-%m-%d %H:%M:%S}<extra></extra>`,
+      hovertemplate: `%{customdata:.3~g} ${amplitudeUnit()} at %{x:.4~g} ${drawn.axis.unit}<br>%{y|%Y-%m-%d %H:%M:%S}<extra></extra>`,
     },
   ];
 }
 
-/** Decades, or even steps. */
+/** Decades, even steps between fewer than two of them, or as the library chooses. */
 function ticksOf({ low, high }, isLog) {
   if (!isLog) return {};
+  if (high - low < 2) return { tickvals: evenTicks(low, high), ticktext: evenTicks(low, high).map(plain) };
   const decades = Array.from({ length: Math.floor(high) - Math.ceil(low) + 1 }, (_, n) => Math.ceil(low) + n);
-  return { tickvals: decades, ticktext: decades.map((decade) => String(Number((10 ** decade).toPrecision(1)))) };
+  return { tickvals: decades, ticktext: decades.map(plain) };
 }
+
+const plain = (decade) => String(Number((10 ** decade).toPrecision(2)));
+const evenTicks = (low, high) => Array.from({ length: 5 }, (_, n) => low + (n / 4) * (high - low));
 
 /** Lines one behind the other, the newest the farthest; each hides what is behind it. */
 export function lineTraces(drawn) {
@@ -69,17 +73,17 @@ function evenly(rows, most) {
 /** How many of the rows are drawn as lines. */
 export const nLines = (rows) => Math.min(rows.filter(({ amplitude }) => amplitude).length, MOST_LINES);
 
-/** Where 1× and the vortex were read, dotted over the picture. */
-export function markTraces({ rows, inOrders }) {
+/** Where 1× and the vortex were read, over the picture. */
+export function markTraces({ rows, axis: along }) {
   const known = withHoles(rows);
-  const at = (hz, turnHz) => (hz && turnHz ? (inOrders ? hz / turnHz : hz) : null);
-  const lines = [["1×", X_COLOUR, (row) => at(row.order1Hz, row.order1Hz)], ["vortex", Y_COLOUR, (row) => at(row.vortexHz, row.order1Hz)]];
-  const y = known.map(({ timeS }) => localMs(timeS));
-  const common = { type: "scatter", mode: "lines", connectgaps: false, hoverinfo: "skip", y };
-  return lines.flatMap(([name, color, of]) => [
-    { ...common, x: known.map(of), line: { color: PLOT, width: 3 }, showlegend: false }, // a rim: the map is dark here
-    { ...common, x: known.map(of), line: { color, width: 1.6, dash: "dot" }, name },
-  ]);
+  const lines = [["1×", "dot", (row) => row.order1Hz], ["vortex", "dash", (row) => row.order1Hz && row.vortexHz]];
+  const common = { type: "scatter", mode: "lines", connectgaps: false, hoverinfo: "skip", y: known.map(({ timeS }) => localMs(timeS)) };
+  return lines.map(([name, dash, of]) => ({
+    ...common,
+    x: known.map((row) => (of(row) ? along.of(of(row), row.order1Hz) : null)),
+    line: { color: MARK, width: 1.6, dash },
+    name,
+  }));
 }
 
 /** Where alarms of the bearing were raised, as triangles along the right edge. */
@@ -101,11 +105,11 @@ export function alarmTraces(alarms, toUpper) {
 }
 
 /** `moment` is the time of the spectrum that is shown beside it, or null. */
-export function waterfallLayout({ inOrders, toUpper, startS, endS, headroom, revision }, momentS) {
+export function waterfallLayout({ axis: along, toUpper, startS, endS, headroom, revision }, momentS) {
   const marked = momentS === null ? [] : [localMs(momentS)];
   const spare = headroom ? REACH * (endS - startS) : 0;
   return baseLayout(revision, {
-    xaxis: axis(inOrders ? "Multiple of the running speed" : "Frequency, Hz", { range: [0, toUpper] }),
+    xaxis: axis(along.title, { range: [0, toUpper] }),
     yaxis: axis("", { type: "date", range: [localMs(startS), localMs(endS + spare)] }),
     hovermode: "closest",
     legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", itemwidth: 44 },

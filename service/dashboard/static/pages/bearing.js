@@ -10,9 +10,10 @@ import { filmBrief } from "../parts/film_brief.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { sourceView } from "../parts/source.js";
 import { openAlarms } from "../parts/unit_alarm_mark.js";
-import { wayLinks } from "../parts/ways.js";
-import { bearingAddress, unitAddress } from "../route.js";
+import { linkTo } from "../parts/ways.js";
+import { bearingAddress } from "../route.js";
 import { qualityOf, reasonSentence } from "../words.js";
+import { bearingHead } from "./bearing_head.js";
 import { estimatorTable } from "./estimator_table.js";
 import { filmMatrices } from "./film_matrices.js";
 import { filmSummary } from "./film_summary.js";
@@ -39,7 +40,7 @@ export function bearingPage(main, unitId, bearingId) {
       content.hidden = !latest;
       missing.hidden = Boolean(latest);
       if (latest) for (const part of parts) part.draw(latest, unit, view);
-      else missing.replaceChildren(missingSentence(view, unit, unitId, bearingId), " ", overviewLink());
+      else missing.replaceChildren(missingSentence(view, unit, unitId, bearingId), " ", linkTo("#/", "Overview"));
     },
     close() {
       for (const part of parts) part.close?.();
@@ -53,23 +54,19 @@ function missingSentence(view, unit, unitId, bearingId) {
   return `This plant has no bearing ${bearingId} on a unit ${unitId}.`;
 }
 
-const overviewLink = () => element("a", { href: "#/" }, "Overview");
-
 /** Where we are, the verdict, and how good and old the data are. */
 function headPart(unitId, bearingId) {
-  const title = element("h1", { dir: "auto" }, `${unitId} ${bearingId}`);
-  const siblings = element("nav", { class: "siblings", "aria-label": "Bearings of this unit" }, overviewLink());
   const alarms = openAlarms();
   const verdict = filmBrief();
   const quality = mark();
   const why = element("span", { class: "why-sentence" });
   const age = element("span", { class: "data-age" });
   const state = element("div", { class: "state" }, element("span", {}, "Data quality:"), quality.node, why, age);
+  const head = bearingHead(unitId, bearingId, "", bearingAddress, verdict.node, state);
   return {
-    node: element("header", { class: "bearing-head" }, siblings, title, verdict.node, state, wayLinks(unitId, bearingId, bearingAddress(unitId, bearingId))),
-    draw(latest, unit) {
-      drawSiblings(siblings, unit, bearingId);
-      setText(title, [`${unit.name}, ${bearingId}`, latest.name].filter(Boolean).join(" "));
+    node: head.node,
+    draw(latest, unit, view) {
+      head.draw(view);
       verdict.draw(unit.films[unit.bearings.indexOf(latest)], alarms.of(unitId, bearingId));
       const whole = qualityOf(latest);
       drawQuality(quality, whole);
@@ -88,11 +85,4 @@ function sourcePart() {
 function windowAge(latest) {
   if (latest.age_s === null) return "No segment has been analysed yet.";
   return `Newest result ${formatAge(latest.age_s)} old, samples up to ${formatTime(Date.parse(latest.time))}`;
-}
-
-function drawSiblings(nav, unit, bearingId) {
-  if (nav.childElementCount === unit.bearings.length + 2) return;
-  const links = unit.bearings.map(({ bearing }) => element("a", { href: bearingAddress(unit.id, bearing) }, bearing));
-  links.find((link) => link.textContent === bearingId).setAttribute("aria-current", "page");
-  nav.replaceChildren(overviewLink(), element("a", { href: unitAddress(unit.id) }, unit.name), ...links);
 }

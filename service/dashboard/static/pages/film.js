@@ -5,6 +5,7 @@ import { element } from "../dom.js";
 import { actorField } from "../parts/actor.js";
 import { bearingAlarms } from "../parts/alarm_brief.js";
 import { poll } from "../poll.js";
+import { filmAddress } from "../route.js";
 import { baselineTable } from "./baseline_table.js";
 import { bearingHead } from "./bearing_head.js";
 import { filmCharts } from "./film_charts.js";
@@ -16,7 +17,7 @@ const PERIOD_S = 10;
 /** Returns `{ draw(view), close() }`. */
 export function filmPage(main, unitId, bearingId) {
   const path = ["units", unitId, "bearings", bearingId];
-  const head = bearingHead(unitId, bearingId, "film against its baseline", "film");
+  const head = bearingHead(unitId, bearingId, ": film against its baseline", filmAddress);
   const actor = actorField("change_measuring", "change baselines");
   const verdict = verdictPanel();
   const alarms = bearingAlarms(unitId, bearingId);

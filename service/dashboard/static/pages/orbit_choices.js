@@ -2,12 +2,12 @@
 
 import { ask } from "../api.js";
 import { element, setText } from "../dom.js";
-import { choice } from "../parts/choice.js";
+import { keptChoice } from "../parts/kept_choice.js";
 import { lengthWords, occasionWords, recordingTime } from "../recording_words.js";
 
 const TURNS = [[1, "1"], [3, "3"], [8, "8"]];
 const PARTS = [["both", "Whole and 1×"], ["whole", "Whole"], ["alone", "1× alone"]];
-const FRAMES = [["clearance", "In the clearance"], ["fit", "To fit"]];
+const FRAMES = [["fit", "To fit"], ["clearance", "In the clearance"]];
 const MOST_RECORDINGS = 100;
 
 /** `choose(recording)` with its name, or null for now; `show` when the drawing changes; `chosen` at first. */
@@ -15,9 +15,9 @@ export function orbitChoices(unit, chosen, choose, show) {
   const select = element("select", { id: "orbit-source" }, element("option", { value: "" }, "Now, live"));
   const note = element("span", { class: "hint", role: "status" });
   const source = element("label", { class: "setting" }, "Play ", select);
-  const parts = choice("Motion", PARTS, "both", show);
-  const turns = choice("Turns", TURNS, 3, show);
-  const frame = choice("Frame", FRAMES, "clearance", show);
+  const parts = keptChoice("motion", "Motion", PARTS, "both", show);
+  const turns = keptChoice("turns", "Turns", TURNS, 3, show);
+  const frame = keptChoice("frame", "Frame", FRAMES, "fit", show);
   select.addEventListener("change", () => choose(select.value || null));
   offer(select, note, unit, chosen);
   return {

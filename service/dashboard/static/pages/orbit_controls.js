@@ -10,7 +10,7 @@ const STEP_TURNS = 1 / 36;
 const OWN_SPACE = "button, a, select, textarea, input:not([type=range], [type=radio])";
 const OWN_ARROWS = "select, textarea, input:not(#orbit-at)";
 
-/** `acts` is `{ play(), step(turns), seek(s), hasten(speed) }`. Returns `{ node, draw(at, clip, source), close() }`. */
+/** `acts` is `{ play(), step(turns), seek(s), hasten(speed), hold() }`. Returns `{ node, draw(at, clip, source), close() }`. */
 export function orbitControls(acts) {
   const play = element("button", { type: "button", class: "play" }, "▶ Play");
   const scrub = element("input", { type: "range", id: "orbit-at", step: "any", "aria-label": "Moment" });
@@ -21,6 +21,8 @@ export function orbitControls(acts) {
     button.addEventListener("click", () => acts.step(turns));
     return button;
   });
+  const hold = element("button", { type: "button", "aria-pressed": "false" }, "Hold as reference");
+  hold.addEventListener("click", () => acts.hold());
   const keys = element("p", { class: "hint" }, "Space: play or pause. ← and →: a step of 10°. With Shift: a turn.");
   play.addEventListener("click", () => acts.play());
   scrub.addEventListener("input", () => acts.seek(Number(scrub.value)));
@@ -39,12 +41,13 @@ export function orbitControls(acts) {
     node: element(
       "div",
       { class: "player-controls" },
-      element("div", { class: "player-buttons" }, play, ...steps),
+      element("div", { class: "player-buttons" }, play, ...steps, hold),
       scrub,
       element("label", { class: "setting" }, "Speed ", speed, " ", speedWords),
       keys,
     ),
-    draw(at, clip, source) {
+    draw(at, clip, source, reference) {
+      setAttribute(hold, "aria-pressed", String(reference !== null));
       setText(play, at.isPlaying ? "‖ Pause" : "▶ Play");
       setText(speedWords, `${at.speed}×`);
       setAttribute(speed, "aria-valuetext", `${at.speed} times`);

@@ -20,13 +20,13 @@ export function orbitFacts() {
   let drawnMs = -Infinity;
   return {
     node: element("div", {}, list, notes),
-    draw(clip, at, source, { inClearance }) {
+    draw(clip, at, source, { inClearance, reference }) {
       const nowMs = performance.now();
       if (at.isPlaying && nowMs - drawnMs < PERIOD_MS) return;
       drawnMs = nowMs;
       const words = clip === null ? NAMES.map(() => "—") : wordsOf(clip, at.atS);
       words.forEach((text, n) => setText(values[n], text));
-      setText(notes, clip === null ? "" : notesOf(clip, source, inClearance));
+      setText(notes, clip === null ? "" : `${notesOf(clip, source, inClearance)}${referenceWords(reference)}`);
     },
   };
 }
@@ -62,3 +62,6 @@ function notesOf(clip, source, inClearance) {
   const live = source.isLive ? " Live motion is played 3.5 s behind the newest sample; slower or paused, the last 10 s are held." : "";
   return `${circle}Solid: whole motion. Dashed: 1× alone. ${marks}${centre}${live}`;
 }
+
+const referenceWords = (reference) =>
+  reference === null ? "" : ` Dotted: the reference, the turn up to ${formatTime(msAt(reference.clip, reference.clip.startS + reference.last / reference.clip.rate_hz))}.`;

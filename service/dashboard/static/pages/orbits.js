@@ -1,11 +1,13 @@
 /** The orbit player: a shaft's motion as it is now, or at any moment of a recording. */
 
 import { NotReachable } from "../api.js";
-import { reachOf } from "../charts/orbit_clip.js";
+import { reachOf, trailAt } from "../charts/orbit_clip.js";
 import { orbitPicture } from "../charts/orbit_picture.js";
 import { timebasePicture } from "../charts/timebase_picture.js";
+import { waveforms } from "../charts/waveforms.js";
 import { element, setText } from "../dom.js";
 import { formatAge } from "../format.js";
+import { keepInAddress } from "../parts/kept_choice.js";
 import { STOPPED, advanced, moved } from "../parts/playhead.js";
 import { poll } from "../poll.js";
 import { orbitAddress, queryOf } from "../route.js";
@@ -31,21 +33,23 @@ const LONGEST_STEP_S = 0.25;
 export function orbitsPage(main, unit, bearing) {
   const path = ["units", unit, "bearings", bearing];
   const isStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
-  const head = bearingHead(unit, bearing, "orbit player", "orbits");
+  const head = bearingHead(unit, bearing, ": orbit player", orbitAddress);
   const asked = queryOf(location.hash).get("recording");
   const choices = orbitChoices(unit, asked, choose, paint);
-  const controls = orbitControls({ play, step, seek, hasten });
+  const controls = orbitControls({ play, step, seek, hasten, hold });
   const [orbit, timebase, facts] = [orbitPicture(), timebasePicture(), orbitFacts()];
   const sentence = element("p", { class: "sentence", role: "status" }, "Asking the service.");
   const pictures = element("div", { class: "orbit-pictures", hidden: "" }, orbit.node, timebase.node);
   const player = element("section", { class: "panel player", "aria-label": "Player" }, sentence, pictures, controls.node, facts.node);
-  main.append(element("div", { class: "bearing orbit-page" }, head.node, choices.node, player));
+  const waves = waveforms(unit, bearing);
+  main.append(element("div", { class: "bearing orbit-page" }, head.node, choices.node, player, waves.node));
 
   const sourceOf = (recording) => (recording === null ? liveSource(path) : recordedSource(recording, bearing));
   let source = sourceOf(asked);
   let clip = null;
   let at = { ...STOPPED, isPlaying: !isStill };
   let trouble = null;
+  let reference = null;
   let shownMs = null;
   let hasSamples = false;
   let absence = "Asking the service.";
@@ -83,7 +87,7 @@ export function orbitsPage(main, unit, bearing) {
 
   function choose(recording) {
     source = sourceOf(recording);
-    history.replaceState(null, "", orbitAddress(unit, bearing, recording));
+    keepInAddress("recording", recording);
     [clip, trouble] = [null, null];
     at = { ...at, atS: 0, isPlaying: !isStill };
     setText(sentence, "Asking the service.");
@@ -113,6 +117,12 @@ export function orbitsPage(main, unit, bearing) {
     paint();
   }
 
+  /** Keep the newest turn to compare others with, or let go of the one that is kept. */
+  function hold() {
+    reference = reference === null && clip !== null ? { clip, ...trailAt(clip, at.atS, 1) } : null;
+    paint();
+  }
+
   function frame(nowMs) {
     timer = requestAnimationFrame(frame);
     const elapsedS = shownMs === null ? 0 : Math.min((nowMs - shownMs) / 1000, LONGEST_STEP_S);
@@ -129,10 +139,10 @@ export function orbitsPage(main, unit, bearing) {
     sentence.hidden = !words;
     if (words) setText(sentence, words);
     pictures.hidden = clip === null;
-    controls.draw(at, clip, source);
-    facts.draw(isThere ? clip : null, at, source, choices.how());
+    controls.draw(at, clip, source, reference);
+    facts.draw(isThere ? clip : null, at, source, { ...choices.how(), reference });
     if (!isThere) return;
-    for (const picture of [orbit, timebase]) picture.draw(clip, at.atS, choices.how());
+    for (const picture of [orbit, timebase]) picture.draw(clip, at.atS, { ...choices.how(), reference });
   }
 
   const onResize = () => paint();
@@ -152,6 +162,7 @@ export function orbitsPage(main, unit, bearing) {
     close() {
       cancelAnimationFrame(timer);
       questions.stop();
+      waves.close();
       controls.close();
       stopTheme();
       window.removeEventListener("resize", onResize);

@@ -2,14 +2,17 @@
 
 import { NotReachable, ask } from "../api.js";
 import { changeWords, kindWords } from "../alarm_words.js";
-import { momentCaption, momentLayout, momentTraces } from "../charts/moment_spectrum.js";
+import { fullTraces, momentCaption, momentLayout, momentTraces } from "../charts/moment_spectrum.js";
 import { panel } from "../charts/panel.js";
+import { AXES } from "../charts/spectrum_reading.js";
 import { alarmTraces, lineTraces, mapTraces, markTraces, nLines, waterfallLayout } from "../charts/waterfall.js";
 import { alongOrders, ordersOf, rowsOf } from "../charts/waterfall_rows.js";
-import { highest } from "../charts/waterfall_scale.js";
+import { SCALE_FROM_HZ, highest } from "../charts/waterfall_scale.js";
 import { element } from "../dom.js";
 import { formatTime } from "../format.js";
+import { spectrumCursor } from "../parts/spectrum_cursor.js";
 import { poll } from "../poll.js";
+import { waterfallAddress } from "../route.js";
 import { onTheme } from "../theme.js";
 import { bearingHead } from "./bearing_head.js";
 import { momentSlider } from "./waterfall_moment.js";
@@ -23,12 +26,16 @@ const LEAST_ROOM_S = 30;
 /** Returns `{ draw(view), close() }`. */
 export function waterfallPage(main, unit, bearing) {
   const path = ["units", unit, "bearings", bearing];
-  const head = bearingHead(unit, bearing, "spectra over time", "waterfall");
+  const head = bearingHead(unit, bearing, ": spectra over time", waterfallAddress);
   const choices = waterfallChoices(() => questions.again(), redraw);
   const map = panel("Spectra over time", "waterfall");
   const single = panel("Spectrum of the moment", "moment");
+  const full = panel("Full spectrum, newest", "full-spectrum");
+  const panels = [map, single, full];
   const moment = momentSlider(redraw);
-  main.append(element("div", { class: "bearing waterfall-page" }, head.node, choices.node, map.node, moment.node, single.node));
+  const cursor = spectrumCursor(redraw);
+  const parts = [head, choices, map, moment, single, cursor, full].map(({ node }) => node);
+  main.append(element("div", { class: "bearing waterfall-page" }, ...parts));
   let found = null;
   let view = null;
 
@@ -45,7 +52,7 @@ export function waterfallPage(main, unit, bearing) {
 
   function tell(failure) {
     const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
-    for (const box of [map, single]) box.trouble(words);
+    for (const box of panels) box.trouble(words);
   }
   function redraw() {
     show().catch(tell);
@@ -56,12 +63,14 @@ export function waterfallPage(main, unit, bearing) {
     const absence = absenceWords(found, choices);
     moment.offer(found.spectra, absence === null);
     if (absence !== null) {
-      for (const box of [map, single]) box.explain(absence);
+      cursor.node.hidden = true;
+      for (const box of panels) box.explain(absence);
       return;
     }
     const drawn = drawnOf(found, choices);
     await showMap(map, drawn, found, moment);
-    await showMoment(single, drawn, found.spectra, moment.index());
+    await showMoment(single, cursor, drawn, found.spectra, moment.index());
+    await showFull(full, cursor, drawn, found);
   }
 
   const stopTheme = onTheme(redraw); // shades of a map are colours, not names of colours
@@ -71,7 +80,7 @@ export function waterfallPage(main, unit, bearing) {
       view = now;
       head.draw(now);
       if (first) questions.again();
-      for (const box of [map, single]) box.draw(null, null);
+      for (const box of panels) box.draw(null, null);
     },
     close() {
       questions.stop();
@@ -89,19 +98,27 @@ async function askSpectra(path, place, { startMs, endMs }, signal) {
   const alarms = events
     .filter(({ subject, change }) => subject === bearing && ["raised", "escalated"].includes(change))
     .map(({ time, kind, change }) => ({ timeS: Date.parse(time) / 1000, words: `${kindWords(kind)} ${changeWords(change)}` }));
-  return { spectra, alarms, place, startS: startMs / 1000, endS: endMs / 1000 };
+  const newest = spectra.time.length ? await ask([...path, "spectrum"], [], signal).catch(refused) : null;
+  return { spectra, alarms, newest, place, startS: startMs / 1000, endS: endMs / 1000 };
+}
+
+/** No newest spectrum, if the service has none since its start; another failure is one of the page. */
+function refused(failure) {
+  if (failure instanceof NotReachable) throw failure;
+  return null;
 }
 
 /** What is drawn, with the choices put in. */
 function drawnOf({ spectra, place, startS, endS }, choices) {
-  const inOrders = choices.inOrders();
+  const axis = AXES[choices.axis()];
+  const inOrders = axis === AXES.orders;
   const plain = rowsOf(spectra, place);
-  const abscissa = inOrders ? ordersOf(plain, spectra.frequency_hz) : spectra.frequency_hz;
-  const rows = inOrders ? alongOrders(plain, spectra.frequency_hz, abscissa) : plain;
-  const turns = plain.map(({ order1Hz }) => order1Hz).filter(Boolean);
-  const turnHz = turns.at(-1) ?? null;
-  const toUpper = Math.min(choices.toOrder() * (inOrders ? 1 : (turnHz ?? Infinity)), abscissa.at(-1));
-  const common = { rows, abscissa, inOrders, turnHz, toUpper, isLog: choices.isLog(), unit: inOrders ? "×" : "Hz" };
+  const frequencyHz = spectra.frequency_hz;
+  const abscissa = inOrders ? ordersOf(plain, frequencyHz) : frequencyHz.map((hz) => axis.of(hz));
+  const rows = inOrders ? alongOrders(plain, frequencyHz, abscissa) : plain;
+  const turnHz = plain.map(({ order1Hz }) => order1Hz).filter(Boolean).at(-1) ?? null;
+  const toUpper = Math.min(choices.toOrder() * axis.of(turnHz ?? Infinity, turnHz), abscissa.at(-1));
+  const common = { rows, plain, frequencyHz, abscissa, axis, turnHz, toUpper, isLog: choices.isLog() };
   return { ...common, startS: shownFromS(startS, endS, Date.parse(spectra.first) / 1000), endS, headroom: choices.asLines(), revision: choices.revision() };
 }
 
@@ -121,7 +138,7 @@ function absenceWords({ spectra, place }, choices) {
     return `No spectrum is kept of this time. The oldest that is kept is of ${first}.${past}`;
   }
   if (!spectra.channels[place].amplitude.some(Boolean)) return "This channel was not usable at any time of this range.";
-  if (choices.inOrders() && !spectra.order1_hz.some(Boolean)) {
+  if (choices.axis() === "orders" && !spectra.order1_hz.some(Boolean)) {
     return "The running speed was not known in this range: there are no multiples of it. Choose the axis in Hz.";
   }
   return null;
@@ -141,7 +158,7 @@ function mapCaption(drawn, { spectra, alarms }) {
   const { n_other_resolution: nOther, damaged, simulated_until: simulated } = spectra;
   const sentences = [
     `${thinned} spectra from ${from} on, each of its moment.`,
-    "Dotted: 1× and vortex. Empty: no samples, or the channel failed.",
+    "Dotted: 1×; dashed: vortex. Empty: no samples, or the channel failed.",
     alarms.length ? "Triangles: alarms of this bearing." : "",
     nOther ? `${nOther} with other lines, from before the analysis was set up anew, are left out.` : "",
     damaged.length ? `${damaged.length} are damaged on the disk and left out.` : "",
@@ -150,12 +167,29 @@ function mapCaption(drawn, { spectra, alarms }) {
   return sentences.filter(Boolean).join(" ");
 }
 
-async function showMoment(box, drawn, spectra, index) {
-  const row = drawn.rows[index];
-  if (!row?.amplitude) {
-    box.explain(`No spectrum of this channel at ${formatTime(spectra.time[index] * 1000)}: it was not usable.`);
+async function showMoment(box, cursor, drawn, spectra, index) {
+  const row = drawn.plain[index];
+  cursor.node.hidden = !drawn.rows[index]?.amplitude;
+  if (cursor.node.hidden) {
+    const why = row?.amplitude ? "the running speed was not known" : "it was not usable";
+    box.explain(`No spectrum of this channel at ${formatTime(spectra.time[index] * 1000)}: ${why}.`);
     return;
   }
-  const traces = momentTraces({ ...drawn, row, name: "" });
-  await box.show(traces, momentLayout({ ...drawn, row, top: highest(drawn) }), momentCaption({ spectra, index }));
+  const { frequencyHz, axis } = drawn;
+  cursor.draw({ frequencyHz, amplitude: row.amplitude, order1Hz: row.order1Hz, axis, fromHz: SCALE_FROM_HZ });
+  const layout = momentLayout({ ...drawn, row, top: highest(drawn) }, cursor.hz());
+  await box.show(momentTraces({ ...drawn, row }), layout, momentCaption({ spectra, index }));
+  cursor.hear(box.node.querySelector(".chart"));
+}
+
+async function showFull(box, cursor, drawn, { newest, place }) {
+  const pair = place.split("_")[0];
+  const row = newest && { order1Hz: newest.lines.order1, vortexHz: newest.lines.vortex };
+  if (!newest?.full[pair] || drawn.axis.of(1, row.order1Hz) === null) {
+    box.explain("No full spectrum now: it needs both channels of the pair and, along multiples, the running speed.");
+    return;
+  }
+  const caption = `${pair === "shaft" ? "Shaft" : "Bearing"} x and y together, up to ${formatTime(Date.parse(newest.time))}: right of zero with the rotation, left against it.`;
+  const layout = momentLayout({ ...drawn, row, top: highest(drawn) }, cursor.hz(), true);
+  await box.show(fullTraces(newest, pair, drawn.axis), layout, caption);
 }

@@ -1,12 +1,12 @@
 /** What a waterfall shows: channel, time, scale, axis, picture. */
 
 import { element } from "../dom.js";
-import { choice } from "../parts/choice.js";
+import { keptChoice } from "../parts/kept_choice.js";
 
 const PLACES = [["shaft_x", "Shaft x"], ["shaft_y", "Shaft y"], ["bearing_x", "Bearing x"], ["bearing_y", "Bearing y"]];
 const SPANS = [[3600, "1 h"], [8 * 3600, "8 h"], [86400, "1 d"], [7 * 86400, "7 d"], [30 * 86400, "30 d"], [365 * 86400, "1 y"]];
 const SCALES = [["log", "Logarithmic"], ["linear", "Linear"]];
-const AXES = [["hz", "Hz"], ["orders", "× speed"]];
+const AXES = [["hz", "Hz"], ["cpm", "cpm"], ["orders", "× speed"]];
 const UPPERS = [[2.5, "2.5×"], [6, "6×"], [Infinity, "All"]];
 const PICTURES = [["map", "Map"], ["lines", "Lines"]];
 
@@ -17,12 +17,12 @@ export function waterfallChoices(ask, show) {
     shiftS = 0;
     moved();
   };
-  const place = choice("Channel", PLACES, "shaft_x", ask);
-  const span = choice("Time", SPANS, 3600, renewed);
-  const scale = choice("Amplitude", SCALES, "log", show);
-  const axis = choice("Axis", AXES, "hz", show);
-  const upper = choice("Up to", UPPERS, 6, show);
-  const picture = choice("Picture", PICTURES, "map", show);
+  const place = keptChoice("channel", "Channel", PLACES, "shaft_x", ask);
+  const span = keptChoice("last", "Time", SPANS, 3600, renewed);
+  const scale = keptChoice("amplitude", "Amplitude", SCALES, "log", show);
+  const axis = keptChoice("axis", "Axis", AXES, "hz", show);
+  const upper = keptChoice("to", "Up to", UPPERS, 6, show);
+  const picture = keptChoice("picture", "Picture", PICTURES, "map", show);
   const earlier = element("button", { type: "button" }, "◂ Earlier");
   const later = element("button", { type: "button", disabled: "" }, "Later ▸");
   const shift = (by) => () => {
@@ -41,7 +41,7 @@ export function waterfallChoices(ask, show) {
     place: place.value,
     range: (nowMs) => ({ startMs: nowMs - (shiftS + span.value()) * 1000, endMs: nowMs - shiftS * 1000 }),
     isLog: () => scale.value() === "log",
-    inOrders: () => axis.value() === "orders",
+    axis: axis.value,
     toOrder: upper.value,
     asLines: () => picture.value() === "lines",
     revision: () => [place, span, scale, axis, upper, picture].map((one) => one.value()).join(" ") + shiftS,

@@ -6,17 +6,21 @@ import { bearingAddress, filmAddress, orbitAddress, waterfallAddress } from "../
 /** Pairs of words and address. */
 export function waysOf(unit, bearing) {
   return [
-    ["Numbers and charts", bearingAddress(unit, bearing)],
-    ["Film and baseline", filmAddress(unit, bearing)],
+    ["Bearing", bearingAddress(unit, bearing)],
+    ["Film", filmAddress(unit, bearing)],
     ["Spectra over time", waterfallAddress(unit, bearing)],
     ["Orbit player", orbitAddress(unit, bearing)],
     ["Trends", `#/trends?${new URLSearchParams([["b", `${unit}/${bearing}`]])}`],
   ];
 }
 
-/** The same as links, without the one to where we are. */
+/** The same as links, the one to where we are marked. */
 export function wayLinks(unit, bearing, here = null) {
-  const ways = waysOf(unit, bearing).filter(([, href]) => href !== here);
-  const links = ways.map(([words, href]) => element("li", {}, element("a", { href }, words)));
+  const links = waysOf(unit, bearing).map(([words, href]) => element("li", {}, linkTo(href, words, href === here)));
   return element("ul", { class: "ways" }, ...links);
+}
+
+/** A link that says whether it leads to where we are. */
+export function linkTo(href, words, isHere = false) {
+  return element("a", isHere ? { href, "aria-current": "page" } : { href }, words);
 }
