@@ -11,7 +11,6 @@ from service.api.answers import AnswerHeaders, Answers
 from service.api.auth.accounts import account_router, key_router
 from service.api.auth.declared import Declared, declared
 from service.api.auth.gate import Gate, require_declared
-from service.api.auth.refusals import AuditTrail
 from service.api.auth.sessions import session_router
 from service.api.context import Context
 from service.api.health import health_router
@@ -115,7 +114,6 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
     # the last one runs first
     app.add_middleware(AnswerHeaders, clock=context.clock)
     app.add_middleware(Gate, declared=lambda: app.declared, authenticator=authenticator)
-    app.add_middleware(AuditTrail, refusals=authenticator.refusals, clock=context.clock)
     app.add_middleware(TimedRequests, metrics=requests)
     install_problem_handlers(app)
     for router in (

@@ -5,62 +5,44 @@ from typing import Any
 
 from fastapi.routing import APIRoute
 
-from service.api.answers import EDITION_HEADER, ORIGIN_HEADER, TIME_HEADER
+from service.api.answers import EDITION_HEADER, JSON, ORIGIN_HEADER, TIME_HEADER
 from service.api.auth.authenticator import COOKIE
 from service.api.auth.declared import Declared
 from service.api.problems import WORDS, problem_schemas
 
-JSON = "application/json"
+
+def header(description: str, example: Any, kind: str = "string", **limits: Any) -> dict[str, Any]:
+    """Return the OpenAPI entry of a header whose schema has a type and further limits."""
+    return {
+        "description": description,
+        "schema": {"type": kind, **limits},
+        "example": example,
+    }
+
+
+TAG = 'W/"1f2e3d4c5b6a79880716253f"'
 
 IF_NONE_MATCH: dict[str, Any] = {
     "name": "If-None-Match",
     "in": "header",
     "required": False,
-    "description": "`ETag` of a cached answer: 304 if it is unchanged.",
-    "schema": {"type": "string"},
-    "example": 'W/"1f2e3d4c5b6a79880716253f"',
+    **header("`ETag` of a cached answer: 304 if it is unchanged.", TAG),
 }
 
-ETAG = {
-    "description": "Entity tag of the content, for `If-None-Match`.",
-    "schema": {"type": "string"},
-    "example": IF_NONE_MATCH["example"],
-}
+ETAG = header("Entity tag of the content, for `If-None-Match`.", TAG)
 
 HEADERS = {
-    TIME_HEADER: {
-        "description": "Time of the answer, from which clients compute ages.",
-        "schema": {"type": "string"},
-        "example": "2026-11-21T09:03:12.400Z",
-    },
-    ORIGIN_HEADER: {
-        "description": "Live data or replay of a recording.",
-        "schema": {"type": "string", "enum": ["live", "replay"]},
-        "example": "live",
-    },
-    EDITION_HEADER: {
-        "description": "Version of the program; changes with an upgrade.",
-        "schema": {"type": "string"},
-        "example": "1.0.0-1f2e3d4c",
-    },
+    TIME_HEADER: header(
+        "Time of the answer, from which clients compute ages.", "2026-11-21T09:03:12.400Z"
+    ),
+    ORIGIN_HEADER: header("Live data or replay of a recording.", "live", enum=["live", "replay"]),
+    EDITION_HEADER: header("Version of the program; changes with an upgrade.", "1.0.0-1f2e3d4c"),
 }
 """OpenAPI entries for the headers of successful answers, by name of the header."""
 
 PROBLEM_HEADERS: dict[str, dict[str, Any]] = {
-    "401": {
-        "WWW-Authenticate": {
-            "description": "How a machine authenticates.",
-            "schema": {"type": "string"},
-            "example": 'Bearer realm="padwatch"',
-        }
-    },
-    "429": {
-        "Retry-After": {
-            "description": "Time to wait before the next request, s.",
-            "schema": {"type": "integer"},
-            "example": 4,
-        }
-    },
+    "401": {"WWW-Authenticate": header("How a machine authenticates.", 'Bearer realm="padwatch"')},
+    "429": {"Retry-After": header("Time to wait before the next request, s.", 4, "integer")},
 }
 """OpenAPI entries for the headers of problems, by status."""
 

@@ -280,11 +280,7 @@ class FilmConditionModel(ApiModel):
 PlaceName = Literal["shaft_x", "shaft_y", "bearing_x", "bearing_y"]
 
 
-LEVEL_NAMES: dict[Level, LevelName] = {
-    Level.GOOD: "good",
-    Level.UNCERTAIN: "uncertain",
-    Level.BAD: "bad",
-}
+LEVEL_NAMES = {level: cast("LevelName", level.name.lower()) for level in Level}
 
 
 def level_names(levels: Iterable[Level | None]) -> list[LevelName | None]:
@@ -313,12 +309,9 @@ def reading_model(reading: Reading) -> ReadingModel:
 def _uncertainty(reading: Reading) -> UncertaintyModel | None:
     if reading.interval_95 is None:
         return None
-    return UncertaintyModel(
-        random=reading.u_random,
-        systematic=reading.u_systematic,
-        low_95=reading.interval_95[0],
-        high_95=reading.interval_95[1],
-    )
+    low, high = reading.interval_95
+    random, systematic = reading.u_random, reading.u_systematic
+    return UncertaintyModel(random=random, systematic=systematic, low_95=low, high_95=high)
 
 
 def window_model(window: AveragingWindow) -> WindowModel:

@@ -2,12 +2,12 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping
-from typing import Protocol
 
 import structlog
 
 from acquisition.clock import Clock
-from service.live.status import LinkState, UnitStatus
+from service.live.metrics import Newest
+from service.live.status import LinkState
 from service.runtime.heartbeats import Heartbeats, Loop
 from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import ServiceManager
@@ -15,14 +15,6 @@ from service.runtime.service_manager import ServiceManager
 log = structlog.get_logger()
 
 LOOK_EVERY_S = 10.0
-
-
-class Links(Protocol):
-    """Provider of the link status of units."""
-
-    def status(self, unit: str) -> UnitStatus:
-        """Return the link status of a unit."""
-        ...
 
 
 async def _no_job() -> None:
@@ -39,7 +31,7 @@ class Supervision:
         self,
         manager: ServiceManager,
         beats: Heartbeats,
-        live: Links,
+        live: Newest,
         units: Iterable[str],
         clock: Clock,
     ) -> None:
@@ -52,6 +44,13 @@ class Supervision:
     def ready(self) -> None:
         """Notify the service manager that the service is ready."""
         self._manager.notify(READY="1", STATUS=self._status())
+
+    def announce(self, write: Callable[[str], None], url: str, token: str | None) -> None:
+        """Notify the service manager; write the URL, and the set-up token unless it is None."""
+        self.ready()
+        write(url)
+        if token is not None:
+            write(f"token to create the first account, valid once within one hour: {token}")
 
     def stopping(self) -> None:
         """Notify the service manager that the service is stopping."""

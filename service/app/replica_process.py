@@ -112,10 +112,7 @@ async def run_serve(
         ended, served = asyncio.Event(), asyncio.Event()
 
         async def ready(url: str, token: str | None) -> None:
-            supervision.ready()
-            announce(url)
-            if token is not None:
-                announce(f"token to create the first account, valid once within one hour: {token}")
+            supervision.announce(announce, url, token)
 
         async def serve(pulse: Pulse) -> None:
             pulse.rest()

@@ -112,17 +112,12 @@ async def run_service(
         sources, held = timed_sources(units), [*(unit.id for unit in plant.unit), PLANT]
         supervision = Supervision(manager, beats, live, units, clock)
 
-        def ready(url: str, token: str | None) -> None:
-            supervision.ready()
-            announce(url)
-            if token is not None:
-                announce(f"token to create the first account, valid once within one hour: {token}")
-
         now = partial(plant_snapshot, analysis, sources)
         reports = SocketReports([*held, SHARED], analysis.snapshots, now, clock)
         metrics = partial(measuring_metrics, analysis, bus, sources)
         questions = Questions(analysis.executor, live, analysis.soundness, metrics)
         start = Start(plant, origin, service_run.is_demo)
+        ready = partial(supervision.announce, announce)
         serving = ServingChild(
             *(start, listener, reports.report, questions.answer, ready, clock, service_run.child)
         )

@@ -129,12 +129,10 @@ class ServiceRules:
         Rules without limits: no delays, delays of 5 s and 30 s, and an off-delay of ten minutes.
     """
 
-    store_behind: LimitRule = field(default_factory=lambda: LimitRule(Limits(10.0), AT_ONCE))
-    waiting: LimitRule = field(
-        default_factory=lambda: LimitRule(Limits(0.5, FULL_SHARE, 0.1), STEADY)
-    )
-    delay: LimitRule = field(default_factory=lambda: LimitRule(Limits(5.0, deadband=1.0), STEADY))
-    loss: LimitRule = field(default_factory=lambda: LimitRule(Limits(0.05), AT_ONCE))
+    store_behind: LimitRule
+    waiting: LimitRule
+    delay: LimitRule
+    loss: LimitRule
     at_once: AlarmRule = AT_ONCE
     steady: AlarmRule = STEADY
     lasting: AlarmRule = field(default_factory=lambda: rule_of(0.0, 60.0 * LOSS_MINUTES))
@@ -225,7 +223,7 @@ class ServiceAlarms(AlarmBoard):
             if look and leads and kind.subject != UNIT and kind.name != MESSAGES_REFUSED
         ]
         subjects = {kind.name: (kind.subject, kind) for kind in self._judged} | subjects
-        rules = rules or ServiceRules()
+        rules = rules or service_rules_of(AlarmSettings())
         self._watches = {
             key: watch(AlarmIdentity(PLANT, subject, kind.name), getattr(rules, kind.rule), subject)
             for key, (subject, kind) in subjects.items()

@@ -105,42 +105,6 @@ that another process has revoked."""
 MAX_CACHED = 4096
 
 
-class IdentityCache:
-    """Cache of the identities of credentials that were checked within the last `CACHE_S` seconds.
-
-    `generation` is the number of calls of `clear`. A full cache is emptied.
-    """
-
-    def __init__(self, clock: Clock) -> None:
-        self._clock = clock
-        self._known: dict[bytes, tuple[float, Identity]] = {}
-        self.generation = 0
-
-    def get(self, secret: str) -> Identity | None:
-        """Return the identity of a session token or key; None if it is not cached now."""
-        until_s, identity = self._known.get(digest(secret), (0.0, None))
-        return identity if self._clock.monotonic_s() < until_s else None
-
-    def put(self, secret: str, identity: Identity, generation: int) -> None:
-        """Store an identity, unless `clear` was called since the identity was read.
-
-        Parameters
-        ----------
-        generation
-            Value of the attribute `generation` before the identity was read.
-        """
-        if generation != self.generation:
-            return
-        if len(self._known) >= MAX_CACHED:
-            self._known.clear()
-        self._known[digest(secret)] = self._clock.monotonic_s() + CACHE_S, identity
-
-    def clear(self) -> None:
-        """Delete all identities; `put` then ignores identities that were read before."""
-        self.generation += 1
-        self._known.clear()
-
-
 class Authenticator:
     """Authenticator of callers, with coroutines that run blocking operations in threads.
 
@@ -162,7 +126,8 @@ class Authenticator:
     ) -> None:
         self.store, self.clock, self.local_role = store, clock, local_role
         self.service, self.work = AccessService(store, hashing, limits), AccessThreads()
-        self.refusals, self._cache = Refusals(store.audit, clock), IdentityCache(clock)
+        self.refusals = Refusals(store.audit, clock)
+        self._cache: dict[bytes, tuple[float, Identity]] = {}
 
     async def caller(self, scope: Scope) -> Caller:
         """Return the caller of a request, identified by credentials, else by address.
@@ -231,7 +196,7 @@ class Authenticator:
         try:
             return await (self.work.run_hashing(do) if hashes else self.work.run(do))
         finally:
-            self._cache.clear()
+            self._cache = {}
 
     async def offer_set_up(self) -> str | None:
         """Return a new token for creating the first account, which invalidates earlier tokens.
@@ -255,11 +220,16 @@ class Authenticator:
     async def _proven(self, shown: Credentials) -> Identity | None:
         if not shown.secret:
             return None
-        if (cached := self._cache.get(shown.secret)) is not None:
-            return cached
+        key, cache = digest(shown.secret), self._cache
+        until_s, identity = cache.get(key, (0.0, None))
+        if self.clock.monotonic_s() < until_s:
+            return identity
         check = self.service.machine if shown.means is Means.KEY else self.service.person
-        now_ns, generation = self.clock.now_ns(), self._cache.generation
+        now_ns = self.clock.now_ns()
         identity = await self.work.run(lambda: check(shown.secret, now_ns))
         if identity is not None:
-            self._cache.put(shown.secret, identity, generation)
+            if len(cache) >= MAX_CACHED:
+                cache.clear()
+            # a change since the start of the check has replaced the cache
+            cache[key] = self.clock.monotonic_s() + CACHE_S, identity
         return identity

@@ -5,13 +5,13 @@ from urllib.parse import urlsplit
 
 from fastapi import Request
 from starlette.datastructures import Headers
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.auth.authenticator import Authenticator, Caller
 from service.api.auth.declared import Declared, Reach
-from service.api.auth.refusals import SAFE
-from service.api.problems import STORE_FAILS, ProblemError, problem_answer
-from service.store.access.audit_entries import acting, name_actor
+from service.api.auth.refusals import REFUSED, SAFE
+from service.api.problems import DETAIL, STORE_FAILS, ProblemError, problem_answer
+from service.store.access.audit_entries import Acting, Source, acting, acting_as, name_actor
 from service.store.access.identities import LOCAL, Identity, Means
 from service.store.port import StoreError
 
@@ -73,6 +73,8 @@ CALLER = "caller"
 class Gate:
     """ASGI middleware that authenticates callers, and protects routes that are not open.
 
+    It gives audit entries the client address, and records refused changes in the audit trail.
+
     Parameters
     ----------
     declared
@@ -89,19 +91,31 @@ class Gate:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request with its caller in the state; answer 401, 403 or 503 if refused."""
-        try:
-            await self._admit(scope)
-        except ProblemError as error:
-            await problem_answer(Request(scope), error)(scope, receive, send)
-        else:
-            await self._app(scope, receive, send)
+        client, status = scope.get("client"), 0
+        state = scope.setdefault("state", {})
+
+        async def watched(message: Message) -> None:
+            nonlocal status
+            status = message.get("status", status)
+            await send(message)
+
+        with acting_as(Acting(Source.API, str(client[0]) if client else None)):
+            try:
+                await self._admit(scope)
+            except ProblemError as error:
+                await problem_answer(Request(scope), error)(scope, receive, watched)
+            else:
+                await self._app(scope, receive, watched)
+            if scope["method"] not in SAFE and status in REFUSED:
+                operation = f"{scope['method']} {scope['path']}"
+                await self._desk.refusals.note(operation, state.get(DETAIL, ""), status)
 
     async def _admit(self, scope: Scope) -> None:
         try:
             caller = await self._desk.caller(scope)
         except StoreError as error:
             raise ProblemError(503, "Store not available", STORE_FAILS) from error
-        scope.setdefault("state", {})[CALLER] = caller
+        scope["state"][CALLER] = caller
         if caller.identity is None and not self._is_open(scope):
             raise not_logged_in()
         _require_own_page(scope, caller)

@@ -3,12 +3,10 @@
 import asyncio
 
 import structlog
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from acquisition.clock import Clock
-from service.api.problems import DETAIL
 from service.api.token_bucket import TokenBucket
-from service.store.access.audit_entries import Acting, AuditAction, Source, acting, acting_as
+from service.store.access.audit_entries import AuditAction, acting
 from service.store.audit import AuditStore
 from service.store.port import StoreError
 
@@ -16,6 +14,9 @@ log = structlog.get_logger()
 
 SAFE = ("GET", "HEAD", "OPTIONS")
 """Safe HTTP methods, which change no state."""
+
+REFUSED = (401, 403, 409, 413, 422, 429)
+"""HTTP statuses of refused requests."""
 
 REQUEST_REFUSED = "request.refused"
 
@@ -37,22 +38,26 @@ class Refusals:
         self._allowance = TokenBucket(N_AT_ONCE, SECONDS_EACH, clock.monotonic_s())
         self.n_more = 0
 
-    async def note(self, deed: AuditAction, status: int) -> None:
+    async def note(self, operation: str, reason: str, status: int) -> None:
         """Record a refused request; above the rate limit, count it for the next entry.
 
         If the entry cannot be stored, the error is logged and the request is counted.
 
         Parameters
         ----------
-        deed
-            Audit entry, to which the HTTP status of the answer is added.
+        operation
+            Method and path of the request.
+        reason, status
+            Detail and HTTP status of the answer.
         """
         if not self._allowance.take(self._clock.monotonic_s()):
             self.n_more += 1
             return
         n_before, self.n_more = self.n_more, 0
         after = {"status": status} | ({"n_refused_more": n_before} if n_before else {})
-        if not await self._record(AuditAction(**{**vars(deed), "after": after})):
+        now_ns, who = self._clock.now_ns(), acting()
+        what = (now_ns, who.actor, REQUEST_REFUSED, operation, None, after, reason)
+        if not await self._record(AuditAction(*what, who.source, who.peer)):
             self.n_more += n_before + 1
 
     async def close(self) -> None:
@@ -68,40 +73,3 @@ class Refusals:
             log.error("refused request not recorded; the next entry counts it", reason=str(error))
             return False
         return True
-
-
-REFUSED = (401, 403, 409, 413, 422, 429)
-
-
-class AuditTrail:
-    """ASGI middleware that gives audit entries the client address, and records refused changes."""
-
-    def __init__(self, app: ASGIApp, refusals: Refusals, clock: Clock) -> None:
-        self._app, self._refusals, self._clock = app, refusals, clock
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request; record it if it would change state and is refused."""
-        client, status = scope.get("client"), 0
-        state = scope.setdefault("state", {})
-
-        async def forward(message: Message) -> None:
-            nonlocal status
-            status = message.get("status", status)
-            await send(message)
-
-        with acting_as(Acting(Source.API, str(client[0]) if client else None)):
-            await self._app(scope, receive, forward)
-            if scope["method"] not in SAFE and status in REFUSED:
-                await self._refusals.note(self._deed(scope, state.get(DETAIL, "")), status)
-
-    def _deed(self, scope: Scope, detail: str) -> AuditAction:
-        who = acting()
-        return AuditAction(
-            time_ns=self._clock.now_ns(),
-            actor=who.actor,
-            action=REQUEST_REFUSED,
-            object=f"{scope['method']} {scope['path']}",
-            reason=detail,
-            source=who.source,
-            peer=who.peer,
-        )

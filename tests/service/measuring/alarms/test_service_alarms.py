@@ -19,7 +19,8 @@ from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.live_view import LiveView
 from service.measuring.recorder import FILE, Findings, ParkedRows, Recorder
 from service.measuring.reported_alarms import identity_of
-from service.measuring.service_alarms import ServiceAlarms, ServiceHealth, ServiceRules
+from service.measuring.service_alarms import ServiceAlarms, ServiceHealth, service_rules_of
+from service.settings.alarms import AlarmSettings
 from service.store.port import AlarmQuery
 from service.store.sharing import UnitRow
 from service.store.sqlite import SqliteStore
@@ -35,7 +36,9 @@ class Watched:
 
     def __init__(self, host: Any, *, leads: bool = True) -> None:
         self.host, self.health = host, ServiceHealth()
-        self.alarms = ServiceAlarms(["U1"], ServiceRules(), lambda: self.health, leads=leads)
+        self.alarms = ServiceAlarms(
+            ["U1"], service_rules_of(AlarmSettings()), lambda: self.health, leads=leads
+        )
 
     def after(self, seconds: float, **health: Any) -> list[str]:
         own = {field.name for field in fields(ServiceHealth)}
@@ -176,7 +179,7 @@ def stored(
         def look() -> ServiceHealth:
             return ServiceHealth(store_error=live.store_error, store_behind_s=recorder.behind_s)
 
-        service = ServiceAlarms([], ServiceRules(), look)
+        service = ServiceAlarms([], service_rules_of(AlarmSettings()), look)
         engine = AlarmEngine({}, recorder.put, host, service=service)
         engine.restore(store.alarms())
         return engine, recorder, (store, uncertain)
