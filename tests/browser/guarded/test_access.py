@@ -112,7 +112,7 @@ async def test_a_viewer_is_told_what_he_may_not_do_and_not_offered_it(plant, rem
     await open_as(page, "viewer", plant.url + ALARMS)
     await expect(page.locator(f"{ROW} button:visible")).to_have_count(0)
     await expect(page.locator(".limit")).to_contain_text("takes the role operator")
-    await expect(page.get_by_label("Your name")).to_have_count(0)
+    await expect(page.get_by_role("textbox", name="Your name")).to_have_count(0)
     await expect(page.get_by_role("link", name="Audit")).to_be_hidden()
     await page.goto(plant.url + "#/audit")
     await expect(page.get_by_text("takes the role engineer")).to_be_visible()
