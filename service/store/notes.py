@@ -1,7 +1,6 @@
 """Notes of people about a unit or a bearing at a time; the audit trail keeps them."""
 
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from service.store.access.audit_entries import AuditAction, acting
@@ -44,9 +43,8 @@ def note_action(note: Note, now_ns: int) -> AuditAction:
     )
 
 
-def notes_between(audit: AuditStore, unit: str, start_ns: int, end_ns: int) -> Iterator[Note]:
-    """Yield the notes of a unit that refer to a half-open time range, last added first."""
-    for entry in audit.entries(AuditQuery(limit=MAX_NOTES, action=NOTE_ADDED, object=unit)):
-        note = Note(unit=unit, author=entry.actor, **json.loads(entry.after or "{}"))
-        if start_ns <= note.time_ns < end_ns:
-            yield note
+def notes_between(audit: AuditStore, unit: str, start_ns: int, end_ns: int) -> list[Note]:
+    """Return the notes of a unit that refer to a half-open time range, last added first."""
+    entries = audit.entries(AuditQuery(limit=MAX_NOTES, action=NOTE_ADDED, object=unit))
+    notes = (Note(unit=unit, author=e.actor, **json.loads(e.after or "{}")) for e in entries)
+    return [note for note in notes if start_ns <= note.time_ns < end_ns]

@@ -10,7 +10,7 @@ from service.api.auth.declared import needs, subject_router
 from service.api.auth.gate import actor_or
 from service.api.context import Context, UnitId
 from service.api.parameters import Moment, OptionalTimeRange, ns_from_datetime
-from service.api.problems import ProblemError, problem_responses
+from service.api.problems import problem_responses
 from service.api.routes.alarms import COMMENT_LIMIT, Allowances
 from service.api.values import ActorModel, ApiModel, ReasonText, Time
 from service.store.access.identities import Permission
@@ -19,9 +19,6 @@ from service.store.notes import Note, notes_between
 
 class NoteModel(ApiModel):
     """Note about a unit or a bearing at a time."""
-
-    unit: str
-    """Identifier of the unit."""
 
     bearing: str | None
     """Identifier of the bearing; null for a note about the whole unit."""
@@ -43,7 +40,7 @@ class AddNoteModel(ActorModel):
     """Text, 1 to 500 printable characters."""
 
     time: Annotated[Moment, Field(strict=False, examples=["2026-11-21T08:00:00Z"])]
-    """Time to which the note refers, RFC 3339 with offset, from 1970 to 2262."""
+    """Time to which the note refers, RFC 3339 with offset."""
 
     bearing: Annotated[str | None, Field(examples=["UJB"])] = None
     """Identifier of the bearing; null for a note about the whole unit."""
@@ -62,7 +59,7 @@ def note_router(context: Context) -> APIRouter:
         """
         context.unit(unit)
         audit = context.store.audit
-        found = await in_thread(lambda: list(notes_between(audit, unit, *times)))
+        found = await in_thread(lambda: notes_between(audit, unit, *times))
         return [NoteModel.of(note) for note in found]
 
     @router.post(
@@ -77,8 +74,6 @@ def note_router(context: Context) -> APIRouter:
         if asked.bearing is not None:
             context.bearing(unit, asked.bearing)
         time_ns = ns_from_datetime(asked.time, "time")
-        if not 0 <= time_ns < 2**63:
-            raise ProblemError(422, "Wrong parameter", "time must be from 1970 to 2262", "time")
         allowances.take(request, context.clock.monotonic_s())
         note = Note(unit, asked.bearing, time_ns, asked.text, actor_or(asked.actor))
         await context.operators.add_note(note)

@@ -191,12 +191,8 @@ def _group(group: TrendGroup) -> dict[str, object]:
 
 def _columns_of(trend: Trend) -> dict[str, object]:
     series = {name: _series(name, trend.series) for name in trend.series if name in BY_NAME}
-    return {"bucket_s": bucket_s(trend), "time": [*map(rfc3339, trend.time_ns)], "series": series}
-
-
-def bucket_s(trend: Trend) -> float | None:
-    """Return the width of the buckets of a trend, s; None for single readings."""
-    return None if trend.bucket_ns is None else trend.bucket_ns / NS_PER_S
+    bucket_s = trend.bucket_ns and trend.bucket_ns / NS_PER_S
+    return {"bucket_s": bucket_s, "time": [*map(rfc3339, trend.time_ns)], "series": series}
 
 
 def trend_columns(quantities: Iterable[str]) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """The page of a bearing: its charts, keyboard, estimators, and the budget of any uncertainty."""
 
+import asyncio
 import json
 import re
 
@@ -51,6 +52,20 @@ async def test_every_chart_is_drawn_from_the_plant_alone_and_says_what_it_shows(
     await expect(page.locator("[data-chart=spectrum] .chart .xtick").last).to_contain_text("25")
     assert all(url.startswith((plant.url, "data:", "blob:")) for url in asked)
     assert complaints == []
+
+
+async def test_the_numbers_do_not_wait_for_the_chart_library(plant, page: Page) -> None:
+    is_let = asyncio.Event()
+
+    async def hold(route: Route) -> None:
+        await is_let.wait()
+        await route.continue_()
+
+    await page.route("**/plotly.min.js", hold)
+    await open_bearing(page, plant.url)
+    assert await page.locator(".chart path.js-line").count() == 0
+    is_let.set()
+    await await_charts(page)
 
 
 async def test_the_keyboard_leads_from_the_plant_to_a_unit_its_bearing_and_its_charts(

@@ -6,10 +6,15 @@ from datetime import UTC, datetime, timedelta
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
+from on_screen import FILES, freeze
 from playwright.async_api import Page, Request, expect
 
 STIFFNESS = "[data-chart=trend-film-stiffness-gn-m]"
 COMPARED = "#/trends?b=U1/UJB&b=U1/LJB&q=stiffness_xx_n_per_m"
+EMPTY = FILES[1:] + "padwatch.svg"
+CALL = (
+    f"async ([module, name, ...given]) => (await import(`{FILES}${{module}}.js`))[name](...given)"
+)
 CURVES = ".chart .scatterlayer .trace path.js-line"
 
 
@@ -195,6 +200,9 @@ async def test_an_address_restores_what_was_shown_and_is_complained_of_in_words(
 
 async def test_the_page_of_a_bearing_leads_to_its_trends(plant, page) -> None:
     await page.goto(plant.url + "#/units/U1/bearings/LJB")
+    await page.get_by_role("link", name="Compare in Trends").click()
+    await expect(page.get_by_role("radio", name="15 min")).to_be_checked()
+    await page.go_back()
     await page.get_by_role("radio", name="1 y").check()
     await page.get_by_role("link", name="Compare in Trends").click()
 
@@ -203,3 +211,62 @@ async def test_the_page_of_a_bearing_leads_to_its_trends(plant, page) -> None:
     await expect(page.locator("summary").first).to_have_text("Bearings: 1")
     assert "b=U1%2FLJB" in await page.evaluate("location.hash")
     assert "order1_shaft_x_um_pk" in await page.evaluate("location.hash")
+
+
+def bucket(value: float, level: str) -> dict[str, object]:
+    return {"mean": value, "minimum": value, "maximum": value, "level": level}
+
+
+async def test_uncertain_values_far_from_the_good_ones_do_not_set_the_axis(plant, page) -> None:
+    await page.goto(plant.url + EMPTY)
+    good = [bucket(0.50, "good"), bucket(0.52, "good")]
+    for others, low, high in (
+        ([], 0.45, 0.55),
+        ([bucket(26.4, "uncertain")], 0.45, 0.55),
+        ([bucket(0.60, "uncertain"), bucket(-3.0, "bad")], 0.45, 0.65),
+    ):
+        axis = await page.evaluate(CALL, ["charts/trend", "valueRange", [[[*good, *others]]]])
+        assert low < axis[0] < 0.5
+        assert max(0.52, high - 0.05) < axis[1] < high
+        n = await page.evaluate(CALL, ["charts/trend", "nOutside", [[[*good, *others]]], axis])
+        assert n == sum(one["mean"] in (26.4, -3.0) for one in others)
+    alone = [[[bucket(26.4, "uncertain"), bucket(0.5, "bad")]]]
+    axis = await page.evaluate(CALL, ["charts/trend", "valueRange", alone])
+    assert axis[0] < 0.5
+    assert axis[1] > 26.4
+
+
+async def test_alarms_are_marked_when_they_were_raised_rose_and_returned(plant, page) -> None:
+    await page.goto(plant.url + EMPTY)
+    events = [
+        {
+            "kind": "oil_temperature",
+            "change": change,
+            "level": level,
+            "time": f"2026-01-01T0{n}:00Z",
+        }
+        for n, (change, level) in enumerate(
+            [
+                *(("raised", "alert"), ("acknowledged", "alert"), ("escalated", "danger")),
+                *(("eased", "alert"), ("returned", "alert"), ("commented", None)),
+            ]
+        )
+    ]
+    beside = {"events": events, "notes": []}
+    marks = await page.evaluate(CALL, ["charts/beside", "markTraces", beside])
+    assert [(one["name"], len(one["x"])) for one in marks] == [
+        *(("alert", 2), ("danger", 1), ("alarm returned", 1)),
+    ]
+    assert marks[1]["text"] == ["Oil temperature rose to danger"]
+
+
+async def test_the_bearing_whose_film_is_in_alarm_comes_first(plant, page) -> None:
+    overview = await freeze(page, plant.url)
+    overview["units"][0]["bearings"][2]["film"]["y"]["level"] = "danger"
+    overview["units"][0]["bearings"][1]["film"]["x"]["level"] = "alert"
+    await page.goto(plant.url + "#/trends")
+
+    await expect(page.locator(f"{STIFFNESS} h2")).to_contain_text("U1 TJB: ")
+    assert "b=U1%2FTJB" in await page.evaluate("location.hash")
+    await page.goto(plant.url + "#/trends?b=U1%2FUJB")
+    await expect(page.locator(f"{STIFFNESS} h2")).to_contain_text("U1 UJB: ")

@@ -14,7 +14,7 @@ async def test_a_note_is_listed_at_its_time_with_who_wrote_it(service):
     )
 
     assert added.status_code == of_unit.status_code == 200
-    first = {"unit": "U1", "bearing": "UJB", "time": AT, "text": "shims changed"}
+    first = {"bearing": "UJB", "time": AT, "text": "shims changed"}
     assert added.json() == first | {"author": "A. Name"}
     second = of_unit.json()
     assert (second["time"], second["bearing"]) == ("2026-01-01T09:00:00.000Z", None)
@@ -42,8 +42,6 @@ async def test_a_note_that_cannot_be_placed_is_refused(service):
         (NOTES, 422, {"text": "two\nlines"}),
         (NOTES, 422, {"time": 1767225600}),
         (NOTES, 422, {"time": "2026-01-01T08:00:00"}),
-        (NOTES, 422, {"time": "1969-12-31T23:59:59Z"}),
-        (NOTES, 422, {"time": "2300-01-01T00:00:00Z"}),
         (NOTES, 422, {"actor": ""}),
     ):
         await service.refused(path, status, SHIMS | changes)

@@ -155,9 +155,6 @@ export function trendLayout(trends, title, revision, valueRange) {
   });
 }
 
-/** Where hardly any value is good, the share at each end that does not set the axis. */
-const TRIMMED = 0.05;
-
 /** Uncertain values set the axis up to this share of a value beyond the good ones, or up to their spread. */
 const REACH = 0.25;
 
@@ -169,15 +166,11 @@ const REACH = 0.25;
 export function valueRange(allPieces, beside = [], fromZero = false) {
   const all = allPieces.flat(2);
   const good = all.filter(({ level }) => level === "good");
-  const isFew = good.length < TRIMMED * all.length;
-  const values = (isFew ? all : good).flatMap(({ minimum, maximum }) => [minimum, maximum]).sort((a, b) => a - b);
-  const n = isFew ? Math.floor(TRIMMED * values.length) : 0;
-  const ends = [values[n], values.at(-1 - n)];
-  const reach = Math.max(ends[1] - ends[0], REACH * Math.max(...ends.map(Math.abs)));
-  const near = all.map(({ mean }) => mean).filter((mean) => mean > ends[0] - reach && mean < ends[1] + reach);
+  const [least, most] = endsOf((good.length ? good : all).flatMap(({ minimum, maximum }) => [minimum, maximum]));
+  const reach = Math.max(most - least, REACH * Math.max(Math.abs(least), Math.abs(most)));
+  const near = all.map(({ mean }) => mean).filter((mean) => mean > least - reach && mean < most + reach);
   const levels = beside.filter(({ name }) => name !== "danger limit").flatMap(({ y }) => y.filter((gn) => gn !== null));
-  const shown = [...ends, ...near, ...levels];
-  const [low, high] = [shown.reduce((a, b) => Math.min(a, b)), shown.reduce((a, b) => Math.max(a, b))];
+  const [low, high] = endsOf([least, most, ...near, ...levels]);
   const margin = 0.08 * (high - low) || 0.05 * Math.abs(high) || 1;
   return [fromZero ? Math.min(low, 0) : low - margin, high + margin];
 }
@@ -190,8 +183,8 @@ const RANDOM_WORDS =
 
 /** From when to when there are data. */
 export function spanCaption(allPieces) {
-  const times = allPieces.flat(2).map((bucket) => bucket.timeS * 1000);
-  return `Data from ${formatTime(earliest(times))} to ${formatTime(latest(times))}.`;
+  const [from, to] = endsOf(allPieces.flat(2).map((bucket) => bucket.timeS * 1000)).map(formatTime);
+  return `Data from ${from} to ${to}.`;
 }
 
 /** From when to when there are data, and how to read the chart. */
@@ -201,5 +194,4 @@ export function trendCaption(allPieces, nBeyond) {
   return `${spanCaption(allPieces)} Band: smallest to largest; line: mean.${random}${outside}`;
 }
 
-const earliest = (times) => times.reduce((a, b) => Math.min(a, b));
-const latest = (times) => times.reduce((a, b) => Math.max(a, b));
+const endsOf = (numbers) => [numbers.reduce((a, b) => Math.min(a, b)), numbers.reduce((a, b) => Math.max(a, b))];

@@ -11,7 +11,7 @@ export function explorerFiles() {
     node,
     show(asked) {
       node.hidden = asked.length === 0;
-      node.replaceChildren("Take away what is shown:", ...asked.flatMap(linksOf));
+      node.replaceChildren("Export:", ...asked.flatMap(linksOf));
     },
   };
 }

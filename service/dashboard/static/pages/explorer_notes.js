@@ -46,9 +46,9 @@ export function explorerNotes(again) {
     node,
     show(found, [, endMs]) {
       form.hidden = found.length === 0;
-      const notes = new Map(found.flatMap(({ beside }) => beside.notes.map((note) => [JSON.stringify(note), note])));
-      const sorted = [...notes.values()].sort((one, other) => other.time.localeCompare(one.time));
-      list.replaceChildren(...sorted.map(noteRow), ...(sorted.length ? [] : [element("li", { class: "sentence" }, "No notes in this time.")]));
+      const notes = found.flatMap(({ bearing: [unit], beside }) => beside.notes.map((note) => `${note.time} ${wordsOf(unit, note)}`));
+      const rows = [...new Set(notes)].sort().reverse().map((note) => element("li", {}, note.replace(/^\S+/, (time) => formatTime(Date.parse(time)))));
+      list.replaceChildren(...(rows.length ? rows : [element("li", { class: "sentence" }, "No notes in this time.")]));
       time.value ||= localSecond(endMs);
       const places = [...new Set(found.flatMap(({ bearing: [unit, bearing] }) => [`${unit}/${bearing}`, unit]))];
       if (places.join() === [...about.options].map(({ value }) => value).join()) return;
@@ -57,7 +57,4 @@ export function explorerNotes(again) {
   };
 }
 
-function noteRow({ unit, bearing, time, text, author }) {
-  const place = [unit, bearing].filter(Boolean).join(" ");
-  return element("li", {}, element("time", { datetime: time }, formatTime(Date.parse(time))), ` ${place}: ${text} (${author})`);
-}
+const wordsOf = (unit, { bearing, text, author }) => `${[unit, bearing].filter(Boolean).join(" ")}: ${text} (${author})`;
