@@ -108,10 +108,10 @@ def preferred_stiffness(
     if numbers:
         reading, estimator = min(numbers, key=lambda choice: choice[0].quality.level)
         before = itertools.takewhile(lambda choice: choice[1] is not estimator, numbers)
-        doubts = [r.quality for r, _ in before if r.quality.reason in MODEL_DOUBTS]
-        if any(r.quality.reason is Reason.POLARITY for r, _ in found):
-            doubts.append(uncertain(Reason.POLARITY))
-        return replace(reading, quality=worst((reading.quality, *doubts))), estimator
+        doubts = (r.quality for r, _ in before if r.quality.reason in MODEL_DOUBTS)
+        has_wrong_sign = any(r.quality.reason is Reason.POLARITY for r, _ in found)
+        signs = [uncertain(Reason.POLARITY)] if has_wrong_sign else []
+        return replace(reading, quality=worst((*signs, reading.quality, *doubts))), estimator
     return missing(found[0][0].quality.reason), None
 
 

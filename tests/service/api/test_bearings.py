@@ -98,6 +98,7 @@ async def test_a_bearing_is_described_as_configured(read_only):
     assert one == {
         "unit": "U1",
         "id": "UJB",
+        "name": "upper guide",
         "bracket_stiffness_n_per_m": 1.18e9,
         "clearance_um": 200.0,
         "gap_reference_um": [2000.0, 2000.0],

@@ -103,7 +103,9 @@ async def test_the_overview_shows_each_bearing_and_the_catalogue_every_quantity(
             latest = await read_only.json(path)
             bad = [one["reason"] for one in latest["readings"].values() if one["level"] == "bad"]
             assert bearing.pop("bad_reasons") == list(dict.fromkeys(bad))
-            assert set(bearing.pop("film")) == {"why_not", "x", "y"}
+            assert set(bearing.pop("film")) == {"why_not", "limits", "x", "y"}
+            assert bearing.pop("doubtful_signs") == []
+            assert "guide" in bearing.pop("name")
             readings = bearing.pop("readings")
             assert set(readings) == set(SHOWN)
             for name, reading in readings.items():
