@@ -94,7 +94,8 @@ class Budget:
     @property
     def interval(self) -> tuple[float, float]:
         """95 % coverage interval of the result: lower and upper end."""
-        return self.bounded_interval or _interval(self.value, self.lines)
+        half = _half_width([(line.contribution, line.freedoms) for line in self.lines])
+        return self.bounded_interval or (self.value - half, self.value + half)
 
     def reading(self, quality: Quality) -> Reading:
         """Return the result as a reading with its standard uncertainties and interval."""
@@ -149,11 +150,6 @@ def proportional(value: float, budget: Budget) -> Budget:
     factor = value / budget.value
     lines = (line._replace(sensitivity=factor * line.sensitivity) for line in budget.lines)
     return Budget(value, tuple(lines))
-
-
-def _interval(value: float, lines: Sequence[BudgetLine]) -> tuple[float, float]:
-    half = _half_width([(line.contribution, line.freedoms) for line in lines])
-    return value - half, value + half
 
 
 def _root_sum(lines: Iterable[BudgetLine]) -> float:

@@ -104,9 +104,7 @@ def confine(memory_bytes: int) -> None:
         (resource.RLIMIT_CORE, 0),
         (resource.RLIMIT_FSIZE, LOG_BYTES),
     ):
-        highest = resource.getrlimit(kind)[
-            1
-        ]  # an unprivileged process cannot raise this inherited limit
+        _, highest = resource.getrlimit(kind)  # cannot be raised without privileges
         limit = limit if highest == resource.RLIM_INFINITY else min(limit, highest)
         is_lower = kind == resource.RLIMIT_CPU and limit != highest
         resource.setrlimit(kind, (limit, limit + is_lower))  # SIGXCPU precedes SIGKILL

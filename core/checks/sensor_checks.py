@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.arrays import FloatArray
+from core.checks.channels import COUNTS_FULL_SCALE
 from core.quality import GOOD, Quality, Reading, Reason, bad, missing, uncertain
 
 N_PIECES = 8
@@ -21,9 +22,6 @@ loose contact: only this segment of the channel is left out. Above it, the chann
 SURE = 4.0
 """Coverage factor for the uncertainty of the speed in the speed check; large, because many segments
 are checked."""
-
-LOWEST_COUNT, HIGHEST_COUNT = -32768, 32767
-"""Lowest and highest count of a 16-bit converter."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +121,7 @@ def clipped_share(samples: FloatArray, unit_per_count: float) -> float:
     `unit_per_count` must not be 0.
     """
     counts = samples / unit_per_count
-    at_end = (counts > HIGHEST_COUNT - 0.5) | (counts < LOWEST_COUNT + 0.5)
+    at_end = (counts > COUNTS_FULL_SCALE - 1.5) | (counts < 0.5 - COUNTS_FULL_SCALE)
     return float(np.mean(at_end))
 
 

@@ -243,16 +243,16 @@ class Counts:
     """Assignment of epochs: a sample count that restarts within an epoch gets a new epoch.
 
     A device or a program that reads it may restart the count without reporting it. The index alone
-    then looks like repeated samples; the time shows that they are new. `count` is None before the
-    first block.
+    then looks like repeated samples; the time shows that they are new.
+
+    Attributes
+    ----------
+    count
+        Current sample count; None before the first block. Set after a restart of padwatch.
     """
 
     def __init__(self) -> None:
         self.count: Count | None = None
-
-    def restore(self, count: Count | None) -> None:
-        """Restore the current sample count after a restart of padwatch; None if there was none."""
-        self.count = count
 
     def replayed(self, block: SampleBlock) -> SampleBlock:
         """Return a replayed block with the epoch that was assigned to its sample count."""

@@ -25,40 +25,6 @@ class RunoutVerdict(StrEnum):
     NO_PHASE_REFERENCE = "no_phase_reference"
 
 
-def take_off_runout(
-    phasor_um_pk: complex,
-    vector: SlowRollVector | None,
-    probe: str,
-    rated_speed_rpm: float,
-    shaft_angle_rad: float | None,
-) -> tuple[complex, RunoutVerdict]:
-    """Subtract the slow-roll vector from a probe's 1× phasor if the vector is applicable.
-
-    Only the 1× phasor is corrected: runout at other orders is not measured.
-
-    Parameters
-    ----------
-    phasor_um_pk
-        1× phasor of one segment; its phase is that of the signal at the segment's first sample.
-    vector
-        Slow-roll vector of the channel; None if not measured.
-    probe
-        Serial number or mark of the installed probe.
-    shaft_angle_rad
-        Angle that the shaft has turned, at the first sample, since its mark passed the pick-up;
-        None without a key-phase.
-
-    Returns
-    -------
-    The corrected or unchanged phasor, and whether the vector was subtracted.
-    """
-    verdict = runout_verdict(vector, probe, rated_speed_rpm, shaft_angle_rad is not None)
-    if vector is None or shaft_angle_rad is None or verdict is not RunoutVerdict.APPLIED:
-        return phasor_um_pk, verdict
-    surface = vector.phasor_um_pk * cmath.exp(1j * shaft_angle_rad)
-    return phasor_um_pk - surface, verdict
-
-
 def runout_verdict(
     vector: SlowRollVector | None, probe: str, rated_speed_rpm: float, has_key_phase: bool
 ) -> RunoutVerdict:
@@ -83,6 +49,8 @@ def without_runout(
 ) -> tuple[ComplexArray, Mapping[str, RunoutVerdict]]:
     """Return 1× phasors from which the applicable slow-roll vectors are subtracted.
 
+    Runout at other orders is not measured and therefore not corrected.
+
     Parameters
     ----------
     order1_um_pk
@@ -100,13 +68,12 @@ def without_runout(
     cleaned, verdicts = order1_um_pk.copy(), {}
     for row in rows:
         channel = unit.channels[row]
-        cleaned[row], verdicts[channel.id] = take_off_runout(
-            complex(order1_um_pk[row]),
-            channel.slow_roll,
-            channel.probe,
-            unit.rated_speed_rpm,
-            angle_rad,
-        )
+        vector, has_key_phase = channel.slow_roll, angle_rad is not None
+        verdict = runout_verdict(vector, channel.probe, unit.rated_speed_rpm, has_key_phase)
+        if vector is not None and angle_rad is not None and verdict is RunoutVerdict.APPLIED:
+            surface = vector.phasor_um_pk * cmath.exp(1j * angle_rad)
+            cleaned[row] = complex(order1_um_pk[row]) - surface
+        verdicts[channel.id] = verdict
     return cleaned, verdicts
 
 

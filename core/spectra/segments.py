@@ -339,8 +339,7 @@ class SegmentTransform(KeptSegments):
         row = self._key_phase_row
         if row is None or not usable[row]:
             return None
-        found = read_key_phase(self._unit.channels[row].direction * samples[row], rate_hz)
-        return found if isinstance(found, KeyPhase) else None
+        return read_key_phase(self._unit.channels[row].direction * samples[row], rate_hz)
 
     def _speed(
         self,

@@ -164,7 +164,7 @@ class Analyser:
         """Prepare the monitor of a unit for a replay of its newest samples, from a stored state."""
         self._monitors[unit].go_on(None)
         self._monitors[unit].rewind(memory.monitor)
-        self._counts[unit].restore(memory.count)
+        self._counts[unit].count = memory.count
 
     def settle(self, unit: str, memory: UnitMemory) -> None:
         """Restore a stored state of a unit's monitor after the replay of its newest samples."""

@@ -74,7 +74,7 @@ def test_an_epoch_that_the_device_tells_is_taken_as_it_is(counts):
 def test_another_process_goes_on_in_the_same_count_whatever_its_clock_says(counts):
     anew = counts.placed(at(0, late_s=1700.0))
     other = Counts()
-    other.restore(counts.count)
+    other.count = counts.count
     assert place(other.replayed(at(0, late_s=1700.0))) == place(anew)
     following = at(60, late_s=1700.0)
     assert place(other.placed(following)) == place(counts.placed(following))
@@ -82,7 +82,7 @@ def test_another_process_goes_on_in_the_same_count_whatever_its_clock_says(count
     counts.placed(at(MILLION))
     counts.placed(at(MILLION + 60, late_s=-3600.0))
     other = Counts()
-    other.restore(counts.count)
+    other.count = counts.count
     assert other.replayed(at(MILLION)).epoch == 7
 
 

@@ -17,7 +17,7 @@ from core.machine.unit import Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
 from core.quality import GOOD, Reading, Reason, bad, uncertain
-from core.spectra.runout import RunoutVerdict, take_off_runout, without_runout
+from core.spectra.runout import RunoutVerdict, without_runout
 from core.spectra.speed import KeyPhase, Speed, SpeedSource
 
 RATE_HZ, N = 600.0, 2 * 8192
@@ -136,13 +136,26 @@ VECTOR = SlowRollVector("ujb_shaft_x", "SN 4711", 10.0 * cmath.exp(0.4j), 12.0, 
 VIBRATION = 25.0 * cmath.exp(-1.1j)
 """Relative to the mark on the shaft, as the vector is."""
 
+UNDOUBTED = Speed(Reading(92.3), SpeedSource.KEY_PHASE)
+
+
+def of_one_channel(
+    unit: Unit, read: complex, vector: SlowRollVector | None, probe: str, angle_rad: float | None
+) -> tuple[complex, RunoutVerdict]:
+    """The phasor of the x probe without runout, and the verdict on its vector."""
+    channel = replace(unit.channels[0], probe=probe, slow_roll=vector)
+    there = replace(unit, rated_speed_rpm=92.3, channels=(channel, *unit.channels[1:]))
+    key_phase = None if angle_rad is None else KeyPhase(angle_rad, 92.3)
+    found, verdicts = without_runout(np.array([read]), there, [0], UNDOUBTED, key_phase)
+    return complex(found[0]), verdicts[channel.id]
+
 
 @pytest.mark.parametrize("shaft_angle_rad", [0.0, 0.9, -2.0, 40.0])
-def test_what_is_left_is_the_vibration_wherever_the_segment_began(shaft_angle_rad):
+def test_what_is_left_is_the_vibration_wherever_the_segment_began(unit, shaft_angle_rad):
     start = cmath.exp(1j * shaft_angle_rad)
     read = (VIBRATION + VECTOR.phasor_um_pk) * start
 
-    phasor_um_pk, verdict = take_off_runout(read, VECTOR, "SN 4711", 92.3, shaft_angle_rad)
+    phasor_um_pk, verdict = of_one_channel(unit, read, VECTOR, "SN 4711", shaft_angle_rad)
 
     assert phasor_um_pk == pytest.approx(VIBRATION * start)
     assert verdict is RunoutVerdict.APPLIED
@@ -158,8 +171,10 @@ def test_what_is_left_is_the_vibration_wherever_the_segment_began(shaft_angle_ra
         (VECTOR, "SN 4711", None, RunoutVerdict.NO_PHASE_REFERENCE),
     ],
 )
-def test_a_vector_that_is_of_no_use_is_left_out_and_said_to_be(vector, probe, angle_rad, verdict):
-    found = take_off_runout(VIBRATION, vector, probe, 92.3, angle_rad)
+def test_a_vector_that_is_of_no_use_is_left_out_and_said_to_be(
+    unit, vector, probe, angle_rad, verdict
+):
+    found = of_one_channel(unit, VIBRATION, vector, probe, angle_rad)
 
     assert found == (VIBRATION, verdict)
 
@@ -167,7 +182,6 @@ def test_a_vector_that_is_of_no_use_is_left_out_and_said_to_be(vector, probe, an
 PHASORS = np.array([30.0 + 10.0j, 20.0j, 5.0 + 0.0j, 5.0j])
 SURFACE = 8.0 * np.exp(0.5j)
 KEY_PHASE = KeyPhase(shaft_angle_rad=1.2, speed_rpm=92.3)
-UNDOUBTED = Speed(Reading(92.3), SpeedSource.KEY_PHASE)
 
 
 @pytest.fixture
