@@ -27,7 +27,8 @@ from service.settings.storage import Origin
 from service.store.port import StoredEvent, ValueRange
 
 if TYPE_CHECKING:
-    AlarmStateName = AlarmChangeName = str
+    AlarmStateName = str
+    AlarmChangeName = str
 else:
     AlarmStateName = Literal[tuple(state.value for state in AlarmState)]
     AlarmChangeName = Literal[tuple(change.value for change in AlarmChange)]
