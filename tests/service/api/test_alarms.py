@@ -378,7 +378,7 @@ async def test_events_are_filtered_by_subject_and_level(service, probes):
 async def test_an_alarm_says_what_it_waits_for(service, probes):
     probes.send(2, Reason.SENSOR_FAILURE)
     [active] = (await service.json(ALARMS))["alarms"]
-    probes.send(2)  # well again, for less than the off-delay
+    probes.send(2, results=[assessment()])  # well again, for less than the off-delay
     [returning] = (await service.json(ALARMS))["alarms"]
 
     assert (active["waits_for"], returning["waits_for"]) == (None, "normal")
