@@ -72,11 +72,11 @@ export function expectedTraces({ film, readings }, name, colour, hasLimits = tru
   const series = readings?.[DIRECTIONS[name]];
   const expected = readings?.time.map((timeS, n) => [timeS, series ? expectedGn(series, n) : null]) ?? [];
   if (!expected.some(([, gn]) => gn !== null)) return [];
-  const traces = [level("expected", [expected], { color: colour, dash: "longdash" })];
+  const traces = [levelTrace("expected", [expected], { color: colour, dash: "longdash" })];
   if (!hasLimits) return traces;
   const { alert, danger } = film.limits;
-  traces.push(level("alert limit", [-alert, alert].map((ln) => scaled(expected, ln)), { color: DOUBT_COLOUR, dash: "dash" }));
-  traces.push(level("danger limit", [-danger, danger].map((ln) => scaled(expected, ln)), { color: "var(--bad)", dash: "dot" }));
+  traces.push(levelTrace("alert limit", [-alert, alert].map((ln) => scaled(expected, ln)), { color: DOUBT_COLOUR, dash: "dash" }));
+  traces.push(levelTrace("danger limit", [-danger, danger].map((ln) => scaled(expected, ln)), { color: "var(--bad)", dash: "dot" }));
   return traces;
 }
 
@@ -87,7 +87,7 @@ function expectedGn({ stiffness_n_per_m: stiffness, deviation_percent: deviation
 /** The limits apply to the change of ln(stiffness). */
 const scaled = (expected, ln) => expected.map(([timeS, gn]) => [timeS, gn === null ? null : gn * Math.exp(ln)]);
 
-function level(name, curves, line) {
+function levelTrace(name, curves, line) {
   const points = curves.flatMap((curve) => [...curve, [null, null]]);
   return {
     x: points.map(([timeS]) => (timeS === null ? null : formatTime(timeS * 1000))),
