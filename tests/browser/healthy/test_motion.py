@@ -96,10 +96,10 @@ async def test_a_cursor_has_harmonics_and_the_address_holds_what_is_chosen(
 
     await expect(rows).to_have_count(6)
     await expect(rows.nth(1)).to_contain_text("184.6")
-    await cursor.press("ArrowUp")  # by a line of 600 / 4096 Hz
-    await expect(rows.first).to_contain_text("101.1")
+    await cursor.press("ArrowUp")  # to the next line, the 11th of 600 / 4096 Hz
+    await expect(rows.first).to_contain_text("96.7")
     await page.get_by_role("radio", name="× speed", exact=True).check()
-    await expect(cursor).to_have_value(re.compile(r"^1\.09"))
+    await expect(cursor).to_have_value(re.compile(r"^1\.04"))
     await page.reload()
     await expect(page.get_by_role("radio", name="× speed", exact=True)).to_be_checked()
     await expect(page.get_by_role("radio", name="Lines", exact=True)).to_be_checked()

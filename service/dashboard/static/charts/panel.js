@@ -28,6 +28,8 @@ export function panel(title, name, ...controls) {
 
   async function redraw(library) {
     await library.react(chart, coloured(shown.traces), coloured(shown.layout), CONFIG);
+    chart.removeAllListeners("plotly_click");
+    chart.on("plotly_click", ({ points }) => node.dispatchEvent(new CustomEvent("point", { detail: points[0] })));
   }
 
   const stop = onTheme(async () => {

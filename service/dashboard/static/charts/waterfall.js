@@ -35,16 +35,12 @@ export function mapTraces(drawn) {
   ];
 }
 
-/** Decades, even steps between fewer than two of them, or as the library chooses. */
+/** Even steps, written as the amplitudes they stand for. */
 function ticksOf({ low, high }, isLog) {
   if (!isLog) return {};
-  if (high - low < 2) return { tickvals: evenTicks(low, high), ticktext: evenTicks(low, high).map(plain) };
-  const decades = Array.from({ length: Math.floor(high) - Math.ceil(low) + 1 }, (_, n) => Math.ceil(low) + n);
-  return { tickvals: decades, ticktext: decades.map(plain) };
+  const steps = Array.from({ length: 5 }, (_, n) => low + (n / 4) * (high - low));
+  return { tickvals: steps, ticktext: steps.map((step) => String(Number((10 ** step).toPrecision(2)))) };
 }
-
-const plain = (decade) => String(Number((10 ** decade).toPrecision(2)));
-const evenTicks = (low, high) => Array.from({ length: 5 }, (_, n) => low + (n / 4) * (high - low));
 
 /** Lines one behind the other, the newest the farthest; each hides what is behind it. */
 export function lineTraces(drawn) {

@@ -21,8 +21,7 @@ export function waveforms(unit, bearing) {
       const names = Object.keys(found.channels);
       await box.show(names.map((name, n) => traceOf(found, name, n)), layoutOf(found, names), `As sampled, from ${formatTime(Date.parse(found.time))} on.`);
     } catch (failure) {
-      if (failure instanceof NotReachable) box.trouble(`Service not reachable. ${failure.message}`);
-      else if (!signal.aborted) box.explain(failure.message);
+      if (!signal.aborted) box[failure instanceof NotReachable ? "trouble" : "explain"](failure.message);
     }
   }, () => PERIOD_S);
   return { node: box.node, close: questions.stop };

@@ -34,6 +34,8 @@ export function waterfallPage(main, unit, bearing) {
   const panels = [map, single, full];
   const moment = momentSlider(redraw);
   const cursor = spectrumCursor(redraw);
+  map.node.addEventListener("point", ({ detail }) => moment.choosePoint(detail));
+  single.node.addEventListener("point", ({ detail }) => cursor.choosePoint(detail));
   const parts = [head, choices, map, moment, single, cursor, full].map(({ node }) => node);
   main.append(element("div", { class: "bearing waterfall-page" }, ...parts));
   let found = null;
@@ -98,14 +100,8 @@ async function askSpectra(path, place, { startMs, endMs }, signal) {
   const alarms = events
     .filter(({ subject, change }) => subject === bearing && ["raised", "escalated"].includes(change))
     .map(({ time, kind, change }) => ({ timeS: Date.parse(time) / 1000, words: `${kindWords(kind)} ${changeWords(change)}` }));
-  const newest = spectra.time.length ? await ask([...path, "spectrum"], [], signal).catch(refused) : null;
+  const newest = spectra.time.length ? await ask([...path, "spectrum"], [], signal).catch(() => null) : null; // none since the start
   return { spectra, alarms, newest, place, startS: startMs / 1000, endS: endMs / 1000 };
-}
-
-/** No newest spectrum, if the service has none since its start; another failure is one of the page. */
-function refused(failure) {
-  if (failure instanceof NotReachable) throw failure;
-  return null;
 }
 
 /** What is drawn, with the choices put in. */
@@ -148,7 +144,6 @@ async function showMap(box, drawn, found, moment) {
   const { spectra, alarms } = found;
   const traces = [...(drawn.headroom ? lineTraces(drawn) : mapTraces(drawn)), ...markTraces(drawn), ...alarmTraces(alarms, drawn.toUpper)];
   await box.show(traces, waterfallLayout(drawn, spectra.time[moment.index()]), mapCaption(drawn, found));
-  moment.hear(box.node.querySelector(".chart"), spectra);
 }
 
 function mapCaption(drawn, { spectra, alarms }) {
@@ -179,7 +174,6 @@ async function showMoment(box, cursor, drawn, spectra, index) {
   cursor.draw({ frequencyHz, amplitude: row.amplitude, order1Hz: row.order1Hz, axis, fromHz: SCALE_FROM_HZ });
   const layout = momentLayout({ ...drawn, row, top: highest(drawn) }, cursor.hz());
   await box.show(momentTraces({ ...drawn, row }), layout, momentCaption({ spectra, index }));
-  cursor.hear(box.node.querySelector(".chart"));
 }
 
 async function showFull(box, cursor, drawn, { newest, place }) {

@@ -4,7 +4,7 @@ import { element, setAttribute } from "../dom.js";
 import { formatTime } from "../format.js";
 import { localMs } from "../charts/waterfall_rows.js";
 
-/** Returns `{ node, offer(spectra, isThere), index(), hear(chart, spectra) }`; the newest until one is chosen. */
+/** Returns `{ node, offer(spectra, isThere), index(), choosePoint(point) }`; the newest until one is chosen. */
 export function momentSlider(onChange) {
   const slider = element("input", { type: "range", min: "0", max: "0", step: "1", id: "moment" });
   const words = element("output", { for: "moment" });
@@ -29,7 +29,6 @@ export function momentSlider(onChange) {
   }
   slider.addEventListener("input", () => choose(Number(slider.value)));
   newest.addEventListener("click", () => choose(offered.time.length - 1));
-  let hasAnswered = false;
   return {
     node,
     offer(spectra, isThere) {
@@ -38,14 +37,10 @@ export function momentSlider(onChange) {
       if (isThere) show();
     },
     index: () => indexOf(offered, chosenS),
-    /** From its first drawing on, a click into the chart chooses the spectrum next to it. */
-    hear(chart) {
-      if (hasAnswered) return;
-      hasAnswered = true;
-      chart.on("plotly_click", ({ points }) => {
-        const atMs = typeof points[0].y === "number" ? points[0].y : Date.parse(`${points[0].y.replace(" ", "T")}Z`);
-        choose(nearest(offered.time.map(localMs), atMs));
-      });
+    /** Choose the spectrum next to a point of the map. */
+    choosePoint({ y }) {
+      const atMs = typeof y === "number" ? y : Date.parse(`${y.replace(" ", "T")}Z`);
+      choose(nearest(offered.time.map(localMs), atMs));
     },
   };
 }

@@ -11,16 +11,15 @@ const WINDOW = "Hann window; peaks are interpolated between the lines, which are
 const HEADINGS = ["Hz", "cpm", "× speed"];
 const ORDERS_DIGITS = [3, 1, 3];
 
-/** Returns `{ node, hz(), draw(spectrum), hear(chart) }`; `hz` is null without a cursor. */
+/** Returns `{ node, hz(), draw(spectrum), choosePoint(point) }`; `hz` is null without a cursor. */
 export function spectrumCursor(onChange) {
-  const input = element("input", { type: "number", min: "0", step: "any", id: "cursor" });
+  const input = element("input", { type: "number", min: "0", id: "cursor" });
   const none = element("button", { type: "button" }, "No cursor");
   const unit = element("span");
   const [harmonics, peaks] = [element("tbody"), element("tbody")];
   const note = element("p", { class: "hint" });
   const field = element("label", { class: "setting" }, "Cursor ", input, " ", unit);
-  let [axis, turnHz, binHz] = [AXES.hz, null, null];
-  let heard = null;
+  let [axis, turnHz] = [AXES.hz, null];
   let hz = Number(queryOf(location.hash).get("cursor")) || null;
 
   function set(toHz) {
@@ -29,25 +28,15 @@ export function spectrumCursor(onChange) {
     onChange();
   }
   input.addEventListener("change", () => set(Number(input.value) / (axis.of(1, turnHz) ?? 1)));
-  input.addEventListener("keydown", (key) => {
-    const step = { ArrowUp: binHz, ArrowDown: -binHz }[key.key];
-    if (!step) return;
-    key.preventDefault();
-    set((hz ?? 0) + step);
-  });
   none.addEventListener("click", () => set(null));
   return {
     node: element("div", { class: "cursor" }, element("div", { class: "choices" }, field, none), listOf("Cursor and harmonics", harmonics), listOf("Peaks", peaks), note),
     hz: () => hz,
-    /** From its first drawing on, a click into the chart sets the cursor. */
-    hear(chart) {
-      if (chart === heard) return;
-      heard = chart;
-      chart.on("plotly_click", ({ points }) => set(points[0].x / (axis.of(1, turnHz) ?? 1)));
-    },
+    choosePoint: ({ x }) => set(x / (axis.of(1, turnHz) ?? 1)),
     /** `frequencyHz`, `amplitude` in µm, `order1Hz`, the axis and the lowest frequency of a peak. */
     draw({ frequencyHz, amplitude, order1Hz, axis: along, fromHz }) {
-      [axis, turnHz, binHz] = [along, order1Hz, frequencyHz[0]];
+      [axis, turnHz] = [along, order1Hz];
+      input.step = axis.of(frequencyHz[0], turnHz);
       unit.textContent = axis.unit;
       if (document.activeElement !== input || hz === null) input.value = hz === null ? "" : Number(axis.of(hz, turnHz)?.toPrecision(6));
       none.disabled = hz === null;
@@ -55,7 +44,7 @@ export function spectrumCursor(onChange) {
       harmonics.replaceChildren(...(hz === null ? [] : harmonicsOf(frequencyHz, amplitude, hz)).map(row((n) => `${n + 1}`)));
       peaks.replaceChildren(...peaksOf(frequencyHz, amplitude, fromHz).map(row((n) => `${n + 1}`)));
       for (const body of [harmonics, peaks]) body.parentNode.hidden = !body.childElementCount;
-      note.textContent = `${WINDOW} ${formatFixed(binHz, 4)} Hz apart. Click into the spectrum, or step the cursor with ↑ and ↓.`;
+      note.textContent = `${WINDOW} ${formatFixed(frequencyHz[0], 4)} Hz apart. Click into the spectrum, or step the cursor with ↑ and ↓.`;
     },
   };
 }
