@@ -26,8 +26,7 @@ export function bearingVerdict(film, alarms) {
   const since = Math.min(...active.filter(({ level }) => level === look).map(({ raised }) => Date.parse(raised)));
   const isFilm = ({ kind }) => ALARM_KINDS[kind]?.rule === "films";
   const others = active.filter((alarm) => !isFilm(alarm)).map(({ kind }) => kindWords(kind).toLowerCase());
-  const films = active.filter(isFilm);
-  const words = [...(films.length ? [changeWords(films)] : []), ...others.slice(0, MOST_OTHERS)];
+  const words = [...active.filter(isFilm).map((alarm) => changeWords(film, alarm)), ...others.slice(0, MOST_OTHERS)];
   if (others.length > MOST_OTHERS) words.push(`${others.length - MOST_OTHERS} more`);
   const brief = `${look.toUpperCase()} since ${sinceWords(since)}`;
   return [look, `${brief}: ${words.join("; ")}`, brief];
@@ -46,12 +45,14 @@ function isAhead({ verdict, level, deviation_percent: deviation }, { danger_perc
   return verdict === "normal" && level === null && Math.abs(deviation ?? 0) > limit;
 }
 
-function changeWords(films) {
-  const said = films.map(({ kind, value }) => [kind.at(-1), value === null ? "changed" : value < 0 ? "softer" : "stiffer"]);
+function changeWords(film, { directions, value, condition_reason: reason }) {
+  const said = [...directions].map((axis) => {
+    const change = film[axis]?.change_percent ?? value;
+    return [axis, change === null ? "changed" : change < 0 ? "softer" : "stiffer"];
+  });
   const [[axis, how]] = said;
   const both = said.every((one) => one[1] === how) ? `film ${how}, both directions` : `film ${said.map((one) => one.join(" ")).join(", ")}`;
-  const cause = films.map(({ condition_reason: reason }) => CAUSES[reason]).find(Boolean);
-  return (said.length === 1 ? `film ${how} in ${axis}` : both) + (cause ? ` (${cause})` : "");
+  return (said.length === 1 ? `film ${how} in ${axis}` : both) + (CAUSES[reason] ? ` (${CAUSES[reason]})` : "");
 }
 
 /** `22:10` of today, else with the date. */

@@ -99,15 +99,14 @@ async def test_a_wrong_sign_is_never_good_and_names_the_channels(plant, page: Pa
 async def test_a_verdict_says_since_when_and_in_which_directions(plant, page: Page) -> None:
     await page.goto(plant.url + EMPTY)
     alarm = {"is_active": True, "raised": "2026-01-01T10:00:00Z", "value": -12.0}
-    alarm |= {"level": "danger", "kind": "stiffness_x", "condition_reason": "film_changed"}
-    other = alarm | {"kind": "stiffness_y", "level": "alert", "raised": "2026-01-02T10:00:00Z"}
-    stiffer = other | {"value": 5.0}
-    film = {"why_not": "no baseline", "x": None, "y": None}
+    alarm |= {"level": "danger", "kind": "film_stiffness", "condition_reason": "film_changed"}
+    alert = {"level": "alert", "raised": "2026-01-02T10:00:00Z"}
+    film = {"why_not": "no baseline", "x": None, "y": {"change_percent": 5.0}}
     for alarms, look, said in [
-        ([alarm, other], "danger", "film softer, both directions"),
-        ([alarm, stiffer], "danger", "film x softer, y stiffer"),
-        ([other], "alert", "film softer in y"),
-        ([other | {"is_active": False}], "quiet", "Not watched"),
+        ([alarm | {"directions": "x"}], "danger", "film softer in x"),
+        ([alarm | {"directions": "xy"}], "danger", "film x softer, y stiffer"),
+        ([alarm | alert | {"directions": "y"}], "alert", "film stiffer in y"),
+        ([alarm | {"directions": "x", "is_active": False}], "quiet", "Not watched"),
         (None, "quiet", "Not watched"),
     ]:
         found = await page.evaluate(CALL, ["verdict_words", "bearingVerdict", film, alarms])
