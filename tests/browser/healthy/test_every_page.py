@@ -133,6 +133,6 @@ async def test_amplitudes_are_shown_zero_to_peak_or_twice_that_as_chosen(plant, 
     after = await number_with(shaft, "µm pk-pk")
     assert after / before == pytest.approx(2.0, rel=0.1)  # the machine lives on in between
     chart = page.locator("[data-chart=amplitude-trend] .ytitle")
-    await expect(chart).to_have_text("µm pk-pk")
+    await expect(chart).to_have_text("Vibration amplitude, µm pk-pk")
     await page.reload()
     await expect(shaft.locator(".suffix")).to_have_text("µm pk-pk")

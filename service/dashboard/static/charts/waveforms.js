@@ -10,11 +10,12 @@ const PERIOD_S = 5;
 const SECONDS = "2";
 const UNITS = { um: "µm", "m/s2": "m/s²" };
 
-/** Returns `{ node, close() }`. */
-export function waveforms(unit, bearing) {
+/** `absence()` says why there are none, null if there are. Returns `{ node, again(), close() }`. */
+export function waveforms(unit, bearing, absence) {
   const box = panel("Waveforms, newest", "waveforms");
   let channels = null;
   const questions = poll(async (signal) => {
+    if (absence() !== null) return box.explain(absence());
     try {
       channels ??= await channelsOf(unit, bearing, signal);
       const found = await ask(["units", unit, "waveform"], [["seconds", SECONDS], ...channels.map((id) => ["channel", id])], signal);
@@ -24,7 +25,7 @@ export function waveforms(unit, bearing) {
       if (!signal.aborted) box[failure instanceof NotReachable ? "trouble" : "explain"](failure.message);
     }
   }, () => PERIOD_S);
-  return { node: box.node, close: questions.stop };
+  return { node: box.node, again: questions.again, close: questions.stop };
 }
 
 async function channelsOf(unit, bearing, signal) {

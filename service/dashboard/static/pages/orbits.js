@@ -41,7 +41,8 @@ export function orbitsPage(main, unit, bearing) {
   const sentence = element("p", { class: "sentence", role: "status" }, "Asking the service.");
   const pictures = element("div", { class: "orbit-pictures", hidden: "" }, orbit.node, timebase.node);
   const player = element("section", { class: "panel player", "aria-label": "Player" }, sentence, pictures, controls.node, facts.node);
-  const waves = waveforms(unit, bearing);
+  let absence = "Asking the service.";
+  const waves = waveforms(unit, bearing, () => absence);
   main.append(element("div", { class: "bearing orbit-page" }, head.node, choices.node, player, waves.node));
 
   const sourceOf = (recording) => (recording === null ? liveSource(path) : recordedSource(recording, bearing));
@@ -52,7 +53,6 @@ export function orbitsPage(main, unit, bearing) {
   let reference = null;
   let shownMs = null;
   let hasSamples = false;
-  let absence = "Asking the service.";
   let staleness = null;
 
   const follows = () => source.isLive && at.isPlaying && at.speed === 1;
@@ -156,7 +156,7 @@ export function orbitsPage(main, unit, bearing) {
       absence = absenceWords(view, unit, bearing);
       hasSamples = absence === null;
       staleness = stalenessWords(view, unit);
-      if (hasSamples && !had) questions.again();
+      if (hasSamples && !had) for (const asked of [questions, waves]) asked.again();
       if (!at.isPlaying || clip === null || staleness !== null) paint();
     },
     close() {
