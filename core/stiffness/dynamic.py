@@ -55,8 +55,8 @@ are fully kept: exceeded by chance in 5 % and 0.1 % of averages (chi-squared).""
 
 AS_DELAY, AS_LAGS = 1.05, 1.3
 """Ratios of the squared significances of lagging parts and of a significant delay of the bearing
-channels, up to which the misfit is a delay, and from which it is the film. They are 1.4 to 1.7 for
-films of tilting pads and 0.7 to 1.04 for late channels."""
+channels, up to which the misfit is a delay, and from which it is the film. Medians are 1.4 to 1.7
+for films of tilting pads and 0.7 to 0.85 for late channels."""
 
 
 @dataclass(frozen=True)
@@ -229,8 +229,9 @@ def _fitted(
         found, moves = fit()
     if not moves.any():
         return [None] * len(measured)
-    kept = np.where(seeks, 0.0, kept_share(found))[:, np.newaxis]
-    results = _results(found.with_lags(kept), kept, mass_kg[:, 0], seeks, bin_hz)
+    kept, is_delay = kept_share(found)
+    kept = np.where(seeks | ~moves, 0.0, kept)[:, np.newaxis]
+    results = _results(found.with_lags(kept), kept, is_delay > 0.0, mass_kg[:, 0], seeks, bin_hz)
     return [
         result if moving else None for result, moving in zip(results, moves.tolist(), strict=True)
     ]
@@ -250,22 +251,24 @@ def tilt_lag(omega: FloatArray, turn_rad_s: float) -> ComplexArray:
     return lagging(omega) - at_turn.real - 1j * at_turn.imag * omega / turn_rad_s
 
 
-def kept_share(fits: FilmFits) -> FloatArray:
+def kept_share(fits: FilmFits) -> tuple[FloatArray, FloatArray]:
     """Return the share of the lagging parts of films that the data demand, (n,), from 0 to 1.
 
     The share is continuous, so that results do not jump between averages (firm shrinkage, Gao and
-    Bruce 1997). It is 0 if a delay of the bearing channels explains the misfit as well.
+    Bruce 1997). It is less by the second array, (n,), the share of the misfit that a delay of the
+    bearing channels explains as well.
     """
     (*_, lags), delay = fits.lag_fit, fits.delay_significance()
     undoubted = (np.array([lags, delay]) - LAGS_DOUBTFUL) / (LAGS_CERTAIN - LAGS_DOUBTFUL)
     certain, is_delay = np.clip(undoubted, 0.0, 1.0)
     is_delay *= 1.0 - np.clip((lags / delay - AS_DELAY) / (AS_LAGS - AS_DELAY), 0.0, 1.0)
-    return np.asarray(np.nan_to_num(certain * (1.0 - is_delay)))
+    return np.nan_to_num(certain * (1.0 - is_delay)), is_delay
 
 
 def _results(
     fits: FilmFits,
     kept: FloatArray,
+    may_be_late: npt.NDArray[np.bool_],
     mass_kg: FloatArray,
     seeks_mass: npt.NDArray[np.bool_],
     bin_hz: float,
@@ -273,7 +276,8 @@ def _results(
     share, delay = kept[:, 0], np.array(fits.delay([DELAY, MASS]))
     if fits.has_lags:
         beside_lags = np.array(fits.delay([DELAY, MASS, *LAGS]))
-        delay = np.where(share > 0.0, (1.0 - share) * delay + share * beside_lags, delay)
+        mixed = (1.0 - share) * delay + share * beside_lags
+        delay = np.where((share > 0.0) & ~may_be_late, mixed, delay)
     delay_s, delay_std, delay_per_damping = delay
     (shift, shift_std), of_row = fits.lags_shift(), kept[..., np.newaxis]
     model = (1.0 - of_row) * math.sqrt(3.0) * np.hypot(shift, shift_std)
@@ -290,9 +294,10 @@ def _results(
         mass_std_kg = np.where(whole, std, 0.0)
         covariance[whole] = fits.film_covariance(fits.through([MASS], of_mass))[whole]
     per = fits.per[:, :4].copy()
-    follow_all = ([MASS], whole, (STIFFNESS, DAMPING, DELAY)), (LAGS, share, range(4))
-    for fitted, fraction, moved in follow_all:  # what is fitted follows what is not
-        for change in moved if fraction.any() and (fits.has_lags or fitted is not LAGS) else ():
+    beside_mass = STIFFNESS, DAMPING, DELAY
+    # what is fitted follows a change of what is not
+    for fitted, fraction, moved in ([MASS], whole, beside_mass), (LAGS, share, range(4)):
+        for change in moved if fraction.any() else ():
             follows = np.where(fraction > 0.0, fraction * fits.follow(change, fitted).T, 0.0)
             per[:, change] += np.einsum("pn,npru->nru", follows, fits.per[:, fitted])
     lines = fits.lines

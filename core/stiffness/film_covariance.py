@@ -152,7 +152,7 @@ class FilmFits:
 
     @cached_property
     def lag_fit(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Estimated parts in `LAGS`, (n, 4), their information, (n, 2, 2, 2), and significance.
+        """Estimated parts in `LAGS`, (n, 4), covariance of each row's, (n, 2, 2, 2), significance.
 
         The significance, (n,), is chi-squared of four if the film has no other lagging parts.
         """
@@ -161,10 +161,12 @@ class FilmFits:
         information = own + self._lag_moments.swapaxes(2, 3) @ self.lag_per
         turned = (self.lag.conj()[:, np.newaxis, np.newaxis] * self._common).real
         score = np.einsum("nrl,nrcl->nrc", self.weight, turned)
-        inverse, _ = _inverse(information.reshape(-1, 2, 2))
-        found = np.einsum("nrjk,nrk->nrj", inverse.reshape(information.shape), score)
-        significance = 2.0 * self.n_segments[:, 0] / CORRELATED_LINES * (found * score).sum((1, 2))
-        return self.lagging + found.reshape(-1, 4), information, significance
+        inverse = _inverse(information.reshape(-1, 2, 2))[0].reshape(information.shape)
+        found = np.einsum("nrjk,nrk->nrj", inverse, score)
+        size = CORRELATED_LINES / (2.0 * self.n_segments[:, 0])
+        covariance = size[:, np.newaxis, np.newaxis, np.newaxis] * inverse
+        significance = (found * score).sum(axis=(1, 2)) / size
+        return self.lagging + found.reshape(-1, 4), covariance, significance
 
     def delay_significance(self) -> FloatArray:
         """Return the squared significance of a delay of the bearing channels, (n,)."""
@@ -327,12 +329,9 @@ class FilmFits:
 
     def lags_shift(self) -> tuple[FloatArray, FloatArray]:
         """Return the change of unknowns by all lagging parts, and its uncertainty, (n, 2, 4)."""
-        lagging, information, _ = self.lag_fit
-        inverse, _ = _inverse(information.reshape(-1, 2, 2))
-        size = CORRELATED_LINES / (2.0 * self.n_segments[..., np.newaxis])
-        inverse = inverse.reshape(information.shape)
-        variance = np.einsum("nrup,nrpq,nruq->nru", self.lag_per, inverse, self.lag_per)
-        return self._shift(lagging), np.sqrt(np.maximum(size * variance, 0.0))
+        lagging, covariance, _ = self.lag_fit
+        variance = np.einsum("nrup,nrpq,nruq->nru", self.lag_per, covariance, self.lag_per)
+        return self._shift(lagging), np.sqrt(np.maximum(variance, 0.0))
 
     def through(self, fitted: Sequence[int], influences: FloatArray) -> FloatArray:
         """Return weights of the influences in the unknowns through fitted changes, by row."""

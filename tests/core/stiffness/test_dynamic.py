@@ -334,7 +334,7 @@ def test_a_constant_film_is_rarely_taken_for_one_that_depends_on_frequency(
 ) -> None:
     recordings = [recording(seed, probe_um=0.1, bearing_um=0.3) for seed in range(60)]
     kept = [found(phasors, DynamicSettings()) for phasors in recordings]
-    monkeypatch.setattr(dynamic, "kept_share", lambda fits: np.zeros(len(fits.weight)))
+    monkeypatch.setattr(dynamic, "kept_share", lambda fits: np.zeros((2, len(fits.weight))))
     constant = [found(phasors, DynamicSettings()) for phasors in recordings]
 
     same = [

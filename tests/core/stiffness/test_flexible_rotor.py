@@ -16,7 +16,7 @@ from acquisition.simulated.plant.films import Film
 from benchmarks.pads import PADS
 from core.arrays import ComplexArray, FloatArray
 from core.machine.unit import BearingAccuracy, BracketDynamics
-from core.quality import Level, Reason
+from core.quality import Level
 from core.spectra.cross_spectrum import phasor_power_per_density
 from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, films
 from core.stiffness.dynamic_lines import DynamicSettings
@@ -185,12 +185,13 @@ def test_statistics_and_the_model_of_the_film_explain_the_errors() -> None:
     assert np.mean(held) >= 0.9
 
 
-@pytest.mark.parametrize("bearing", ["LJB", "TJB"])
-def test_a_late_channel_is_still_noticed_on_tilting_pads(bearing: str) -> None:
-    late = recording(bearing, 0.3, 5, 140)
-    late[:, 2:] *= np.exp(-2j * np.pi * FREQUENCY_HZ / 600.0)
+@pytest.mark.parametrize("bearing", [*BEARINGS])
+def test_late_channels_on_tilting_pads_never_give_a_good_result(bearing: str) -> None:
+    for seed in range(5, 9):
+        late = recording(bearing, 0.3, seed, 140)
+        late[:, 2:] *= np.exp(-2j * np.pi * FREQUENCY_HZ / 600.0)
 
-    assert _fit_quality(film_of(bearing, late), 2e-4, 0.0).reason is Reason.CHANNEL_DELAY
+        assert _fit_quality(film_of(bearing, late), 2e-4, 0.0).level is Level.UNCERTAIN
 
 
 def test_the_stated_change_with_the_brackets_mass_is_the_change_on_tilting_pads() -> None:
