@@ -140,9 +140,7 @@ class FilmFits:
         of_bracket = self._solved[..., 1:].transpose(0, 3, 1, 2)
         if not self.has_lags:
             return of_bracket
-        of_lags = np.zeros((len(of_bracket), 2, 2, 2, N_UNKNOWNS))
-        for row in (0, 1):
-            of_lags[:, row, :, row] = self.lag_per[:, row].swapaxes(1, 2)
+        of_lags = np.einsum("nruj,rs->nrjsu", self.lag_per, np.eye(2))  # each acts on one row
         return np.concatenate([of_bracket, of_lags.reshape(-1, 4, 2, N_UNKNOWNS)], axis=1)
 
     @property
