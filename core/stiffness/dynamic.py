@@ -46,7 +46,7 @@ TILT_LAG_RAD = 0.135
 """Angle by which the shaft turns during the lag of a pad's tilt. It is about half the time that oil
 takes along a pad: 0.11 to 0.17 rad for the 12 and 16 pads of Brito et al. (decision 37)."""
 
-TILT_MODEL = 0.15
+TILT_MODEL = 0.25
 """Half-width of the error of coefficients from the assumed lag, as a fraction of their shift."""
 
 LAGS_DOUBTFUL, LAGS_CERTAIN = 9.5, 18.5
