@@ -185,8 +185,8 @@ def _tilting(eccentricity: float) -> tuple[Required, ...]:
     """
     k_mean = 0.012 if eccentricity > 0.5 else 0.007
     return (
-        Required("dynamic k_??", mean=k_mean, coverage=(0.90, 1.0)),
-        Required("dynamic c_??", mean=0.02, coverage=(0.90, 1.0)),
+        Required("dynamic k_??", mean=k_mean, coverage=(0.88, 1.0)),
+        Required("dynamic c_??", mean=0.02, coverage=(0.88, 1.0)),
     )
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import ComplexArray, FloatArray
 from core.machine.unit import BracketDynamics
 from core.quality import Reason
 from core.spectra.cross_spectrum import (
@@ -27,7 +27,7 @@ from core.stiffness.dynamic_lines import (
     probe_noise_power,
     used_lines,
 )
-from core.stiffness.film_covariance import DAMPING, DELAY, MASS, STIFFNESS, FilmFits
+from core.stiffness.film_covariance import DAMPING, DELAY, LAGS, MASS, STIFFNESS, FilmFits
 from core.stiffness.film_fit import N_ITERATIONS, FilmLines, line_weights
 
 MIN_LINES = 12
@@ -42,6 +42,23 @@ MAX_MASS_STD = 0.5
 bracket. Beyond it the lines do not determine the mass, and there is no result."""
 
 
+TILT_LAG_RAD = 0.135
+"""Angle by which the shaft turns during the lag of a pad's tilt. It is about half the time that oil
+takes along a pad: 0.11 to 0.17 rad for the 12 and 16 pads of Brito et al. (decision 37)."""
+
+TILT_MODEL = 0.25
+"""Half-width of the error of coefficients from the assumed lag, as a fraction of their shift."""
+
+LAGS_DOUBTFUL, LAGS_CERTAIN = 9.5, 18.5
+"""Squared significance of four lagging parts, up to which a film is constant, and from which they
+are fully kept: exceeded by chance in 5 % and 0.1 % of averages (chi-squared)."""
+
+AS_DELAY, AS_LAGS = 1.05, 1.3
+"""Ratios of the squared significances of lagging parts and of a significant delay of the bearing
+channels, up to which the misfit is a delay, and from which it is the film. Medians are 1.4 to 1.7
+for films of tilting pads and 0.7 to 0.85 for late channels."""
+
+
 @dataclass(frozen=True)
 class DynamicStiffness:
     """Stiffness and damping of a film, with statistics of the fit.
@@ -50,9 +67,11 @@ class DynamicStiffness:
     ----------
     coefficients : (2, 4)
         Coefficients (k_i1, k_i2, c_i1, c_i2) of the rows x and y, the directions of the force; N/m
-        and N·s/m.
+        and N·s/m. Those at 1× where the film depends on frequency.
     covariance : (2, 4, 4)
         Random covariance of the coefficients of each row.
+    model : (2, 4)
+        Half-width of the error of the coefficients because the film depends on frequency.
     changes : (4, 2, 4)
         Change of the coefficients per unit of `STIFFNESS`, `MASS`, `DAMPING` and `DELAY`.
     bracket_mass_kg
@@ -82,6 +101,7 @@ class DynamicStiffness:
 
     coefficients: FloatArray
     covariance: FloatArray
+    model: FloatArray
     changes: FloatArray
     bracket_mass_kg: float
     bracket_mass_std_kg: float
@@ -188,15 +208,15 @@ def _fitted(
     changes[:, STIFFNESS], changes[:, MASS] = stiffness, -(omega**2)
     changes[:, DAMPING] = 1j * omega
     moves = np.ones(len(measured), dtype=np.bool_)
+    lag, constant = tilt_lag(omega, math.pi * sum(turn_hz)), np.zeros((len(measured), len(LAGS)))
 
     def fit() -> tuple[FilmFits, npt.NDArray[np.bool_]]:
         bracket_n_per_m = stiffness - mass_kg * omega**2 + 1j * omega * damping
         # a delay turns the phase back by ω times the delay
         changes[:, DELAY] = 1j * omega * bracket_n_per_m
         weight, moving = line_weights(lines, bracket_n_per_m)
-        found = FilmFits(
-            lines, weight, bracket_n_per_m, changes, smear_share, n_segments, floor_std
-        )
+        errors = smear_share, n_segments, floor_std
+        found = FilmFits(lines, weight, bracket_n_per_m, changes, *errors, lag, constant)
         return found, moves & moving
 
     found, moves = fit()
@@ -209,43 +229,92 @@ def _fitted(
         found, moves = fit()
     if not moves.any():
         return [None] * len(measured)
-    results = _results(found, mass_kg[:, 0], seeks, bin_hz)
+    kept, is_delay = kept_share(found)
+    kept = np.where(seeks | ~moves, 0.0, kept)[:, np.newaxis]
+    results = _results(found.with_lags(kept), kept, is_delay > 0.0, mass_kg[:, 0], seeks, bin_hz)
     return [
         result if moving else None for result, moving in zip(results, moves.tolist(), strict=True)
     ]
 
 
+def tilt_lag(omega: FloatArray, turn_rad_s: float) -> ComplexArray:
+    """Return the shape over frequency of the part of a film that lags as its pads tilt.
+
+    It is ``(iωτ)² / (1 + iωτ)`` less the stiffness and damping at 1×, where it is zero.
+    """
+
+    def lagging(omega: FloatArray | float) -> ComplexArray:
+        turned = 1j * np.asarray(omega) * TILT_LAG_RAD / turn_rad_s
+        return np.asarray(turned**2 / (1.0 + turned))
+
+    at_turn = complex(lagging(turn_rad_s))
+    return lagging(omega) - at_turn.real - 1j * at_turn.imag * omega / turn_rad_s
+
+
+def kept_share(fits: FilmFits) -> tuple[FloatArray, FloatArray]:
+    """Return the share of the lagging parts of films that the data demand, (n,), from 0 to 1.
+
+    The share is continuous, so that results do not jump between averages (firm shrinkage, Gao and
+    Bruce 1997). It is less by the second array, (n,), the share of the misfit that a delay of the
+    bearing channels explains as well.
+    """
+    (*_, lags), delay = fits.lag_fit, fits.delay_significance()
+    undoubted = (np.array([lags, delay]) - LAGS_DOUBTFUL) / (LAGS_CERTAIN - LAGS_DOUBTFUL)
+    certain, is_delay = np.clip(undoubted, 0.0, 1.0)
+    is_delay *= 1.0 - np.clip((lags / delay - AS_DELAY) / (AS_LAGS - AS_DELAY), 0.0, 1.0)
+    return np.nan_to_num(certain * (1.0 - is_delay)), is_delay
+
+
 def _results(
-    fits: FilmFits, mass_kg: FloatArray, seeks_mass: npt.NDArray[np.bool_], bin_hz: float
+    fits: FilmFits,
+    kept: FloatArray,
+    may_be_late: npt.NDArray[np.bool_],
+    mass_kg: FloatArray,
+    seeks_mass: npt.NDArray[np.bool_],
+    bin_hz: float,
 ) -> list[DynamicStiffness]:
-    (delays_s, of_delay), per = fits.estimate([DELAY, MASS]), fits.per
-    delay_std = np.sqrt(fits.covariance(of_delay)[:, 0, 0, 0])
-    delay_per_damping = fits.follow(DAMPING, [DELAY, MASS])[:, 0]
-    covariance, mass_std_kg = fits.film_covariance(), np.zeros(len(mass_kg))
+    share, delay = kept[:, 0], np.array(fits.delay([DELAY, MASS]))
+    if fits.has_lags:
+        beside_lags = np.array(fits.delay([DELAY, MASS, *LAGS]))
+        mixed = (1.0 - share) * delay + share * beside_lags
+        delay = np.where((share > 0.0) & ~may_be_late, mixed, delay)
+    delay_s, delay_std, delay_per_damping = delay
+    (shift, shift_std), of_row = fits.lags_shift(), kept[..., np.newaxis]
+    model = (1.0 - of_row) * math.sqrt(3.0) * np.hypot(shift, shift_std)
+    model += of_row * TILT_MODEL * np.abs(shift)
+    through: FloatArray | float = 0.0
+    if fits.has_lags:
+        through = of_row[..., np.newaxis, np.newaxis] * fits.through(LAGS, fits.estimate(LAGS)[1])
+    covariance = fits.film_covariance(through)
+    mass_std_kg, whole = np.zeros(len(mass_kg)), np.zeros(len(mass_kg), dtype=np.bool_)
     if seeks_mass.any():
         masses_kg, of_mass = fits.estimate([MASS])
         whole = seeks_mass & ~np.isnan(masses_kg[:, 0])
         std = np.sqrt(fits.covariance(of_mass)[:, 0, 0, 0])
         mass_std_kg = np.where(whole, std, 0.0)
-        covariance[whole] = fits.film_covariance(of_mass)[whole]
-        per = per.copy()
-        for change in (STIFFNESS, DAMPING, DELAY):  # the fitted mass follows
-            follows = np.where(whole, fits.follow(change, [MASS])[:, 0], 0.0)
-            per[:, change] += follows[:, np.newaxis, np.newaxis] * per[:, MASS]
+        covariance[whole] = fits.film_covariance(fits.through([MASS], of_mass))[whole]
+    per = fits.per[:, :4].copy()
+    beside_mass = STIFFNESS, DAMPING, DELAY
+    # what is fitted follows a change of what is not
+    for fitted, fraction, moved in ([MASS], whole, beside_mass), (LAGS, share, range(4)):
+        for change in moved if fraction.any() else ():
+            follows = np.where(fraction > 0.0, fraction * fits.follow(change, fitted).T, 0.0)
+            per[:, change] += np.einsum("pn,npru->nru", follows, fits.per[:, fitted])
     lines = fits.lines
     scale = (lines.omega_unit ** (0.0, 0.0, 1.0, 1.0))[:, np.newaxis]
     coefficients = fits.unknowns / scale
     covariance /= scale[..., np.newaxis] * scale[..., np.newaxis, :]
-    per = per / scale[:, np.newaxis]
+    model, per = model / scale, per / scale[:, np.newaxis]
     coherence, segments, lack = fits.coherence, fits.coherence_segments, fits.lack_of_fit
     noise_um2_per_hz = lines.noise_power / phasor_power_per_density(bin_hz)
-    delay_s, share = delays_s[:, 0], fits.signal_share
+    signal_share = fits.signal_share
     unseparable = np.isnan(delay_s)
     sizes = lines.counted.sum(axis=(1, 2)).astype(int).tolist()
     return [
         DynamicStiffness(
             coefficients=coefficients[n],
             covariance=covariance[n],
+            model=model[n],
             changes=per[n],
             bracket_mass_kg=float(mass_kg[n]),
             bracket_mass_std_kg=float(mass_std_kg[n]),
@@ -257,7 +326,7 @@ def _results(
             lack_of_fit=lack[n],
             frequency_hz=lines.frequency_hz[n, :size],
             probe_noise_um2_per_hz=noise_um2_per_hz[n],
-            noise_share=1.0 - float(share[n]),
+            noise_share=1.0 - float(signal_share[n]),
         )
         for n, size in enumerate(sizes)
     ]

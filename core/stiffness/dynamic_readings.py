@@ -82,6 +82,7 @@ def dynamic_budgets(
                 *map(systematic_line, names, widths, changes.tolist()),
                 systematic_line("probe noise taken off", accuracy.probe_noise, value * left_in),
                 systematic_line("spectral resolution", RESOLUTION, direct),
+                systematic_line("film over frequency", float(found.model[row, column]), 1.0),
             ),
         )
     return budgets

@@ -2,12 +2,13 @@
 
 Every estimate is a linear function of ``Σ_lines w Σ_segments conj(f u) e``, with the weight w of a
 line, the residual force e, and the influence f of the shaft's motion u on the estimate. All
-influences are sums of the same six: the four regressors of a film, and the effects of the bracket's
-`FITTED` properties through the film. Their covariance is therefore calculated once.
+influences are sums of the same eight: the four regressors of a film, the effects of the bracket's
+`FITTED` properties through the film, and the two lagging motions. Their covariance is therefore
+calculated once.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,7 +24,7 @@ from core.spectra.cross_spectrum import (
     correlated_sum,
 )
 from core.stiffness.dynamic_lines import own_power
-from core.stiffness.film_fit import MIN_SHARE, N_UNKNOWNS, FilmLines
+from core.stiffness.film_fit import MIN_SHARE, N_UNKNOWNS, ROUNDING, FilmLines
 
 PART_PRODUCTS: FloatArray = np.array(
     [
@@ -41,12 +42,19 @@ of the six of `FilmFits._parts`, then imaginary parts of the first five."""
 
 N_PARTS = 6
 
+N_REWEIGHTED = 2
+"""Number of new fits of lagging parts with the weights of their own residual."""
+
 STIFFNESS, MASS, DAMPING, DELAY = range(4)
 """Indices of the bracket properties that can change: relative stiffness, mass in kg, damping in
 N·s/m, and delay of the bearing channels in s."""
 
 FITTED = (DELAY, MASS)
 """Bracket properties that can be fitted together with the film."""
+
+LAGS = range(4, 8)
+"""Indices of the parts of a film that lag because its pads tilt, after the bracket properties: from
+x and y to the force in x, then to that in y; in N/m."""
 
 N_INFLUENCES = N_UNKNOWNS + len(FITTED)
 
@@ -70,6 +78,10 @@ class FilmFits:
         Number of independent segments.
     floor_std : (n, 2)
         Relative standard uncertainty of each probe's noise power; zero if it is known.
+    lag : (n, n_used)
+        Dynamic stiffness per unit of a part in `LAGS`.
+    lagging : (n, 4)
+        Parts of the film that lag, in N/m; zero for a film that is constant over frequency.
     """
 
     lines: FilmLines
@@ -79,6 +91,8 @@ class FilmFits:
     smear_share: FloatArray
     n_segments: FloatArray
     floor_std: FloatArray
+    lag: ComplexArray
+    lagging: FloatArray
 
     @cached_property
     def _normal(self) -> tuple[FloatArray, FloatArray]:
@@ -101,17 +115,67 @@ class FilmFits:
     @property
     def unknowns(self) -> FloatArray:
         """Coefficients (k_i1, k_i2, c_i1, c_i2) of each row, in N/m, (n, 2, 4)."""
-        return self._solved[..., 0]
+        return self._solved[..., 0] + self._shift(self.lagging)
+
+    @cached_property
+    def _lag_moments(self) -> FloatArray:
+        """Moments of the lagging motions with the regressors of each row, (n, 2, 4, 2)."""
+        moved = self._motion * self.lag[:, np.newaxis, np.newaxis]
+        scaled = self.lines.ratio[:, np.newaxis, np.newaxis] * moved.imag
+        moments = np.concatenate([moved.real, scaled], axis=2).reshape(len(moved), 8, -1)
+        weighted = (moments @ self.weight.swapaxes(1, 2)).reshape(-1, 2, N_UNKNOWNS, 2)
+        return weighted.transpose(0, 3, 2, 1)
+
+    @cached_property
+    def lag_per(self) -> FloatArray:
+        """Derivatives of a row's unknowns with respect to its two parts in `LAGS`, (n, 2, 4, 2)."""
+        return -np.asarray(np.linalg.solve(self._normal[0], self._lag_moments), dtype=np.float64)
 
     @cached_property
     def per(self) -> FloatArray:
-        """Derivatives of the unknowns with respect to each change, (n, 4, 2, 4)."""
-        return self._solved[..., 1:].transpose(0, 3, 1, 2)
+        """Derivatives of the unknowns with respect to each change, (n, 4 or 8, 2, 4).
+
+        The changes are those of the bracket, and `LAGS` if the film has lagging parts.
+        """
+        of_bracket = self._solved[..., 1:].transpose(0, 3, 1, 2)
+        if not self.has_lags:
+            return of_bracket
+        of_lags = np.einsum("nruj,rs->nrjsu", self.lag_per, np.eye(2))  # each acts on one row
+        return np.concatenate([of_bracket, of_lags.reshape(-1, 4, 2, N_UNKNOWNS)], axis=1)
+
+    @property
+    def has_lags(self) -> bool:
+        """Whether one of the films has lagging parts."""
+        return bool(self.lagging.any())
+
+    @cached_property
+    def lag_fit(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Estimated parts in `LAGS`, (n, 4), covariance of each row's, (n, 2, 2, 2), significance.
+
+        The significance, (n,), is chi-squared of four if the film has no other lagging parts.
+        """
+        shape = np.abs(self.lag[:, np.newaxis]) ** 2 * self.weight
+        own = np.einsum("nrl,njkl->nrjk", shape, self._motion.real)
+        information = own + self._lag_moments.swapaxes(2, 3) @ self.lag_per
+        turned = (self.lag.conj()[:, np.newaxis, np.newaxis] * self._common).real
+        score = np.einsum("nrl,nrcl->nrc", self.weight, turned)
+        inverse = _inverse(information.reshape(-1, 2, 2))[0].reshape(information.shape)
+        found = np.einsum("nrjk,nrk->nrj", inverse, score)
+        size = CORRELATED_LINES / (2.0 * self.n_segments[:, 0])
+        covariance = size[:, np.newaxis, np.newaxis, np.newaxis] * inverse
+        significance = (found * score).sum(axis=(1, 2)) / size
+        return self.lagging + found.reshape(-1, 4), covariance, significance
+
+    def delay_significance(self) -> FloatArray:
+        """Return the squared significance of a delay of the bearing channels, (n,)."""
+        value, information = self.estimate([DELAY])[0][:, 0], self._information[:, DELAY, DELAY]
+        return np.asarray(2.0 * self.n_segments[:, 0] / CORRELATED_LINES * value**2 * information)
 
     @cached_property
     def film(self) -> ComplexArray:
         """Dynamic stiffness of the films in N/m, (n, 2, 2, n_used)."""
-        return self.lines.film(self.unknowns)
+        lagging = self.lagging.reshape(-1, 2, 2, 1) * self.lag[:, np.newaxis, np.newaxis]
+        return self.lines.film(self.unknowns) + lagging
 
     @cached_property
     def force_power(self) -> FloatArray:
@@ -129,9 +193,8 @@ class FilmFits:
     def residual(self) -> FloatArray:
         """Power of the residual force in (N/m)² µm², (n, 2, n_used)."""
         common = (self._force * self.film.conj()).real.sum(axis=2)
-        left: FloatArray = (
-            self.force_power - 2.0 * common + self.lines.modelled_power(self.unknowns)
-        )
+        modelled = (_times(self.film, self.lines.shaft) * self.film.conj()).real.sum(axis=2)
+        left: FloatArray = self.force_power - 2.0 * common + modelled
         return np.maximum(left, 0.0)
 
     @cached_property
@@ -194,14 +257,16 @@ class FilmFits:
 
     @cached_property
     def _left(self) -> ComplexArray:
-        """Residual per unit of each change after a new fit of the film, (n, 4, 2, 2, n_used)."""
-        through = self._relative[:, :, np.newaxis, np.newaxis] * self.film[:, np.newaxis]
-        through -= self.lines.film(self.per)
+        """Residual per unit of each change in `per` after a new fit, (n, ..., 2, 2, n_used)."""
+        through = -self.lines.film(self.per)
+        through[:, :4] += self._relative[:, :, np.newaxis, np.newaxis] * self.film[:, np.newaxis]
+        for part in LAGS if self.has_lags else ():
+            through[:, part, *divmod(part - LAGS[0], 2)] -= self.lag
         return through
 
     @cached_property
     def _information(self) -> FloatArray:
-        """Information on the changes in the residual, (n, 4, 4)."""
+        """Information on the changes in the residual, (n, 4, 4) or (n, 8, 8)."""
         moved = _times(self._left, self._motion[:, np.newaxis])
         moved *= self.weight[:, np.newaxis, :, np.newaxis]
         return _real_product(moved, self._left)
@@ -216,7 +281,7 @@ class FilmFits:
         return -(inverse @ self._information[:, fitted, change, np.newaxis])[..., 0]
 
     def estimate(self, fitted: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-        """Return joint estimates of one or two of the `FITTED` changes, and their influences.
+        """Return joint estimates of some of the `FITTED` changes and `LAGS`, and their influences.
 
         The estimation is one Gauss-Newton step. It uses the shaft's motion through the fitted film
         instead of the bearing's motion, whose noise would bias the estimates.
@@ -224,26 +289,63 @@ class FilmFits:
         Returns
         -------
         Estimates, (n, n_fitted), NaN where the data do not separate the changes; and the weights of
-        the six influences in them as a single group of `covariance`.
+        the influences in them as a single group of `covariance`.
         """
         inverse, separate = _inverse(self._information[:, fitted][..., fitted])
         weighted = (self.weight[:, :, np.newaxis] * self._common)[:, np.newaxis]
         score = _real_product(self._left[:, fitted], weighted)
         value = np.where(separate[:, np.newaxis], -(inverse @ score)[..., 0], np.nan)
-        own = np.zeros((len(value), 2, len(fitted), N_INFLUENCES))
+        own = np.zeros((len(value), 2, len(fitted), self._n_influences))
         own[..., :N_UNKNOWNS] = self.per[:, fitted].swapaxes(1, 2)
         for n, change in enumerate(fitted):
-            own[..., n, N_UNKNOWNS + FITTED.index(change)] = -1.0
+            if change in FITTED:
+                own[..., n, N_UNKNOWNS + FITTED.index(change)] = -1.0
+            else:
+                row, column = divmod(change - LAGS[0], 2)
+                own[:, row, n, N_UNKNOWNS + len(FITTED) + column] = 1.0
         return value, (inverse[:, np.newaxis] @ own)[:, np.newaxis]
 
-    def film_covariance(self, of_mass: FloatArray | None = None) -> FloatArray:
+    def delay(self, fitted: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return `DELAY`, first of joint estimates, its uncertainty and per `DAMPING`, (n,)."""
+        value, influences = self.estimate(fitted)
+        std = np.sqrt(self.covariance(influences)[:, 0, 0, 0])
+        return value[:, 0], std, self.follow(DAMPING, fitted)[:, 0]
+
+    def with_lags(self, share: FloatArray) -> "FilmFits":
+        """Return fits with a share (n, 1) of their estimated lagging parts, and their weights."""
+        if not share.any():
+            return self
+        fits = replace(self, lagging=share * self.lag_fit[0])
+        for _ in range(N_REWEIGHTED):
+            least = ROUNDING * fits.force_power
+            weight = fits.lines.counted / fits.lines.smoothed(np.maximum(fits.residual, least))
+            weight = np.where(share[..., np.newaxis] > 0.0, weight, self.weight)
+            fits = replace(fits, weight=weight)
+            fits = replace(fits, lagging=share * fits.lag_fit[0])
+        return fits
+
+    def _shift(self, lagging: FloatArray) -> FloatArray:
+        """Return the change of the unknowns by lagging parts (n, 4), (n, 2, 4)."""
+        shift: FloatArray = np.einsum("nrup,nrp->nru", self.lag_per, lagging.reshape(-1, 2, 2))
+        return shift
+
+    def lags_shift(self) -> tuple[FloatArray, FloatArray]:
+        """Return the change of unknowns by all lagging parts, and its uncertainty, (n, 2, 4)."""
+        lagging, covariance, _ = self.lag_fit
+        variance = np.einsum("nrup,nrpq,nruq->nru", self.lag_per, covariance, self.lag_per)
+        return self._shift(lagging), np.sqrt(np.maximum(variance, 0.0))
+
+    def through(self, fitted: Sequence[int], influences: FloatArray) -> FloatArray:
+        """Return weights of the influences in the unknowns through fitted changes, by row."""
+        of_each = np.moveaxis(influences, 3, 1)[:, :, :, :, np.newaxis]
+        return np.asarray((self.per[:, fitted][..., np.newaxis, :, np.newaxis] * of_each).sum(1))
+
+    def film_covariance(self, through: FloatArray | float = 0.0) -> FloatArray:
         """Return the covariance of the films' unknowns, (n, 2, 4, 4).
 
-        `of_mass` holds the influences on `MASS` from `estimate` if it was fitted with the film.
+        `through` holds the weights through changes that were fitted with the film.
         """
-        through = np.zeros((len(self.weight), 2, 2, N_UNKNOWNS, N_INFLUENCES))
-        if of_mass is not None:
-            through += self.per[:, MASS, :, np.newaxis, :, np.newaxis] * of_mass
+        through = np.zeros((len(self.weight), 2, 2, N_UNKNOWNS, self._n_influences)) + through
         inverse = np.linalg.inv(self._normal[0])
         for row in (0, 1):
             through[:, row, row, :, :N_UNKNOWNS] += inverse[:, row]
@@ -254,8 +356,8 @@ class FilmFits:
 
         Parameters
         ----------
-        weights : (n, n_groups, 2, n_estimates, 6)
-            Weights of the six influences in the estimates, through the residual of each row.
+        weights : (n, n_groups, 2, n_estimates, 6 or 8)
+            Weights of the influences in the estimates, through the residual of each row.
         """
         covariance, slope = self._spread
         own = (weights @ covariance[:, np.newaxis] @ weights.swapaxes(-1, -2)).sum(axis=2)
@@ -263,9 +365,13 @@ class FilmFits:
         own += through @ through.swapaxes(-1, -2)
         return np.asarray(own)
 
+    @property
+    def _n_influences(self) -> int:
+        return N_INFLUENCES + 2 * self.has_lags
+
     @cached_property
     def _spread(self) -> tuple[FloatArray, FloatArray]:
-        """Covariance of the six influences' sums, (n, 2, 6, 6), and its part from the noise floor.
+        """Covariance of the influences' sums, (n, 2, 6, 6), and its part from the noise floor.
 
         The second array, (n, 2, 6, 2), holds the change of the sums per standard uncertainty of
         each probe's noise power.
@@ -275,11 +381,15 @@ class FilmFits:
         relative = self._relative[:, np.newaxis, FITTED]
         moved = (self.film[:, :, :, np.newaxis] * parts).sum(axis=2)
         moved = relative[:, :, :, np.newaxis] * moved[:, :, np.newaxis]
-        terms = np.empty((*parts.shape[:2], N_INFLUENCES, 2 * N_PARTS - 1, parts.shape[-1]))
+        n_influences = self._n_influences
+        terms = np.empty((*parts.shape[:2], n_influences, 2 * N_PARTS - 1, parts.shape[-1]))
         terms[:, :, :2, :N_PARTS] = parts.real
         terms[:, :, :2, N_PARTS:] = parts.imag[..., : N_PARTS - 1, :]
         np.multiply(-ratio, parts.imag, out=terms[:, :, 2:4, :N_PARTS])
         np.multiply(ratio, terms[:, :, :2, : N_PARTS - 1], out=terms[:, :, 2:4, N_PARTS:])
+        if self.has_lags:
+            lagging = self.lag[:, np.newaxis, np.newaxis, np.newaxis] * parts
+            moved = np.concatenate([moved, lagging], axis=2)
         terms[:, :, 4:, :N_PARTS] = moved.real
         terms[:, :, 4:, N_PARTS:] = moved.imag[..., : N_PARTS - 1, :]
         # the real part of conj(x) e with circular e has half its power (Bendat and Piersol, 9.2)
@@ -288,12 +398,15 @@ class FilmFits:
         # per unit of noise power
         weight = self.weight[:, :, np.newaxis]
         weighted = weight * self.film
-        slope = np.empty((*parts.shape[:2], N_INFLUENCES, 2))
-        slope[:, :, :4] = 0.0
+        slope = np.empty((*parts.shape[:2], n_influences, 2))
+        slope[:] = 0.0
         np.einsum("...ii->...i", slope[:, :, :2])[...] = weighted.real.sum(axis=-1)
         np.einsum("...ii->...i", slope[:, :, 2:4])[...] = (ratio[:, 0] * weighted.imag).sum(axis=-1)
         power = weight * (self.film.real**2 + self.film.imag**2)
-        slope[:, :, 4:] = relative.real @ power.swapaxes(-1, -2)
+        slope[:, :, 4:6] = relative.real @ power.swapaxes(-1, -2)
+        if self.has_lags:
+            turned = (self.lag.conj()[:, np.newaxis, np.newaxis] * weighted).real.sum(axis=-1)
+            np.einsum("...ii->...i", slope[:, :, 6:])[...] = turned
         slope *= (lines.noise_power * self.floor_std)[:, np.newaxis, np.newaxis]
         return covariance, slope
 
@@ -353,7 +466,7 @@ def _real_product(first: ComplexArray, second: ComplexArray) -> FloatArray:
 
 
 def _inverse(information: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """Return inverses of (n, p, p) matrices, and where they are positive definite; p is 1 or 2.
+    """Return inverses of (n, p, p) matrices, and where they are positive definite.
 
     Elsewhere the inverse is the identity.
     """

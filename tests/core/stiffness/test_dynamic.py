@@ -22,6 +22,7 @@ from rigs.shaken_shaft import (
 from core.arrays import ComplexArray, FloatArray
 from core.quality import Reason
 from core.spectra.cross_spectrum import phasor_power_per_density
+from core.stiffness import dynamic
 from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, films
 from core.stiffness.dynamic_lines import DynamicSettings
 from core.stiffness.film_covariance import DELAY
@@ -326,3 +327,19 @@ def test_bearings_fitted_together_have_the_films_that_each_has_alone(recording: 
         for name, value in vars(alone).items():
             np.testing.assert_allclose(getattr(found, name), value, rtol=1e-10)
     assert len({found.frequency_hz.size for found in together[:2]}) == 2
+
+
+def test_a_constant_film_is_rarely_taken_for_one_that_depends_on_frequency(
+    recording: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recordings = [recording(seed, probe_um=0.1, bearing_um=0.3) for seed in range(60)]
+    kept = [found(phasors, DynamicSettings()) for phasors in recordings]
+    monkeypatch.setattr(dynamic, "kept_share", lambda fits: np.zeros((2, len(fits.weight))))
+    constant = [found(phasors, DynamicSettings()) for phasors in recordings]
+
+    same = [
+        np.array_equal(a.coefficients, b.coefficients) for a, b in zip(kept, constant, strict=True)
+    ]
+    # 5 % expected; 9 of 60 or more by chance in a thousandth of cases
+    assert sum(same) > 51
+    assert np.sqrt((rms_z(kept) ** 2).mean()) == pytest.approx(1.0, abs=0.1)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.simulated.plant.films import Film
+from acquisition.simulated.plant.moving_rotor import MovingRotor
 from acquisition.simulated.plant.rotor import (
     ForcePlane,
     RotorParameters,
@@ -13,8 +14,11 @@ from acquisition.simulated.plant.rotor import (
     rotor_matrices,
 )
 from acquisition.simulated.plant.rotor_steps import discretize
+from acquisition.simulated.plant.scenario import BearingScenario, Scenario
+from benchmarks.accuracy_plant import machine
 from benchmarks.pads import PADS
 from core.arrays import FloatArray
+from core.machine.channel import Measurand
 
 SPEED_RAD_S = 92.3 * np.pi / 30.0
 VISCOSITY_PA_S = 0.029
@@ -141,3 +145,25 @@ def test_a_film_without_lags_is_the_same_at_all_frequencies() -> None:
 
     assert constant.at(3.0) == constant
     assert film("TJB", 425.0, 0.3).at(60.0).k_xx_n_per_m < 1.4e9
+
+
+def test_a_rotor_follows_films_of_tilting_pads_from_one_moment_to_the_next() -> None:
+    def scenario(eccentricity: float) -> Scenario:
+        places = (("UJB", 500.0), ("LJB", 615.0), ("TJB", 425.0))
+        return Scenario(
+            {name: BearingScenario(film(name, um, eccentricity)) for name, um in places}
+        )
+
+    unit = machine(Measurand.ACCELERATION_M_S2)
+    first, last = scenario(0.1), scenario(0.3)
+    forces = 1e4 * np.random.default_rng(3).standard_normal((4, 10 * 2048))
+    moved, there = MovingRotor(unit, first), MovingRotor(unit, last)
+
+    moved.advance(forces[:, :2048], first, last)
+    followed = moved.advance(forces, last, last)
+
+    expected = there.advance(forces, last, last)
+    stayed = MovingRotor(unit, first).advance(forces, first, first)
+    # 34 s later what was before has decayed
+    np.testing.assert_allclose(followed[:, -2048:], expected[:, -2048:], atol=1e-4)
+    assert np.abs(stayed - expected)[:, -2048:].max() > 1.0
