@@ -162,8 +162,10 @@ def _parsed(line: bytes, ids: Container[int]) -> Message | None:
     except (HexError, IndexError) as exc:
         raise FrameError(f"malformed slcan frame: {line[:40]!r}") from exc
     length = CAN_FD_DLC[code] if fd else code
-    if len(data) != (0 if remote else length) or length > (64 if fd else 8):
-        raise FrameError(f"slcan frame has {len(data)} bytes of data, expected {length}")
+    if length > (64 if fd else 8):
+        raise FrameError(f"slcan frame has length {length}, must be at most 8")
+    if len(data) != (expected := 0 if remote else length):
+        raise FrameError(f"slcan frame has {len(data)} bytes of data, expected {expected}")
     if frame_id >= (1 << 29 if extended else 1 << 11):
         raise FrameError(f"invalid CAN id: {line[1:end]!r}")
     return Message(

@@ -69,7 +69,7 @@ class Supervision:
         if set(troubles) != self._logged:
             self._logged = set(troubles)
             if words:
-                log.error("a loop of the program has failed", loops=words)
+                log.error("loops of the program have ended or are stuck", loops=words)
             else:
                 log.info("all loops of the program run again")
         if words:

@@ -107,7 +107,7 @@ class Operators(ABC):
     async def _carried_out(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
         answer = await self.send(unit, command, actor)
         if answer.state in FAILED:
-            words = answer.words or "the command is in progress but not stored yet"
+            words = answer.words or "not stored yet; check its result before you repeat it"
             raise CommandFailedError(FAILED[answer.state], f"unit {unit}: {words}")
         return answer
 

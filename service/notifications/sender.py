@@ -153,7 +153,8 @@ class Sender:
     async def _wait_after(self, letter: StoredMessage, failed: Failed) -> None:
         now_ns, before = self._clock.now_ns(), self.status
         if before.n_failures == 0:
-            log.warning("message not delivered", receiver=self.receiver.name, reason=failed.answer)
+            found = {"receiver": self.receiver.name, "id": letter.event_id}
+            log.warning("message not delivered; it is sent again", **found, reason=failed.answer)
         await self._stored(lambda: self._outbox.fail(letter.id, failed.answer))
         await self._expire(failed.answer)
         n_failures = before.n_failures + 1

@@ -177,9 +177,10 @@ class CanSettings(Settings):
         if self.data_bitrate is not None and not self.fd:
             raise MisfitError("requires CAN FD; set fd = true", "data_bitrate")
         if self.interface in LISTENING_IS_SET:
+            words = "bitrate N dbitrate N fd on" if self.fd else "bitrate N"
             for key in ("bitrate", "data_bitrate"):
                 if getattr(self, key) is not None:
                     raise MisfitError(
-                        "must be set in the operating system: ip link set can0 type can bitrate …",
+                        f"set by the system, not here: ip link set {self.channel} type can {words}",
                         key,
                     )
