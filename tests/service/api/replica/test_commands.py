@@ -159,7 +159,7 @@ async def test_a_store_that_comes_back_late_is_told_of(pair, monkeypatch):
         answer = await post(pair, "acknowledge", occurrence=1)
 
     assert answer.status_code == 503
-    assert "in progress but not stored yet" in answer.json()["detail"]
+    assert "not stored yet; check its result" in answer.json()["detail"]
 
 
 def _after(pair: Any) -> Any:
