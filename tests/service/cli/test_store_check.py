@@ -27,6 +27,7 @@ from service.store.access.identities import KeyState, Role, Session
 from service.store.highwater.commits import MAX_BEHIND
 from service.store.sqlite import SqliteStore, checking
 from service.store.sqlite.store import open_access_file
+from service.store.waveforms import WaveformKind
 
 Build = Callable[..., Assessment]
 T0 = 1_767_225_600_000_000_000
@@ -134,7 +135,8 @@ def recorded_plant(plant_path: Path) -> Path:
         make(root / f"U1-{number}", recorded_unit(settings.unit[0]))
     with closing(open_store(settings)) as store:
         keeper = waveform_keeper(settings, store, SystemClock())
-        keeper.look()
+        while keeper.n_files.get(WaveformKind.CONTINUOUS, 0) < 3:  # one look ends after 2 s
+            keeper.look()
         keeper.close()
     return plant_path
 

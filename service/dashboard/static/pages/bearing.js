@@ -62,7 +62,8 @@ function headPart(unitId, bearingId) {
   const why = element("span", { class: "why-sentence" });
   const age = element("span", { class: "data-age" });
   const state = element("div", { class: "state" }, element("span", {}, "Data quality:"), quality.node, why, age);
-  const head = bearingHead(unitId, bearingId, "", bearingAddress, verdict.node, state);
+  const source = sourceView();
+  const head = bearingHead(unitId, bearingId, "", bearingAddress, verdict.node, state, source.node);
   return {
     node: head.node,
     draw(latest, unit, view) {
@@ -72,6 +73,8 @@ function headPart(unitId, bearingId) {
       drawQuality(quality, whole);
       setText(why, whole.level === "good" ? "" : reasonSentence(whole.reason));
       setText(age, windowAge(latest));
+      source.draw(unit.source);
+      source.node.hidden = unit.source.state === "connected";
     },
     close: alarms.close,
   };

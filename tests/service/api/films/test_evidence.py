@@ -108,8 +108,9 @@ async def require_a_report_of_everything_without_a_script(service: Any) -> None:
     assert not {name for name in page.attributes if name.startswith("on")}
     for words in (
         "film stiffness changed, x and y",
-        "has changed in x by −",
-        "and in y by −",
+        "under this condition: in x now −",
+        "; in y now −",
+        "confirmed −",
         "95 %:",
         "GN/m",
         "configuration ",

@@ -139,7 +139,7 @@ def test_a_socket_file_is_for_user_and_group_and_goes_at_the_end(tmp_path):
 def test_nothing_else_is_ever_removed_for_a_socket(tmp_path):
     path = tmp_path / "notes.txt"
     path.write_text("keep")
-    with pytest.raises(PortInUseError, match="not a socket"), socket_file(path):
+    with pytest.raises(PortInUseError, match="another file is there"), socket_file(path):
         pass
     running = tmp_path / "http.sock"
     with socket_file(running):
