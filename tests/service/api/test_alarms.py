@@ -276,7 +276,7 @@ async def test_an_acknowledgement_that_cannot_be_stored_is_refused_and_may_be_re
     probes.send(3, Reason.SENSOR_FAILURE)
     await probes.stored()
     with refusing(service, table), monkeypatch.context() as impatient:
-        impatient.setattr(in_process, "WITHIN_S", 0.05)
+        impatient.setattr(in_process, "WITHIN_S", 0.5)
         assert (await service.refused(ACKNOWLEDGE, 503, body))["title"] == title
         assert not service.store.alarms()[0].is_acknowledged
     if table == "high_water":
