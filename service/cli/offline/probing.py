@@ -6,7 +6,6 @@ Functions that read raise `LinkError` if the device does not answer or answers w
 
 import math
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from acquisition.errors import AcquisitionError
@@ -15,7 +14,7 @@ from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.decoding import MapDecoder, byte_permutation
 from acquisition.modbus.identity import Identification
 from acquisition.modbus.polled_source import MapReader
-from acquisition.modbus.register_map import MapValue, RegisterMap
+from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.requests import Span
 from acquisition.modbus.ring_follower import RingReader
 from acquisition.modbus.ring_profile import RingHeader, Slot
@@ -163,7 +162,7 @@ def value_looks(decoder: MapDecoder, content: bytes) -> list[ValueLook]:
             registers=_words(decoder, content, value.cell),
             value=float(number) if math.isfinite(number) else None,
             state=state.name.lower(),
-            flags=dict(_flags(decoder, content, value)),
+            flags={f.cell.address: _words(decoder, content, f.cell)[0] for f in value.flags},
         )
         for value, number, state in zip(
             decoder.map.values, reading.values, reading.states, strict=True
@@ -208,11 +207,6 @@ def _words(decoder: MapDecoder, content: bytes, cell: Cell) -> tuple[int, ...]:
     if cell.function in (1, 2):
         return (content[start] >> bit & 1,)
     return struct.unpack_from(f">{cell.n_places}H", content, start)
-
-
-def _flags(decoder: MapDecoder, content: bytes, value: MapValue) -> Iterator[tuple[int, int]]:
-    for flag in value.flags:
-        yield flag.cell.address, _words(decoder, content, flag.cell)[0]
 
 
 _TRIES_IN_FLIGHT = 20
