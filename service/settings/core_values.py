@@ -1,7 +1,6 @@
 """Conversion of settings to the objects of the analysis: machine, calibration, alarm rules."""
 
 from collections.abc import Mapping
-from dataclasses import fields
 
 from core.alarms.judgements import OrderVector, VectorReference
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
@@ -69,7 +68,7 @@ def _channel(settings: ChannelSettings) -> Channel:
 def _bearing(settings: BearingSettings, unit: UnitSettings) -> Bearing:
     gain = {channel.id: channel.gain_uncertainty for channel in unit.channel}
     return Bearing(
-        **settings.model_dump(include={field.name for field in fields(Bearing)}),
+        **settings.values_for(Bearing),
         accuracy=_accuracy(settings, gain),
         gap_accuracy=_gap_accuracy(settings, gain),
     )
@@ -114,16 +113,11 @@ def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
     noise = dynamic.probe_noise_um2_per_hz
     return AnalysisSettings(
         **settings.model_dump(exclude={"dynamic", "speed_tolerance", "max_power_change"}),
-        sensors=SensorLimits(
-            speed_tolerance=settings.speed_tolerance, max_power_change=settings.max_power_change
-        ),
+        sensors=SensorLimits(**settings.values_for(SensorLimits)),
         dynamic=DynamicSettings(
-            band_hz=dynamic.band_hz,
-            guard_bins=dynamic.guard_bins,
+            **dynamic.model_dump(exclude={"probe_noise_um2_per_hz"}),
             probe_noise_um2_per_hz=None if noise is None else (noise, noise),
-            quiet_band_hz=dynamic.quiet_band_hz,
             min_segments=max(settings.min_segments, 3),
-            max_relative_uncertainty=dynamic.max_relative_uncertainty,
             overlap=settings.overlap,
         ),
     )

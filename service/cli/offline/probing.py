@@ -19,7 +19,7 @@ from acquisition.modbus.requests import Span
 from acquisition.modbus.ring_follower import RingReader
 from acquisition.modbus.ring_profile import RingHeader, Slot
 from acquisition.modbus.transport import LinkSettings
-from service.settings.adapter_values import link_fields
+from service.settings.adapter_values import link_settings
 from service.settings.sources.modbus import ModbusLinkSettings
 
 PLAUSIBLE = (1e-3, 1e6)
@@ -212,14 +212,9 @@ def _words(decoder: MapDecoder, content: bytes, cell: Cell) -> tuple[int, ...]:
 _TRIES_IN_FLIGHT = 20
 
 
-def link_settings_of(device: ModbusLinkSettings) -> LinkSettings:
-    """Return the connection settings of a device for the Modbus client."""
-    return LinkSettings(**link_fields(device))
-
-
 async def read_once(device: ModbusLinkSettings, function: int, address: int, count: int) -> bytes:
     """Read registers; return big-endian words or, for functions 1 and 2, bits, eight in a byte."""
-    client = ModbusClient(link_settings_of(device))
+    client = ModbusClient(link_settings(LinkSettings, device))
     async with client.connected():
         return await client.read(address, count, function)
 
@@ -229,7 +224,7 @@ async def read_map_once(
 ) -> tuple[MapDecoder, bytes]:
     """Check the signature of a device; return the decoder and the content of its registers."""
     decoder = MapDecoder(registers)
-    reader = MapReader(link_settings_of(device), decoder)
+    reader = MapReader(link_settings(LinkSettings, device), decoder)
     async with reader.connected():
         return decoder, await reader.content()
 
@@ -238,7 +233,7 @@ async def read_ring_once(
     device: ModbusLinkSettings, base_address: int, function: int
 ) -> tuple[RingHeader, Slot]:
     """Return the header and the newest slot of a block ring."""
-    client = ModbusClient(link_settings_of(device))
+    client = ModbusClient(link_settings(LinkSettings, device))
     reader = RingReader(client, base_address, function)
     async with client.connected():
         header = await reader.header()
@@ -248,7 +243,7 @@ async def read_ring_once(
 
 async def identify_once(device: ModbusLinkSettings) -> Identification:
     """Return the vendor, product code and revision of a device (function 43/14)."""
-    client = ModbusClient(link_settings_of(device))
+    client = ModbusClient(link_settings(LinkSettings, device))
     async with client.connected():
         return await client.identify()
 
@@ -263,7 +258,9 @@ async def measure_in_flight(
     await read_once(device, address, 1, function)
     n_answered = 1
     for n_requests in range(2, most + 1):
-        client = ModbusClient(replace(link_settings_of(device), requests_in_flight=n_requests))
+        client = ModbusClient(
+            replace(link_settings(LinkSettings, device), requests_in_flight=n_requests)
+        )
         spans = [Span(address, 1, function)] * n_requests
         try:
             async with client.connected():
