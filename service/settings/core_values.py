@@ -35,17 +35,11 @@ from service.settings.units import UnitSettings
 def machine_of(settings: UnitSettings) -> Unit:
     """Return the settings of a generating unit as a `Unit`."""
     return Unit(
-        id=settings.id,
-        rated_speed_rpm=settings.rated_speed_rpm,
-        rate_hz=settings.rate_hz,
+        **settings.values_for(Unit),
         channels=tuple(_channel(channel) for channel in settings.channel),
         bearings=tuple(_bearing(bearing, settings) for bearing in settings.bearing),
-        speed_channel=settings.speed_channel,
-        power_channel=settings.power_channel,
         rotation_sense=1 if settings.rotation == "x_to_y" else -1,
         has_vortex=settings.turbine == "francis",
-        key_phase=settings.key_phase,
-        rated_power_mw=settings.rated_power_mw,
     )
 
 

@@ -175,13 +175,12 @@ def test_how_long_a_connection_is_kept_reaches_the_adapter(use, keeps):
         (ModbusLinkSettings, SerialTransport, set()),
         (SignatureIdentity, ExpectedRegisters, set()),
         (IdentificationIdentity, ExpectedIdentification, set()),
+        (UnitSettings, Unit, {"channels", "bearings", "rotation_sense", "has_vortex"}),
         (CanSettings, CanLinkSettings, set()),
         (CanSettings, CanAdapterSettings, {"link", "dbc_text", "channels", "queue_frames"}),
     ],
 )
-def test_every_field_of_an_adapter_that_is_not_computed_is_a_key_of_the_file(
-    source, adapter, computed
-):
+def test_every_field_that_is_not_computed_is_a_key_of_the_file(source, adapter, computed):
     named = {field.name for field in fields(adapter)} - computed
     assert named <= set(source.model_fields)
 
