@@ -92,7 +92,7 @@ class ReferencesInForce:
     async def look(self) -> None:
         """Read the stored references once; after an error, references in force are unchanged."""
         try:
-            found = await asyncio.to_thread(self._store.references)
+            found = await asyncio.to_thread(self._store.gap_references.in_force)
         except StoreError as error:
             self._trouble.note(str(error))
             return

@@ -70,7 +70,11 @@ def compared(mark: Mark | str, database: Mark, host: str) -> list[MarkFinding]:
         Mark in the database, and identifier of this machine.
     """
     if isinstance(mark, str):
-        return [MarkFinding(Kind.MARK_LOST, None, _lost(mark, database))]
+        words = (
+            f"{mark}; it is unknown whether the database, whose last transaction is of"
+            f" {_when(database.time_ns)}, is the newest"
+        )
+        return [MarkFinding(Kind.MARK_LOST, None, words)]
     found = _history(mark, database)
     if NO_HOST not in (host, mark.host) and mark.host != host:
         found.append(MarkFinding(Kind.OTHER_HOST, None, OTHER_HOST))
@@ -110,13 +114,6 @@ def _history(mark: Mark, database: Mark) -> list[MarkFinding]:
         )
         return [MarkFinding(Kind.MARK_BEHIND, 0, words)]
     return []
-
-
-def _lost(why: str, database: Mark) -> str:
-    return (
-        f"{why}; it is unknown whether the database, whose last transaction is of"
-        f" {_when(database.time_ns)}, is the newest"
-    )
 
 
 def _when(time_ns: int) -> str:
