@@ -51,9 +51,7 @@ def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
     waveforms = [u for u in plant.unit if not isinstance(u.source, ModbusVectorSettings)]
     units = waveforms if kept else []
     settings = CaptureSettings(
-        pre_s=found.pre_s,
-        post_s=found.post_s,
-        max_s=found.max_s,
+        **found.values_for(CaptureSettings),
         window_s=max((_window_s(plant, unit) for unit in units), default=0.0),
     )
     return Captures(
@@ -126,9 +124,7 @@ def limits_of(plant: PlantFile) -> EvidenceLimits:
     return EvidenceLimits(
         max_bytes=round(found.max_gb * BYTES_PER_GB),
         hard_max_bytes=round(found.hard_max_gb * BYTES_PER_GB),
-        keep_days=found.keep_days,
-        max_per_alarm=found.max_per_alarm,
-        trend_days=found.trend_days,
+        **found.values_for(EvidenceLimits),
     )
 
 

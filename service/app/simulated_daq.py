@@ -243,7 +243,6 @@ def _ring_shape(unit: UnitSettings, source: ModbusRingSettings) -> RingDeviceSet
 
 _LOOPBACK = "127.0.0.1"
 
-
 STALE_AFTER_S = 5.0
 """Silence of a device, s, after which a finished run ends; longer than a start."""
 

@@ -143,10 +143,7 @@ def spectra_limits(settings: SpectraSettings) -> SpectraLimits:
     )
 
 
-CAPTURES = "captures"
-
-
-RECORDINGS = "recordings"
+CAPTURES, RECORDINGS = "captures", "recordings"
 
 
 def recordings_folder(plant: PlantFile) -> Path:

@@ -134,8 +134,8 @@ def set_reference(
         )
         actor = Acting(Source.COMMAND_LINE, person())
         with acting_as(actor), plant_store(plant, creates=True) as store:
-            store.add_reference(reference)
-            history = store.reference_history(machine.id, found.id)
+            store.gap_references.add(reference)
+            history = store.gap_references.history(machine.id, found.id)
     except (ReferenceRefusedError, ValueError) as error:
         fail(f"unit {machine.id} bearing {found.id}: {error}", code=2)
     now = bearing_references(machine.id, found, history)
@@ -149,7 +149,7 @@ def list_references(plant_file: PlantPath, json_output: JsonOutput = False) -> N
     with plant_store(plant) if has_store(plant) else nullcontext() as store:
         found = [
             bearing_references(
-                unit.id, bearing, store.reference_history(unit.id, bearing.id) if store else ()
+                unit.id, bearing, store.gap_references.history(unit.id, bearing.id) if store else ()
             )
             for unit in plant.unit
             for bearing in machine_of(unit).bearings

@@ -92,7 +92,7 @@ class ReferencesInForce:
     async def look(self) -> None:
         """Read the stored references once; after an error, references in force are unchanged."""
         try:
-            found = await asyncio.to_thread(self._store.references)
+            found = await asyncio.to_thread(self._store.gap_references.in_force)
         except StoreError as error:
             self._trouble.note(str(error))
             return
@@ -103,7 +103,8 @@ class ReferencesInForce:
         news = {(r.unit, r.bearing): r for r in found if self._is_news(r)}
         self._in_force |= news
         for unit in {unit for unit, _ in news}:
-            self._on_change(self._described(self._units[unit]))
+            bearings = tuple(self.bearing(unit, each.id) for each in self._units[unit].bearings)
+            self._on_change(replace(self._units[unit], bearings=bearings))
         for (unit, bearing), reference in news.items():
             log.info(
                 "reference in force",
@@ -121,6 +122,3 @@ class ReferencesInForce:
             self._unknown.add(key)
             log.warning("reference of an unknown bearing is ignored", unit=key[0], bearing=key[1])
         return False
-
-    def _described(self, unit: Unit) -> Unit:
-        return replace(unit, bearings=tuple(self.bearing(unit.id, b.id) for b in unit.bearings))

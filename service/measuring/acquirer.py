@@ -166,7 +166,9 @@ class Acquirer:
             try:
                 await self._read(unit, watched.source, pulse)
             except AcquisitionError as error:
-                self._note_failure(unit, error)
+                if self._live.set_link(unit, LinkState.NOT_CONNECTED, str(error)):
+                    log.warning("not connected", unit=unit, reason=str(error))
+                self._report(LinkNews(unit, LinkState.NOT_CONNECTED, str(error)))
                 wait_s = _retry_s(error, watched.retry_s)
                 pulse.beat(wait_s)
                 await self._clock.sleep(wait_s)
@@ -190,11 +192,6 @@ class Acquirer:
                 pulse.rest()  # waiting for a full queue is not a fault of the source
                 await self._publish(block)
                 resume()
-
-    def _note_failure(self, unit: str, error: AcquisitionError) -> None:
-        if self._live.set_link(unit, LinkState.NOT_CONNECTED, str(error)):
-            log.warning("not connected", unit=unit, reason=str(error))
-        self._report(LinkNews(unit, LinkState.NOT_CONNECTED, str(error)))
 
 
 def _retry_s(error: AcquisitionError, retry_s: float) -> float:

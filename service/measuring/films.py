@@ -168,7 +168,10 @@ class FilmMonitor:
                 await self.learn(place)
             if due:
                 pulse.beat(MAX_LEARN_S)
-                await self._learn_response(unit)
+                response = await asyncio.to_thread(
+                    self.learner.learn_response, unit, films.rules, self._clock.now_ns()
+                )
+                films.watch.judge.response = response
 
     async def learn(self, place: FilmPlace, **why: str) -> BearingBaseline | None:
         """Learn a baseline of a bearing now; return None if there are too few readings.
@@ -187,11 +190,6 @@ class FilmMonitor:
             )
             await self.put_in_force(place)
         return learned
-
-    async def _learn_response(self, unit: str) -> None:
-        films, now_ns = self._films[unit], self._clock.now_ns()
-        response = await asyncio.to_thread(self.learner.learn_response, unit, films.rules, now_ns)
-        films.watch.judge.response = response
 
     async def act(
         self, place: FilmPlace, action: BaselineAction, actor: str, reason: str

@@ -281,7 +281,10 @@ class Recorder:
             log.info("results are being stored again")
         self._live.store_error = None
         self._waits_since_s = self._clock.monotonic_s()
-        self._note_parked(refused)
+        if refused:
+            reason = f"{refused[-1][1]} (parked in {self._parked.path.name})"
+            self._live.note_unstored(len(refused), reason)
+            log.error("the database refused results", n_parked=len(refused), reason=reason)
         self._n_writing = 0
         for findings in batch:
             self._live.note_stored(findings.assessments, findings.gaps)
@@ -326,19 +329,10 @@ class Recorder:
                 return
             self._store.append([], [])  # raises if the store refuses every write
             refused.append((parts[0].row, str(error)))
-            self._append_without_spectrum(parts[0].assessments)
-
-    def _append_without_spectrum(self, assessments: Sequence[Assessment]) -> None:
-        """Store a result without its spectrum, which may be the refused part."""
-        if any(assessment.spectrum.frequency_hz.size for assessment in assessments):
-            with suppress(RefusedRowError):
-                self._store.append([replace(a, spectrum=NO_SPECTRUM) for a in assessments], [])
-
-    def _note_parked(self, refused: Sequence[tuple[object, str]]) -> None:
-        if refused:
-            reason = f"{refused[-1][1]} (parked in {self._parked.path.name})"
-            self._live.note_unstored(len(refused), reason)
-            log.error("the database refused results", n_parked=len(refused), reason=reason)
+            found = parts[0].assessments
+            if any(assessment.spectrum.frequency_hz.size for assessment in found):
+                with suppress(RefusedRowError):  # the spectrum may be the refused part
+                    self._store.append([replace(a, spectrum=NO_SPECTRUM) for a in found], [])
 
     def _resolve(self, news: AlarmNews, refusal: str | None) -> None:
         """Resolve the future of a change of an alarm; `refusal` is None if it was stored."""

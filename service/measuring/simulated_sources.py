@@ -158,9 +158,5 @@ def scenario_of(simulation: SimulationSettings) -> Scenario:
 def _bearing_scenario(bearing: SimulatedBearingSettings) -> BearingScenario:
     return BearingScenario(
         film=Film.proportional(bearing.k_xx_n_per_m, bearing.k_yy_n_per_m, bearing.k_cross_n_per_m),
-        centre_x_um=bearing.centre_x_um,
-        centre_y_um=bearing.centre_y_um,
-        centre_wander_um_rms=bearing.centre_wander_um_rms,
-        oil_temperature_c=bearing.oil_temperature_c,
-        oil_temperature_wander_c_rms=bearing.oil_temperature_wander_c_rms,
+        **bearing.values_for(BearingScenario),
     )

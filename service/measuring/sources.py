@@ -16,12 +16,11 @@ from core.monitor.monitor import UnitMonitor
 from core.samples.calibration import UnitCalibration
 from core.spectra.polls import PollTransform
 from service.runtime.polls import TimedSource
-from service.settings.adapter_values import link_fields
+from service.settings.adapter_values import link_settings
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.plant import AnalysisModel, PlantFile
 from service.settings.sources.can import CanSettings
 from service.settings.sources.devices import (
-    MappedDeviceSettings,
     ModbusFifoSettings,
     ModbusPolledSettings,
     ModbusRingSettings,
@@ -33,15 +32,6 @@ from service.settings.sources.devices import (
 from service.settings.units import UnitSettings
 
 
-def polled_settings(device: MappedDeviceSettings) -> PolledSettings:
-    """Return the settings of the Modbus adapter for a device with a register map."""
-    return PolledSettings(
-        **link_fields(device),
-        poll_period_s=device.poll_period_s,
-        stale_after_s=device.stale_after_s,
-    )
-
-
 def modbus_source(
     source: ModbusSettings, unit: Unit, calibration: UnitCalibration, clock: Clock
 ) -> SampleSource:
@@ -50,28 +40,18 @@ def modbus_source(
     match source:
         case ModbusPolledSettings():
             calibration = replace(calibration, rate_hz=source.rate_hz)
-            return PolledSource(polled_settings(source), source.registers, ids, calibration, clock)
+            settings = link_settings(PolledSettings, source)
+            return PolledSource(settings, source.registers, ids, calibration, clock)
         case ModbusVectorSettings():
             calibration = replace(calibration, rate_hz=source.rate_hz)
             calibration = vector_calibration(calibration, ids, source.rows)
             rows = [row.id for row in source.rows]
-            return PolledSource(polled_settings(source), source.registers, rows, calibration, clock)
+            settings = link_settings(PolledSettings, source)
+            return PolledSource(settings, source.registers, rows, calibration, clock)
         case ModbusRingSettings():
-            ring = RingSettings(
-                **link_fields(source),
-                function=source.function,
-                base_address=source.base_address,
-                poll_period_s=source.poll_period_s,
-                stale_after_s=source.stale_after_s,
-            )
-            return RingSource(ring, calibration, clock)
+            return RingSource(link_settings(RingSettings, source), calibration, clock)
         case ModbusFifoSettings():
-            fifo = FifoSettings(
-                **link_fields(source),
-                poll_period_s=source.poll_period_s,
-                stale_after_s=source.stale_after_s,
-                loss_tolerance_s=source.loss_tolerance_s,
-            )
+            fifo = link_settings(FifoSettings, source)
             return FifoSource(fifo, source.fifo_layout(len(ids)), calibration, clock)
 
 
@@ -160,7 +140,7 @@ def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:
     channels = only_slow(calibration, ids).slow
     return JoinedSource(
         _main_source(unit, without_slow(calibration, ids), clock),
-        PolledSlowValues(polled_settings(slow), slow.registers, channels, clock),
+        PolledSlowValues(link_settings(PolledSettings, slow), slow.registers, channels, clock),
     )
 
 

@@ -70,10 +70,11 @@ def value_words(message: Message) -> str | None:
 
 
 def _alarm(message: Message) -> Iterator[str]:
+    named = f" ({message['unit_name']})" if message["unit_name"] else ""
     rows = [
         ("What", f"{_what(message)}: {change_words(message)}"),
         ("Priority", message["priority"]),
-        ("Where", f"{message['plant']}, {_place(message)}{_unit_name(message)}"),
+        ("Where", f"{message['plant']}, {_place(message)}{named}"),
         ("When", message["time"]),
         ("Since", message["raised"]),
         ("Confirmed" if message["kind"] == FILM_STIFFNESS else "Value", value_words(message)),
@@ -112,10 +113,6 @@ def _what(message: Message) -> str:
 def _place(message: Message) -> str:
     about_part = message["subject"] not in WHOLE_UNIT
     return f"{message['unit']} {message['subject']}" if about_part else str(message["unit"])
-
-
-def _unit_name(message: Message) -> str:
-    return f" ({message['unit_name']})" if message["unit_name"] else ""
 
 
 QUIT_S = 2.0

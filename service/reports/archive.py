@@ -144,7 +144,8 @@ class EvidenceArchive:
             why = f"{place.folder.name}: the document cannot be read: {error}"
             raise DamagedEvidenceError(why) from error
         content = json.loads(text)
-        if hashlib.sha256(canonical(_without_hash(content))).hexdigest() != found.sha256:
+        del content["sha256"]
+        if hashlib.sha256(canonical(content)).hexdigest() != found.sha256:
             name = place.folder.name
             raise DamagedEvidenceError(
                 f"{name}: the document was changed since it was written; restore a copy"
@@ -224,10 +225,6 @@ def capture_folder(place: Place, capture: CapturePart) -> Path | None:
 def _of_event(event: AlarmEvent, found: Sequence[Place]) -> Place | None:
     moment = compact(event.time_ns)
     return max(found, key=lambda each: (each.moment == moment, each.moment), default=None)
-
-
-def _without_hash(content: dict[str, object]) -> dict[str, object]:
-    return {key: value for key, value in content.items() if key != "sha256"}
 
 
 README = """Evidence of an alarm, made by padwatch.

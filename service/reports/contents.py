@@ -272,7 +272,8 @@ def _comparison(
     reading, row = news.reading, AXES.index(direction)
     value, cell = reading.values[row], cell_of(news, rules)
     learned = baseline.of(direction) if baseline else None
-    own = None if learned is None or cell is None else _own_cell(learned, cell)
+    cells = learned.table.cells if learned else ()
+    own = next((each for each in cells if each.cell == cell), None)
     found = _expected_at(learned, news.reading.conditions) if learned and own else None
     return ComparisonPart(
         bearing=reading.bearing,
@@ -291,12 +292,8 @@ def _comparison(
         time_scales=list(_time_scales(news.decisions[row], learned, rules)) if learned else [],
         members=None if members is None or cell is None else members.part(direction),
         expected=None if learned is None else _line(learned, news),
-        map=[] if learned is None else [_cell_part(each) for each in learned.table.cells],
+        map=[_cell_part(each) for each in cells],
     )
-
-
-def _own_cell(learned: QuantityBaseline, cell: Cell) -> CellStatistics | None:
-    return next((each for each in learned.table.cells if each.cell == cell), None)
 
 
 def _expected_at(learned: QuantityBaseline, conditions: FilmConditions) -> list[float]:

@@ -177,7 +177,9 @@ def _draw_films(
     if expected is not None:
         plot.line(expected.eccentricity_ratio, expected.stiffness_n_per_m, "expected")
     plot.dots(*recent, "today")
-    _own_point(plot, found)
+    k, u = found.stiffness_n_per_m, found.u_random
+    error = None if k is None or u is None else 1.96 * u * k
+    plot.points([found.eccentricity_ratio], [k], "alarm", 2.4, [error])
 
 
 def _bounds(found: ComparisonPart, cell: CellPart) -> list[tuple[float, float]]:
@@ -190,12 +192,6 @@ def _darkness(cell: CellPart, low: float, high: float) -> float:
     if cell.support == "none" or high == low:
         return 1.0 if cell.support == "none" else 0.5
     return 0.12 + 0.78 * math.log(cell.location_n_per_m / low) / math.log(high / low)
-
-
-def _own_point(plot: Plot, found: ComparisonPart) -> None:
-    k, u = found.stiffness_n_per_m, found.u_random
-    error = None if k is None or u is None else 1.96 * u * k
-    plot.points([found.eccentricity_ratio], [k], "alarm", 2.4, [error])
 
 
 def _recent(case: Case) -> EccentricityStiffness:

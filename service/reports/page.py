@@ -102,12 +102,6 @@ def shortened(text: str, longest: int = LONGEST) -> str:
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
-def headline(evidence: Evidence) -> str:
-    """Return the title of the report: unit, subject and kind of the alarm."""
-    alarm = evidence.alarm
-    return f"{alarm.unit} {alarm.subject}: {kind_words(alarm.kind, alarm.directions)}"
-
-
 def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
     """Yield name and text of each fact at the top of the report; `now` is its time as text."""
     evidence, alarm = case.evidence, case.evidence.alarm
@@ -340,9 +334,9 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-a
 
 def report_page(case: Case, now_ns: int) -> str:
     """Return the report of an occurrence, made at the time `now_ns`, as an HTML page."""
-    evidence = case.evidence
-    title, level = escape(headline(evidence)), evidence.alarm.level or "alert"
-    bearing = case.bearing
+    evidence, bearing = case.evidence, case.bearing
+    alarm, level = evidence.alarm, evidence.alarm.level or "alert"
+    title = escape(f"{alarm.unit} {alarm.subject}: {kind_words(alarm.kind, alarm.directions)}")
     body = [
         f'<header><h1>{title}</h1><span class="badge {level}">{level.upper()}</span></header>',
         _facts(case, now_ns),

@@ -71,7 +71,8 @@ class EvidenceRetention:
     def note(self, place: Place) -> None:
         """Update the cached size of a bundle after it was written or a file was added to it."""
         own = self._sizes.setdefault(place.alarm, {})
-        held, size = _Held(place.folder.name, place.unit), _size(place.folder)
+        held = _Held(place.folder.name, place.unit)
+        size = sum(file.stat().st_size for file in place.folder.iterdir())
         self._n_bytes += size - own.get(held, 0)
         own[held] = size
         if len(own) > self._limits.max_per_alarm:
@@ -153,7 +154,3 @@ def _remove(folder: Path) -> None:
     aside = folder.with_name(folder.name + INCOMPLETE)
     folder.rename(aside)  # no partial bundle may have a final name
     shutil.rmtree(aside)
-
-
-def _size(folder: Path) -> int:
-    return sum(file.stat().st_size for file in folder.iterdir())

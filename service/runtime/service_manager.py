@@ -32,7 +32,8 @@ class ServiceManager:
         """Send variables of sd_notify(3), such as ``READY``, without blocking; log failure once."""
         if self._address is None:
             return
-        message = "\n".join(f"{key}={_one_line(value)}" for key, value in assignments.items())
+        # a line break separates assignments
+        message = "\n".join(f"{key}={' '.join(v.split())}" for key, v in assignments.items())
         try:
             with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
                 sender.setblocking(False)
@@ -62,11 +63,6 @@ def _watchdog_s(environment: Mapping[str, str]) -> float | None:
         return None
     given = environment.get("WATCHDOG_USEC", "")
     return int(given) / US_PER_S if given.isdecimal() and int(given) > 0 else None
-
-
-def _one_line(value: str) -> str:
-    """Return text as one line, because a line break separates assignments."""
-    return " ".join(value.split())
 
 
 NO_MANAGER = ServiceManager({})

@@ -1,9 +1,9 @@
 """Conversion of Modbus and recording settings to settings of the acquisition adapters."""
 
-from typing import Any
+from typing import TypeVar
 
 from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters, Identity
-from acquisition.modbus.transport import SerialTransport, TcpTransport, Transport
+from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport, Transport
 from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
 from service.settings.sources.devices import MappedDeviceSettings, ModbusRingSettings
 from service.settings.sources.modbus import (
@@ -33,15 +33,9 @@ def identity_of(settings: IdentitySettings | None) -> Identity | None:
     """Return the expected identity of a device; None if any device is accepted."""
     match settings:
         case SignatureIdentity():
-            return ExpectedRegisters(
-                address=settings.address, words=settings.words, function=settings.function
-            )
+            return ExpectedRegisters(**settings.values_for(ExpectedRegisters))
         case IdentificationIdentity():
-            return ExpectedIdentification(
-                vendor=settings.vendor,
-                product_code=settings.product_code,
-                revision=settings.revision,
-            )
+            return ExpectedIdentification(**settings.values_for(ExpectedIdentification))
         case None:
             return None
 
@@ -54,25 +48,22 @@ def transport_of(source: ModbusLinkSettings) -> Transport:
     """Return the transport of a Modbus device: TCP or serial line."""
     if source.host is not None:
         return TcpTransport(host=source.host, port=source.port)
-    return SerialTransport(
-        device=source.device or "",
-        baudrate=source.baudrate,
-        parity=source.parity,
-        stop_bits=source.stop_bits,
-    )
+    return SerialTransport(**source.values_for(SerialTransport))
 
 
-def link_fields(source: ModbusLinkSettings) -> dict[str, Any]:
-    """Return the connection and identity fields that the settings of all Modbus adapters share."""
+Link = TypeVar("Link", bound=LinkSettings)
+
+
+def link_settings(kind: type[Link], source: ModbusLinkSettings) -> Link:
+    """Return the settings of a Modbus device as the `LinkSettings` of one kind of adapter."""
     is_per_reply = isinstance(source, MappedDeviceSettings) and source.connection == "per_reply"
-    return {
+    own = {
         "transport": transport_of(source),
-        "device_id": source.device_id,
-        "timeout_s": source.timeout_s,
         "identity": identity_of(source.identity),
         "keeps_connection": not is_per_reply,
         "requests_in_flight": _requests_in_flight(source),
     }
+    return kind(**source.values_for(kind) | own)
 
 
 def _requests_in_flight(source: ModbusLinkSettings) -> int:

@@ -98,15 +98,14 @@ else:
 """Name of an alarm kind, validated by pydantic."""
 
 
-def kind_label(kind: str) -> str:
-    """Return the label of an alarm kind; for an unknown kind, its name without underscores."""
-    found = ALARM_KINDS.get(kind)
-    return kind.replace("_", " ") if found is None else found.label
-
-
 def kind_words(kind: str, directions: str = "") -> str:
-    """Return the label of an alarm kind in lower case: "film stiffness changed, x and y"."""
-    label = ", ".join(filter(None, (kind_label(kind), " and ".join(directions))))
+    """Return the label of an alarm kind in lower case: "film stiffness changed, x and y".
+
+    The label of an unknown kind is its name without underscores.
+    """
+    found = ALARM_KINDS.get(kind)
+    name = kind.replace("_", " ") if found is None else found.label
+    label = ", ".join(filter(None, (name, " and ".join(directions))))
     return label[:1].lower() + label[1:]
 
 

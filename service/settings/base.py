@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable
+from dataclasses import fields
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, StringConstraints, field_validator
@@ -50,6 +51,10 @@ class Settings(BaseModel):
         if isinstance(value, str) and CONTROL.search(value):
             raise SecretMisfitError("must not contain control characters")
         return value
+
+    def values_for(self, kind: type[Any]) -> dict[str, Any]:
+        """Return the values of the settings that have the names of fields of a dataclass."""
+        return self.model_dump(include={field.name for field in fields(kind)})
 
 
 def refuse_twice(entries: Iterable[tuple[int | str, ...]]) -> None:

@@ -21,47 +21,19 @@ from service.settings.units import UnitSettings
 
 def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSettings:
     """Return the settings of the CAN adapter for a unit."""
-    link = can_link_of(source)
-    others: dict[str, Any] = {
-        "hold_s": source.hold_s,
-        "stale_after_s": source.stale_after_s,
-        "queue_frames": source.receive_buffer,
-        "when_full": source.when_full,
-        "stamps": source.stamps,
-    }
+    link = CanLinkSettings(**source.values_for(CanLinkSettings))
+    others = source.model_dump(include={"hold_s", "stale_after_s", "when_full", "stamps"})
+    others["queue_frames"] = source.receive_buffer
     units = tuple(UNIT_OF[channel.measurand] for channel in unit.channel)
     if source.profile is not None:
         return daq_settings(can_shape_of(unit, source), link, units, **others)
-    return CanSettings(
-        link=link,
-        dbc=source.dbc_path,
-        channels=tuple(
-            CanChannel(channel.id, engineering_unit, _listed(source.signals[channel.id]))
-            for channel, engineering_unit in zip(unit.channel, units, strict=True)
-        ),
-        slow=tuple(CanSlowChannel(s.id, s.unit, source.slow[s.id]) for s in unit.slow_channel),
-        counters=source.counters,
-        counter_counts=source.counter_counts,
-        frame_samples=source.frame_samples,
-        epoch=source.epoch,
-        ok_bits=source.ok_bits,
-        seconds=source.seconds,
-        microseconds=source.microseconds,
-        hold_samples=source.hold_samples,
-        **others,
+    channels = tuple(
+        CanChannel(channel.id, engineering_unit, _listed(source.signals[channel.id]))
+        for channel, engineering_unit in zip(unit.channel, units, strict=True)
     )
-
-
-def can_link_of(source: settings.CanSettings) -> CanLinkSettings:
-    """Return the connection settings of a CAN bus."""
-    return CanLinkSettings(
-        interface=source.interface,
-        channel=source.channel,
-        bitrate=source.bitrate,
-        fd=source.fd,
-        data_bitrate=source.data_bitrate,
-        options=source.options,
-    )
+    slow = tuple(CanSlowChannel(s.id, s.unit, source.slow[s.id]) for s in unit.slow_channel)
+    own = {"link": link, "dbc": source.dbc_path, "channels": channels, "slow": slow}
+    return CanSettings(**source.values_for(CanSettings) | others | own)
 
 
 def can_shape_of(unit: UnitSettings, source: settings.CanSettings) -> CanShape:

@@ -1,7 +1,6 @@
 """Conversion of settings to the objects of the analysis: machine, calibration, alarm rules."""
 
 from collections.abc import Mapping
-from dataclasses import fields
 
 from core.alarms.judgements import OrderVector, VectorReference
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
@@ -36,17 +35,11 @@ from service.settings.units import UnitSettings
 def machine_of(settings: UnitSettings) -> Unit:
     """Return the settings of a generating unit as a `Unit`."""
     return Unit(
-        id=settings.id,
-        rated_speed_rpm=settings.rated_speed_rpm,
-        rate_hz=settings.rate_hz,
+        **settings.values_for(Unit),
         channels=tuple(_channel(channel) for channel in settings.channel),
         bearings=tuple(_bearing(bearing, settings) for bearing in settings.bearing),
-        speed_channel=settings.speed_channel,
-        power_channel=settings.power_channel,
         rotation_sense=1 if settings.rotation == "x_to_y" else -1,
         has_vortex=settings.turbine == "francis",
-        key_phase=settings.key_phase,
-        rated_power_mw=settings.rated_power_mw,
     )
 
 
@@ -69,7 +62,7 @@ def _channel(settings: ChannelSettings) -> Channel:
 def _bearing(settings: BearingSettings, unit: UnitSettings) -> Bearing:
     gain = {channel.id: channel.gain_uncertainty for channel in unit.channel}
     return Bearing(
-        **settings.model_dump(include={field.name for field in fields(Bearing)}),
+        **settings.values_for(Bearing),
         accuracy=_accuracy(settings, gain),
         gap_accuracy=_gap_accuracy(settings, gain),
     )
@@ -114,16 +107,11 @@ def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
     noise = dynamic.probe_noise_um2_per_hz
     return AnalysisSettings(
         **settings.model_dump(exclude={"dynamic", "speed_tolerance", "max_power_change"}),
-        sensors=SensorLimits(
-            speed_tolerance=settings.speed_tolerance, max_power_change=settings.max_power_change
-        ),
+        sensors=SensorLimits(**settings.values_for(SensorLimits)),
         dynamic=DynamicSettings(
-            band_hz=dynamic.band_hz,
-            guard_bins=dynamic.guard_bins,
+            **dynamic.model_dump(exclude={"probe_noise_um2_per_hz"}),
             probe_noise_um2_per_hz=None if noise is None else (noise, noise),
-            quiet_band_hz=dynamic.quiet_band_hz,
             min_segments=max(settings.min_segments, 3),
-            max_relative_uncertainty=dynamic.max_relative_uncertainty,
             overlap=settings.overlap,
         ),
     )

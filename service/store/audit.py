@@ -282,6 +282,19 @@ def begin_head(path: Path) -> None:
         write_head(path, AuditHead())
 
 
+@contextmanager
+def closed_after_error(database: Database, head: Path) -> Iterator[None]:
+    """Close a database after an error in the block; `OSError` concerns its head file."""
+    try:
+        yield
+    except OSError as error:
+        database.close()
+        raise StoreError(f"the head file {head} cannot be written: {error.strerror}") from error
+    except BaseException:
+        database.close()
+        raise
+
+
 def _insert(writer: Connection, action: AuditAction, newest: AuditHead) -> AuditHead:
     entry = chained(action, newest.number + 1, newest.hash)
     writer.execute(INSERT, astuple(entry))

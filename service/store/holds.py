@@ -167,11 +167,6 @@ class AlreadyRunningError(StoreError):
     """Error raised if another service uses the database; the message states its process id."""
 
 
-def lock_path(database: Path) -> Path:
-    """Return the path of the lock file of a database."""
-    return database.with_name(database.name + SUFFIX)
-
-
 @contextmanager
 def exclusive_use(
     database: Path, look: Callable[[Path], FileSystem] = file_system_of
@@ -192,7 +187,7 @@ def exclusive_use(
     StoreError
         If the folder is not writable, or is on a network file system.
     """
-    path = lock_path(database)
+    path = database.with_name(database.name + SUFFIX)
     _require_local(database.parent, look(database.parent))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

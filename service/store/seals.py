@@ -213,16 +213,13 @@ class Seals:
         writer.execute(SCHEMA)
         writer.execute(WALK)
         if writer.execute(SEALED_AT).fetchone() != now:
-            self._anew(writer)
+            for table in self.tables.values():
+                writer.execute(f"DROP TABLE IF EXISTS {table.seals}")
+                for statement in table.create:
+                    writer.execute(statement)
             writer.execute(SET_SEALED_AT, now)
         for table in self.tables.values():
             for statement in (*table.triggers, table.view(WHOLE)):
-                writer.execute(statement)
-
-    def _anew(self, writer: sqlite3.Connection) -> None:
-        for table in self.tables.values():
-            writer.execute(f"DROP TABLE IF EXISTS {table.seals}")
-            for statement in table.create:
                 writer.execute(statement)
 
     def load(self, reader: sqlite3.Connection) -> None:

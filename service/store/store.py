@@ -25,7 +25,7 @@ from service.store.port import (
     TrendQuery,
     UnitGap,
 )
-from service.store.references import GapReference, GapReferenceStore, VectorReferenceStore
+from service.store.references import GapReferenceStore, VectorReferenceStore
 from service.store.retention import RetentionStore
 from service.store.rollups.coverage import read_trend
 from service.store.rollups.gathering import RollupStore
@@ -216,18 +216,6 @@ class Store:
         time_ns, quantities, reasons, values, qualities = row
         readings = Layout.loads(quantities, reasons).readings(values, qualities)
         return StoredReadings(int(time_ns), readings)
-
-    def add_reference(self, reference: GapReference) -> None:
-        """Write a gap reference, which is then in force for the bearing."""
-        self.gap_references.add(reference)
-
-    def references(self) -> list[GapReference]:
-        """Return the gap reference in force of each bearing."""
-        return self.gap_references.in_force()
-
-    def reference_history(self, unit: str, bearing: str) -> list[GapReference]:
-        """Return the newest gap references of a bearing, at most 1000, newest first."""
-        return self.gap_references.history(unit, bearing)
 
     def position(self, unit: str) -> StreamPosition | None:
         """Return the stream position of a unit; None if its results never came from a stream."""

@@ -105,7 +105,7 @@ def reference_router(context: Context) -> APIRouter:
         references, the reference of the plant file applies.
         """
         context.bearing(unit, bearing)
-        history = await asyncio.to_thread(context.store.reference_history, unit, bearing)
+        history = await asyncio.to_thread(context.store.gap_references.history, unit, bearing)
         return [set_reference_model(reference) for reference in history]
 
     @router.get("/order1-references", summary="References of 1×", name="references")

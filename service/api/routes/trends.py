@@ -162,7 +162,10 @@ def trend_answer(
         End of the simulated readings of the bearing; None without simulated readings.
     """
     return {
-        **history_of(query),
+        "unit": query.unit,
+        "bearing": query.bearing,
+        "start": rfc3339(query.start_ns),
+        "end": rfc3339(query.end_ns),
         **_columns_of(trend),
         "simulated_until": simulated_until(query, past_end_ns),
         "coarse_until": None if trend.coarse_until_ns is None else rfc3339(trend.coarse_until_ns),
@@ -176,12 +179,6 @@ def simulated_until(query: TrendQuery, past_end_ns: int | None) -> str | None:
     if past_end_ns is None or past_end_ns < query.start_ns:
         return None
     return rfc3339(past_end_ns)
-
-
-def history_of(query: TrendQuery) -> dict[str, object]:
-    """Return the fields of `BearingHistory` for a query, by name."""
-    place = {"unit": query.unit, "bearing": query.bearing}
-    return {**place, "start": rfc3339(query.start_ns), "end": rfc3339(query.end_ns)}
 
 
 def _group(group: TrendGroup) -> dict[str, object]:

@@ -133,7 +133,10 @@ def _table(text: bytes, numbers: TimeArray, headings: list[str]) -> Any:
         raise ReadingsError(_misfit(misfits, numbers, headings, error)) from error
     if len(table) != numbers.size:
         raise ReadingsError(f"line {numbers[0]} or a later line: invalid row")
-    return _trimmed(table) if b" " in text else table
+    if b" " not in text:
+        return table
+    columns = [pc.utf8_trim_whitespace(column) for column in table.columns]
+    return pa.table([pc.if_else(pc.equal(c, ""), None, c) for c in columns], table.column_names)
 
 
 def _misfit(
@@ -143,11 +146,6 @@ def _misfit(
         return f"line {numbers[0]} or a later line: {str(error).splitlines()[0]}"
     row, n_columns = misfits[0]
     return f"line {numbers[row - 1]}: expected {len(headings)} columns, got {n_columns}"
-
-
-def _trimmed(table: Any) -> Any:
-    columns = [pc.utf8_trim_whitespace(column) for column in table.columns]
-    return pa.table([pc.if_else(pc.equal(c, ""), None, c) for c in columns], table.column_names)
 
 
 MAGIC = b"PAR1"

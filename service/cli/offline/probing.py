@@ -6,7 +6,6 @@ Functions that read raise `LinkError` if the device does not answer or answers w
 
 import math
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from acquisition.errors import AcquisitionError
@@ -15,12 +14,12 @@ from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.decoding import MapDecoder, byte_permutation
 from acquisition.modbus.identity import Identification
 from acquisition.modbus.polled_source import MapReader
-from acquisition.modbus.register_map import MapValue, RegisterMap
+from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.requests import Span
 from acquisition.modbus.ring_follower import RingReader
 from acquisition.modbus.ring_profile import RingHeader, Slot
 from acquisition.modbus.transport import LinkSettings
-from service.settings.adapter_values import link_fields
+from service.settings.adapter_values import link_settings
 from service.settings.sources.modbus import ModbusLinkSettings
 
 PLAUSIBLE = (1e-3, 1e6)
@@ -163,7 +162,7 @@ def value_looks(decoder: MapDecoder, content: bytes) -> list[ValueLook]:
             registers=_words(decoder, content, value.cell),
             value=float(number) if math.isfinite(number) else None,
             state=state.name.lower(),
-            flags=dict(_flags(decoder, content, value)),
+            flags={f.cell.address: _words(decoder, content, f.cell)[0] for f in value.flags},
         )
         for value, number, state in zip(
             decoder.map.values, reading.values, reading.states, strict=True
@@ -210,22 +209,12 @@ def _words(decoder: MapDecoder, content: bytes, cell: Cell) -> tuple[int, ...]:
     return struct.unpack_from(f">{cell.n_places}H", content, start)
 
 
-def _flags(decoder: MapDecoder, content: bytes, value: MapValue) -> Iterator[tuple[int, int]]:
-    for flag in value.flags:
-        yield flag.cell.address, _words(decoder, content, flag.cell)[0]
-
-
 _TRIES_IN_FLIGHT = 20
-
-
-def link_settings_of(device: ModbusLinkSettings) -> LinkSettings:
-    """Return the connection settings of a device for the Modbus client."""
-    return LinkSettings(**link_fields(device))
 
 
 async def read_once(device: ModbusLinkSettings, function: int, address: int, count: int) -> bytes:
     """Read registers; return big-endian words or, for functions 1 and 2, bits, eight in a byte."""
-    client = ModbusClient(link_settings_of(device))
+    client = ModbusClient(link_settings(LinkSettings, device))
     async with client.connected():
         return await client.read(address, count, function)
 
@@ -235,7 +224,7 @@ async def read_map_once(
 ) -> tuple[MapDecoder, bytes]:
     """Check the signature of a device; return the decoder and the content of its registers."""
     decoder = MapDecoder(registers)
-    reader = MapReader(link_settings_of(device), decoder)
+    reader = MapReader(link_settings(LinkSettings, device), decoder)
     async with reader.connected():
         return decoder, await reader.content()
 
@@ -244,7 +233,7 @@ async def read_ring_once(
     device: ModbusLinkSettings, base_address: int, function: int
 ) -> tuple[RingHeader, Slot]:
     """Return the header and the newest slot of a block ring."""
-    client = ModbusClient(link_settings_of(device))
+    client = ModbusClient(link_settings(LinkSettings, device))
     reader = RingReader(client, base_address, function)
     async with client.connected():
         header = await reader.header()
@@ -254,7 +243,7 @@ async def read_ring_once(
 
 async def identify_once(device: ModbusLinkSettings) -> Identification:
     """Return the vendor, product code and revision of a device (function 43/14)."""
-    client = ModbusClient(link_settings_of(device))
+    client = ModbusClient(link_settings(LinkSettings, device))
     async with client.connected():
         return await client.identify()
 
@@ -269,7 +258,9 @@ async def measure_in_flight(
     await read_once(device, address, 1, function)
     n_answered = 1
     for n_requests in range(2, most + 1):
-        client = ModbusClient(replace(link_settings_of(device), requests_in_flight=n_requests))
+        client = ModbusClient(
+            replace(link_settings(LinkSettings, device), requests_in_flight=n_requests)
+        )
         spans = [Span(address, 1, function)] * n_requests
         try:
             async with client.connected():

@@ -70,7 +70,11 @@ def compared(mark: Mark | str, database: Mark, host: str) -> list[MarkFinding]:
         Mark in the database, and identifier of this machine.
     """
     if isinstance(mark, str):
-        return [MarkFinding(Kind.MARK_LOST, None, _lost(mark, database))]
+        words = (
+            f"{mark}; it is unknown whether the database, whose last transaction is of"
+            f" {_when(database.time_ns)}, is the newest"
+        )
+        return [MarkFinding(Kind.MARK_LOST, None, words)]
     found = _history(mark, database)
     if NO_HOST not in (host, mark.host) and mark.host != host:
         found.append(MarkFinding(Kind.OTHER_HOST, None, OTHER_HOST))
@@ -85,52 +89,31 @@ OTHER_HOST = (
 
 def _history(mark: Mark, database: Mark) -> list[MarkFinding]:
     if mark.store != database.store:
-        return [MarkFinding(Kind.REPLACED, None, _replaced(mark, database))]
+        words = (
+            f"the database was replaced: the former had {mark.n_commits} transactions up to"
+            f" {_when(mark.time_ns)}, this one has {database.n_commits}"
+        )
+        return [MarkFinding(Kind.REPLACED, None, words)]
     n_missing = mark.n_commits - database.n_commits
     if n_missing > 0:
-        return [MarkFinding(Kind.ROLLED_BACK, n_missing, _rolled_back(mark, database))]
+        words = (
+            f"the database was rolled back: {n_missing} transactions, written after"
+            f" {_when(database.time_ns)} and up to {_when(mark.time_ns)}, are missing"
+        )
+        return [MarkFinding(Kind.ROLLED_BACK, n_missing, words)]
     if n_missing == 0 and mark.nonce != database.nonce:
-        return [MarkFinding(Kind.ROLLED_BACK, None, _parted(mark, database))]
+        words = (
+            f"the database is not the last one used here: transaction {database.n_commits} differs"
+            f" from that of {_when(mark.time_ns)}"
+        )
+        return [MarkFinding(Kind.ROLLED_BACK, None, words)]
     if n_missing < -MAX_BEHIND:
-        return [MarkFinding(Kind.MARK_BEHIND, 0, _behind(mark, database))]
+        words = (
+            f"the high-water mark is older than the database: it counts {mark.n_commits}"
+            f" transactions of {database.n_commits}"
+        )
+        return [MarkFinding(Kind.MARK_BEHIND, 0, words)]
     return []
-
-
-def _rolled_back(mark: Mark, database: Mark) -> str:
-    n = mark.n_commits - database.n_commits
-    last, known = _when(database.time_ns), _when(mark.time_ns)
-    return (
-        f"the database was rolled back: {n} transactions, written after {last} and up to {known},"
-        " are missing"
-    )
-
-
-def _parted(mark: Mark, database: Mark) -> str:
-    return (
-        f"the database is not the last one used here: transaction {database.n_commits} differs from"
-        f" that of {_when(mark.time_ns)}"
-    )
-
-
-def _replaced(mark: Mark, database: Mark) -> str:
-    return (
-        f"the database was replaced: the former had {mark.n_commits} transactions up to"
-        f" {_when(mark.time_ns)}, this one has {database.n_commits}"
-    )
-
-
-def _behind(mark: Mark, database: Mark) -> str:
-    return (
-        f"the high-water mark is older than the database: it counts {mark.n_commits} transactions"
-        f" of {database.n_commits}"
-    )
-
-
-def _lost(why: str, database: Mark) -> str:
-    return (
-        f"{why}; it is unknown whether the database, whose last transaction is of"
-        f" {_when(database.time_ns)}, is the newest"
-    )
 
 
 def _when(time_ns: int) -> str:

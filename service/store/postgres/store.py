@@ -10,9 +10,8 @@ from service.settings.storage import Origin
 from service.store.access.audit_entries import AuditAction, acting
 from service.store.access.audit_verification import AuditHead, write_head
 from service.store.access.tables import AccessStore
-from service.store.audit import AuditChain, Trail, newest_of
+from service.store.audit import AuditChain, Trail, closed_after_error, newest_of
 from service.store.outbox import Address, no_recipients
-from service.store.port import StoreError
 from service.store.postgres.connection import PostgresAddress, PostgresConnection
 from service.store.postgres.database import PostgresDatabase, Readers
 from service.store.spectra import SpectraLimits
@@ -53,7 +52,7 @@ class PostgresStore(Store):
         spectra: SpectraLimits | None = None,
     ) -> None:
         database = PostgresDatabase(address, origin)
-        with _closed_after_error(database, head):
+        with closed_after_error(database, head):
             has_begun = _begin_head(database, head)
             super().__init__(database, head, to, spectra)
             if has_begun:
@@ -71,24 +70,12 @@ def open_server_access(
         As in `PostgresStore`.
     """
     database = PostgresDatabase(address, origin)
-    with _closed_after_error(database, head):
+    with closed_after_error(database, head):
         has_begun = _begin_head(database, head)
         store = AccessStore(database, AuditChain(head, database))
         if has_begun:
             store.audit.record([_begun(head)])
         return store
-
-
-@contextmanager
-def _closed_after_error(database: PostgresDatabase, head: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        database.close()
-        raise StoreError(f"the head file {head} cannot be written: {error.strerror}") from error
-    except BaseException:
-        database.close()
-        raise
 
 
 def _begin_head(database: PostgresDatabase, head: Path) -> bool:

@@ -117,7 +117,8 @@ class _Covering:
             self.cover.spans.append(span)
             return
         width_ns, finer_ns = widths_ns[-1], widths_ns[:-1]
-        inner = (-(-span[0] // width_ns) * width_ns, self._gathered_until(span[1], width_ns))
+        gathered_ns = min(span[1], self._mark_ns) // width_ns * width_ns
+        inner = (-(-span[0] // width_ns) * width_ns, gathered_ns)
         if inner[0] >= inner[1]:
             self.take(span, finer_ns)
             return
@@ -170,9 +171,6 @@ class _Covering:
     def _cells(self, span: Span, width_ns: int) -> Cells | None:
         arguments = (self._reader, self._series, width_ns, span, self._names, self._asked)
         return select_cells(*arguments, has_conditions=self._asked != ANYTHING)
-
-    def _gathered_until(self, end_ns: int, width_ns: int) -> int:
-        return min(end_ns, self._mark_ns) // width_ns * width_ns
 
     def _take_inner(self, inner: Span, width_ns: int, finer_ns: Sequence[int]) -> None:
         redone = self._redone(inner)
@@ -245,7 +243,8 @@ def read_trend(reader: Connection, query: TrendQuery) -> Trend:
     QueryTooLargeError
         If too many single readings would have to be read.
     """
-    deleted = _deleted(reader, query)
+    series = find_series(reader, query.unit, query.bearing)
+    deleted = DeletedUntil({}) if series is None else select_deleted(reader, series)
     whole = (storable(query.start_ns), storable(query.end_ns))
     coarse_ns = deleted.readings_ns if whole[0] < deleted.readings_ns else None
     if query.is_page:
@@ -257,11 +256,6 @@ def read_trend(reader: Connection, query: TrendQuery) -> Trend:
     return replace(found, coarse_until_ns=coarse_ns)
 
 
-def _deleted(reader: Connection, query: TrendQuery) -> DeletedUntil:
-    series = find_series(reader, query.unit, query.bearing)
-    return DeletedUntil({}) if series is None else select_deleted(reader, series)
-
-
 def _read(
     reader: Connection, query: TrendQuery, deleted: DeletedUntil, whole: Span, width_ns: int
 ) -> Trend:
@@ -270,9 +264,6 @@ def _read(
     if cover.is_coarse or cover.n_rolled + n_single > query.max_points:
         return bucketed(Summaries.together([*cover.summaries, singles]), width_ns)
     if cover.n_rolled:
-        _, singles = select_readings(reader, query, _all_spans(cover), width_ns)
+        spans = sorted([*cover.spans, *cover.rolled_spans])
+        _, singles = select_readings(reader, query, spans, width_ns)
     return single_points(singles, query.hole_ns)
-
-
-def _all_spans(cover: Cover) -> list[Span]:
-    return sorted([*cover.spans, *cover.rolled_spans])

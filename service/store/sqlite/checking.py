@@ -153,7 +153,8 @@ class Scrubber:
             If the database is temporarily unusable.
         """
         if self._number < 0:
-            self._recall()
+            with self._database.reading() as reader:
+                self._number, self._after = _place(self._walks, reader)
         if not self._walks:
             return True
         self._after = self._looked(self._walks[self._number])
@@ -175,10 +176,6 @@ class Scrubber:
             what = repr(str(error.__cause__ or error)[:80])
             self._damage.note(Place(walk.table.name, f"cannot be read further: {what}"))
             return None
-
-    def _recall(self) -> None:
-        with self._database.reading() as reader:
-            self._number, self._after = _place(self._walks, reader)
 
     def _remember(self) -> None:
         walk = self._walks[self._number]

@@ -5,7 +5,6 @@ import re
 import resource
 import sqlite3
 from pathlib import Path
-from types import TracebackType
 
 from service.store.holds import take_lock
 from service.store.port import StoreError
@@ -194,12 +193,7 @@ class FileHold:
         self._descriptor = descriptor
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None

@@ -10,7 +10,7 @@ from threading import Lock
 from service.settings.storage import Origin
 from service.store.access.audit_verification import head_path
 from service.store.access.tables import AccessStore
-from service.store.audit import AuditChain, Trail, begin_head
+from service.store.audit import AuditChain, Trail, begin_head, closed_after_error
 from service.store.integrity import Integrity
 from service.store.outbox import Address, no_recipients
 from service.store.port import StoreError
@@ -107,16 +107,10 @@ def open_access_file(path: Path) -> AccessStore:
 @contextmanager
 def _begun_head(database: SqliteDatabase, path: Path) -> Iterator[None]:
     """Create the head file of a new database; close the database after an error in the block."""
-    try:
+    with closed_after_error(database, head_path(path)):
         if not database.had_trail:
             begin_head(head_path(path))
         yield
-    except OSError as error:
-        database.close()
-        raise StoreError(f"{head_path(path)} cannot be written: {error.strerror}") from error
-    except BaseException:
-        database.close()
-        raise
 
 
 def _integrity(

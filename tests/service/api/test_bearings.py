@@ -215,9 +215,9 @@ def reference(n: int, **changes: Any) -> GapReference:
 
 
 async def test_a_reference_and_its_history_have_time_author_and_note(running):
-    running.store.add_reference(reference(1))
+    running.store.gap_references.add(reference(1))
     known = {"source": ReferenceSource.MEASURED, "opposite_reference_um": (1.0, 2.0)}
-    running.store.add_reference(reference(2, note="after the overhaul", **known))
+    running.store.gap_references.add(reference(2, note="after the overhaul", **known))
     assert (await running.json(UJB))["reference"]["source"] == "plant_file"  # not yet taken over
     await running.references.look()
 

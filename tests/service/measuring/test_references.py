@@ -51,8 +51,8 @@ def watched(monitor: UnitMonitor) -> dict[str, tuple[float, float]]:
 
 
 async def test_a_bearing_is_watched_with_the_reference_set_last(in_force, monitor, store):
-    store.add_reference(reference(x_um=1.0))
-    store.add_reference(reference())
+    store.gap_references.add(reference(x_um=1.0))
+    store.gap_references.add(reference())
     await in_force.look()
 
     assert watched(monitor) == {"UJB": (1998.5, 2003.1), "LJB": (2000.0, 2000.0)}
@@ -67,7 +67,7 @@ async def test_a_reference_set_while_the_service_runs_is_taken_over_at_the_next_
 ):
     async with at_work(in_force.run()):
         for x_um in (1990.0, 1991.0, 1992.0):
-            store.add_reference(reference(x_um=x_um))
+            store.gap_references.add(reference(x_um=x_um))
             await until(lambda x_um=x_um: watched(monitor)["UJB"][0] == x_um)
         taken_s = stepped_clock.monotonic_s()
         quiet_s = 3 * LOOK_EVERY_S
@@ -82,9 +82,9 @@ async def test_a_reference_set_while_the_service_runs_is_taken_over_at_the_next_
 async def test_a_reference_of_a_bearing_that_is_gone_is_ignored_and_said_once(
     in_force, monitor, store, logged
 ):
-    store.add_reference(reference("TJB"))
-    store.add_reference(reference(unit="U9"))
-    store.add_reference(reference())
+    store.gap_references.add(reference("TJB"))
+    store.gap_references.add(reference(unit="U9"))
+    store.gap_references.add(reference())
     for _ in range(3):
         await in_force.look()
 
@@ -96,18 +96,18 @@ async def test_a_reference_of_a_bearing_that_is_gone_is_ignored_and_said_once(
 async def test_while_the_store_cannot_be_read_the_references_stay(
     in_force, monitor, store, tmp_path, logged
 ):
-    store.add_reference(reference())
+    store.gap_references.add(reference())
     await in_force.look()
     path, away = tmp_path / "padwatch.sqlite3", tmp_path / "away"
     path.rename(away)
     with pytest.raises(StoreError):
-        store.references()
+        store.gap_references.in_force()
     for _ in range(3):
         await in_force.look()
     assert watched(monitor)["UJB"] == (1998.5, 2003.1)
 
     away.rename(path)
-    store.add_reference(reference(x_um=1990.0))
+    store.gap_references.add(reference(x_um=1990.0))
     await in_force.look()
 
     assert watched(monitor)["UJB"] == (1990.0, 2003.1)

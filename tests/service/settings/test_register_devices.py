@@ -2,42 +2,53 @@
 
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from acquisition.can.settings import CanLinkSettings
+from acquisition.can.settings import CanSettings as CanAdapterSettings
 from acquisition.can.source import CanSource
 from acquisition.delivery.blocks import BlockAssembler
+from acquisition.modbus.fifo_source import FifoSettings
+from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters
+from acquisition.modbus.polled_source import PolledSettings
+from acquisition.modbus.ring_source import RingSettings
+from acquisition.modbus.transport import LinkSettings, SerialTransport
 from acquisition.simulated.devices.can_shape import daq_dbc
 from core.machine.unit import Unit
 from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.app.simulated_daq import modbus_device, modbus_server
-from service.cli.offline.probing import link_settings_of
 from service.measuring.simulated_sources import simulated_feed
-from service.measuring.sources import (
-    modbus_source,
-    monitor_for,
-    polled_settings,
-    retry_s,
-)
+from service.measuring.sources import modbus_source, monitor_for, retry_s
+from service.settings.adapter_values import link_settings
 from service.settings.can_values import can_daq_of, can_settings_of, can_shape_of
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.sources.can import CanSettings
 from service.settings.sources.devices import (
+    MappedDeviceSettings,
     ModbusFifoSettings,
     ModbusPolledSettings,
+    ModbusRingSettings,
     ModbusVectorSettings,
+)
+from service.settings.sources.modbus import (
+    IdentificationIdentity,
+    ModbusLinkSettings,
+    SignatureIdentity,
 )
 from service.settings.transducers import FOLDER
 from service.settings.units import UnitSettings
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 N_SEGMENTS = 6
+LINK_FIELDS = {"transport", "keeps_connection"}
 
 
 @pytest.fixture(scope="module")
@@ -151,8 +162,27 @@ def test_how_long_a_connection_is_kept_reaches_the_adapter(use, keeps):
 
     device = ModbusPolledSettings.model_validate(given | {"connection": use})
 
-    assert polled_settings(device).keeps_connection is keeps
-    assert link_settings_of(device).keeps_connection is keeps
+    assert link_settings(PolledSettings, device).keeps_connection is keeps
+    assert link_settings(LinkSettings, device).keeps_connection is keeps
+
+
+@pytest.mark.parametrize(
+    ("source", "adapter", "computed"),
+    [
+        (ModbusRingSettings, RingSettings, LINK_FIELDS),
+        (ModbusFifoSettings, FifoSettings, LINK_FIELDS),
+        (MappedDeviceSettings, PolledSettings, LINK_FIELDS),
+        (ModbusLinkSettings, SerialTransport, set()),
+        (SignatureIdentity, ExpectedRegisters, set()),
+        (IdentificationIdentity, ExpectedIdentification, set()),
+        (UnitSettings, Unit, {"channels", "bearings", "rotation_sense", "has_vortex"}),
+        (CanSettings, CanLinkSettings, set()),
+        (CanSettings, CanAdapterSettings, {"link", "dbc_text", "channels", "queue_frames"}),
+    ],
+)
+def test_every_field_that_is_not_computed_is_a_key_of_the_file(source, adapter, computed):
+    named = {field.name for field in fields(adapter)} - computed
+    assert named <= set(source.model_fields)
 
 
 RING = load_plant_file(DEMO).unit[0].source

@@ -108,7 +108,7 @@ def test_trends_are_read_while_others_are_written(store):
 
 def test_a_closed_database_is_one_whole_file_also_after_reads(tmp_path):
     store = SqliteStore(tmp_path / "padwatch.sqlite3")
-    assert store.references() == []
+    assert store.gap_references.in_force() == []
     store.close()
 
     assert [path.name for path in tmp_path.iterdir() if "sqlite3" in path.name] == [
@@ -256,13 +256,13 @@ def test_an_older_database_keeps_its_data_and_gets_room_for_what_is_new(
 
     with closing(SqliteStore(path)) as store:
         store.append([assessment(speed_rpm=92.3)], [], [raised])
-        store.add_reference(reference)
+        store.gap_references.add(reference)
 
         gather_all(store)
         assert n_rows(path, "rollup_mark") == 1
         assert [gap.first_index for gap in store.gaps("U1", 0, 10)] == [2]
         assert [found.identity for found in store.alarms()] == [alarm.identity]
-        assert store.references() == [reference]
+        assert store.gap_references.in_force() == [reference]
         newest = store.newest("U1", "UJB")
     assert newest is not None
     assert newest.readings["speed_rpm"].value == 92.3

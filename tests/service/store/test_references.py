@@ -48,36 +48,42 @@ def test_a_reference_is_read_back_to_the_last_bit(store):
         ),
     ]
     for each in written:
-        store.add_reference(each)
+        store.gap_references.add(each)
 
-    assert store.references() == sorted(written, key=lambda r: r.bearing)
-    assert [store.reference_history("U1", r.bearing) for r in written] == [[r] for r in written]
+    assert store.gap_references.in_force() == sorted(written, key=lambda r: r.bearing)
+    assert [store.gap_references.history("U1", r.bearing) for r in written] == [
+        [r] for r in written
+    ]
 
 
 def test_the_reference_set_last_rules_and_all_are_kept(store):
     for n in range(3):
-        store.add_reference(reference(n))
-        store.add_reference(reference(n, bearing="LJB"))
-        store.add_reference(reference(n, unit="U2"))
+        store.gap_references.add(reference(n))
+        store.gap_references.add(reference(n, bearing="LJB"))
+        store.gap_references.add(reference(n, unit="U2"))
 
-    assert store.references() == [
+    assert store.gap_references.in_force() == [
         reference(2, bearing="LJB"),
         reference(2),
         reference(2, unit="U2"),
     ]
-    assert store.reference_history("U1", "UJB") == [reference(n) for n in (2, 1, 0)]
-    assert store.reference_history("U1", "TJB") == []
-    store.add_reference(reference(-1))  # by a clock that was put back
-    assert store.references()[1] == store.reference_history("U1", "UJB")[0] == reference(-1)
+    assert store.gap_references.history("U1", "UJB") == [reference(n) for n in (2, 1, 0)]
+    assert store.gap_references.history("U1", "TJB") == []
+    store.gap_references.add(reference(-1))  # by a clock that was put back
+    assert (
+        store.gap_references.in_force()[1]
+        == store.gap_references.history("U1", "UJB")[0]
+        == reference(-1)
+    )
 
 
 def test_what_another_process_has_set_is_seen(store, path):
-    assert store.references() == []
+    assert store.gap_references.in_force() == []
     other = SqliteStore(path)
-    other.add_reference(reference())
+    other.gap_references.add(reference())
     other.close()
 
-    assert store.references() == [reference()]
+    assert store.gap_references.in_force() == [reference()]
 
 
 @pytest.mark.parametrize(
@@ -103,7 +109,7 @@ def test_a_reference_outside_its_limits_is_refused_with_value_and_limit(changes,
 
 
 def test_a_reference_that_makes_no_sense_is_an_error_of_the_store(store):
-    store.add_reference(reference())
+    store.gap_references.add(reference())
     with store.database.writing() as writer:
         writer.execute(
             "INSERT INTO gap_reference SELECT 7, unit, bearing, set_ns, '', x_um, y_um, NULL, NULL,"
@@ -111,7 +117,7 @@ def test_a_reference_that_makes_no_sense_is_an_error_of_the_store(store):
         )
 
     with pytest.raises(StoreError, match="unit U1 bearing UJB is invalid: author is empty"):
-        store.references()
+        store.gap_references.in_force()
 
 
 def test_the_newest_readings_come_with_their_qualities(store):
@@ -139,7 +145,7 @@ def test_only_the_newest_thousand_of_a_history_are_handed_out(store):
             [(T0 + n,) for n in range(1001)],
         )
 
-    history = store.reference_history("U1", "UJB")
+    history = store.gap_references.history("U1", "UJB")
 
     assert (len(history), history[0].set_ns, history[-1].set_ns) == (1000, T0 + 1000, T0 + 1)
 

@@ -117,12 +117,12 @@ def test_a_damaged_account_lets_nobody_in_and_nobody_set_up_anew(access, execute
 
 def test_a_reference_that_was_altered_does_not_rule(store, execute):
     source = ReferenceSource.GIVEN
-    store.add_reference(GapReference("U1", "UJB", 1, "A", (2000.0, 2001.0), None, source, ""))
+    store.gap_references.add(GapReference("U1", "UJB", 1, "A", (2000.0, 2001.0), None, source, ""))
     execute("DROP TRIGGER gap_reference_kept_as_set")
     execute("UPDATE gap_reference SET x_um = 2100.0")
 
-    assert store.references() == []
-    assert store.reference_history("U1", "UJB") == []
+    assert store.gap_references.in_force() == []
+    assert store.gap_references.history("U1", "UJB") == []
     assert store.integrity.n_damaged == 1
 
 

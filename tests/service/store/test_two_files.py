@@ -27,7 +27,7 @@ from service.store.store import Store
 REFERENCE = GapReference("U1", "UJB", 5, "A", (1.0, 2.0), None, ReferenceSource.GIVEN)
 
 WRITES: list[Callable[[Store], object]] = [
-    lambda store: store.add_reference(REFERENCE),
+    lambda store: store.gap_references.add(REFERENCE),
     lambda store: store.audit.record([AuditAction(1, "A", "x", "y")]),
     lambda store: store.append([], [gap(at(1))]),
     lambda store: store.commands.ask(Command("c", "U1", "alarm", "{}", "A", None, 9, 10)),
@@ -124,12 +124,12 @@ def test_what_is_written_again_because_nobody_could_tell_counts_once(store):
     step = StoredStep("U1", "UJB", None, BaselineStep.RENEWED, 7, "A", "overhaul", 7)
     command = Command("c1", "U1", "alarm", "{}", "A", None, 9, LATER)
     for _ in range(2):
-        store.add_reference(GAP)
+        store.gap_references.add(GAP)
         store.order1_references.add(VECTOR)
         store.films.add_steps([step])
         store.commands.ask(command)
 
-    assert store.reference_history("U1", "UJB") == [GAP]
+    assert store.gap_references.history("U1", "UJB") == [GAP]
     assert store.order1_references.history("U1", "UJB") == [VECTOR]
     assert store.films.steps("U1", "UJB") == [step]
     assert store.commands.open(["U1"]) == [OpenCommand(command, None)]
@@ -146,7 +146,7 @@ def test_nothing_waits_for_anybody_in_a_new_outbox(store):
 
 @pytest.mark.parametrize("table", ["gap_reference", "vector_reference", "alarm_event", "audit"])
 def test_what_is_on_record_is_never_changed_or_taken_away(store, store_place, table):
-    store.add_reference(GAP)
+    store.gap_references.add(GAP)
     store.order1_references.add(VECTOR)
     alarm = Alarm(AlarmIdentity("U1", "UJB", "order1_shaft_x"))
     news = AlarmNews(*update(alarm, Judgement(AlarmLevel.ALERT), 7, AlarmRule()))

@@ -50,7 +50,9 @@ def _others(store: SqliteStore) -> None:
     source = ReferenceSource.GIVEN
     for n in range(3):
         gaps = (2000.0 + n, 2001.5)
-        store.add_reference(GapReference("U1", "UJB", T0_NS + n, "A", gaps, None, source, "note"))
+        store.gap_references.add(
+            GapReference("U1", "UJB", T0_NS + n, "A", gaps, None, source, "note")
+        )
     store.audit.record(
         [AuditAction(T0_NS + n, "A", "told", "something", after={"n": n}) for n in range(9)]
     )

@@ -107,8 +107,8 @@ def gap_reference(x_um: float = 1998.5) -> GapReference:
 
 def test_references_are_told_with_those_that_they_follow(store):
     with acting_as(Acting(Source.COMMAND_LINE, "anna on host")):
-        store.add_reference(gap_reference())
-        store.add_reference(gap_reference(2001.0))
+        store.gap_references.add(gap_reference())
+        store.gap_references.add(gap_reference(2001.0))
     told = newest(store)
     assert (told.actor, told.source, told.peer) == ("C. Name", "command_line", "anna on host")
     assert (told.action, told.object, told.reason) == ("gap_reference.set", "U1:UJB", "overhaul")
@@ -140,7 +140,7 @@ def test_what_cannot_be_told_is_not_done_and_the_other_way_round(store, path):
     news = raised()
     done = AlarmNews(*operate(news.alarm, Comment("A", "text"), T0 + 5))
     writes: list[Callable[[], Any]] = [
-        lambda: store.add_reference(gap_reference()),
+        lambda: store.gap_references.add(gap_reference()),
         lambda: store.films.add_steps([step(BaselineStep.ACCEPTED)]),
         lambda: store.order1_references.add(vector_reference(1.0, OperatingState.FULL_LOAD)),
         lambda: store.append([], [], [news, done]),
@@ -148,7 +148,11 @@ def test_what_cannot_be_told_is_not_done_and_the_other_way_round(store, path):
     for write in writes:
         with pytest.raises(StoreError):
             write()
-    assert (store.references(), store.films.steps("U1", "UJB"), store.alarms()) == ([], [], [])
+    assert (store.gap_references.in_force(), store.films.steps("U1", "UJB"), store.alarms()) == (
+        [],
+        [],
+        [],
+    )
     assert store.order1_references.in_force() == []
 
     swapped = "DROP TRIGGER full; CREATE TRIGGER full BEFORE INSERT ON baseline_step"
