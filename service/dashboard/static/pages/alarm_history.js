@@ -7,7 +7,7 @@ import { evidenceLinks } from "../parts/evidence.js";
 
 const HEADS = ["Time", "Where", "What", "Change", "Value", "Raised at", "By", "Reason"];
 
-/** Returns `{ node, draw(events), fail(sentence) }`; `filter` says which events are wanted. */
+/** Returns `{ node, draw({ events }), fail(sentence) }`; `filter` says which events are wanted. */
 export function historyTable(filter) {
   const heads = HEADS.map((head) => element("th", { scope: "col", role: "columnheader" }, head));
   const body = element("tbody", { role: "rowgroup" });
@@ -21,7 +21,7 @@ export function historyTable(filter) {
   let shown = null;
   return {
     node: element("section", { class: "panel alarm-list" }, element("h2", {}, "History"), sentence, table),
-    draw(events) {
+    draw({ events }) {
       table.hidden = events.length === 0;
       sentence.hidden = events.length > 0;
       setText(sentence, filter.eventQuery().length ? "No event matches the filter." : "Nothing has happened yet.");

@@ -1,6 +1,6 @@
 /** The audit trail: who did what to what, before and after, newest first. */
 
-import { NotReachable, ask } from "../api.js";
+import { ask } from "../api.js";
 import { chainWords } from "../audit_words.js";
 import { element, setText } from "../dom.js";
 import { listing } from "../parts/listing.js";
@@ -31,9 +31,7 @@ export function auditPage(main) {
       const query = [...filter.query(), ["limit", PAGE], ...(before === null ? [] : [["before", before]])];
       show(await ask(["audit"], query, mine.signal), before);
     } catch (failure) {
-      if (mine.signal.aborted) return;
-      const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
-      setText(sentence, `The audit trail cannot be read now. ${words}`);
+      if (!mine.signal.aborted) setText(sentence, `The audit trail cannot be read now. ${failure.message}`);
     }
   }
 

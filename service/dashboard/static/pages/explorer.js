@@ -79,13 +79,9 @@ export function explorerPage(main) {
 
   const questions = poll(async (signal) => {
     if (view?.serviceTimeMs == null) return;
-    try {
-      catalogue ??= await offered(signal);
-      await showTrends(signal);
-    } catch (failure) {
-      if (!signal.aborted) charts.trouble(failure);
-    }
-  }, () => (state.spanS === null ? LONGEST_PERIOD_S : Math.min(Math.max(bucketS, SHORTEST_PERIOD_S), LONGEST_PERIOD_S)));
+    catalogue ??= await offered(signal);
+    await showTrends(signal);
+  }, () => (state.spanS === null ? LONGEST_PERIOD_S : Math.min(Math.max(bucketS, SHORTEST_PERIOD_S), LONGEST_PERIOD_S)), charts.trouble);
 
   async function offered(signal) {
     const found = await ask(["quantities"], [], signal);

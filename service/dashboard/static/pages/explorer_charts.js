@@ -1,6 +1,5 @@
 /** The charts of the trend explorer: one for each kind of quantity, a sentence where there is nothing. */
 
-import { NotReachable } from "../api.js";
 import { besideWords } from "../charts/beside.js";
 import { MOST_LINES, againstLayout, againstTraces, besideTraces, compareLayout, compareTraces, lineOf } from "../charts/compare.js";
 import { panel } from "../charts/panel.js";
@@ -13,7 +12,7 @@ import { byAxis } from "../quantity_groups.js";
 /** A double click also makes the chart reset itself, which is not a zoom of the user. */
 const AFTER_DOUBLE_MS = 500;
 
-/** Returns `{ node, show(found, state, labels, refreshS), trouble(failure), draw(notCurrent) }`. */
+/** Returns `{ node, show(found, state, labels, refreshS), explain(sentence), trouble(failure), draw(notCurrent) }`. */
 export function explorerCharts(onZoom, onBack) {
   const node = element("div", { class: "charts explorer-charts" });
   const panels = new Map();
@@ -23,6 +22,11 @@ export function explorerCharts(onZoom, onBack) {
     for (const one of axes) if (!panels.has(keyOf(one))) panels.set(keyOf(one), panel(one.title, nameOf(one)));
     const wanted = axes.map((one) => panels.get(keyOf(one)).node);
     if (wanted.some((one, n) => node.children[n] !== one) || node.childElementCount !== wanted.length) node.replaceChildren(...wanted);
+  }
+
+  function explain(words) {
+    panels.clear();
+    node.replaceChildren(element("p", { class: "sentence panel" }, words));
   }
 
   return {
@@ -37,14 +41,10 @@ export function explorerCharts(onZoom, onBack) {
         wire(box.node.querySelector(".chart"), onZoom, onBack);
       }
     },
-    explain(words) {
-      panels.clear();
-      node.replaceChildren(element("p", { class: "sentence panel" }, words));
-    },
-    trouble(failure) {
-      const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
-      if (panels.size === 0) this.explain(words);
-      for (const box of panels.values()) box.trouble(words);
+    explain,
+    trouble({ message }) {
+      if (panels.size === 0) explain(message);
+      for (const box of panels.values()) box.trouble(message);
     },
     draw(notCurrent) {
       for (const box of panels.values()) box.draw(null, notCurrent);

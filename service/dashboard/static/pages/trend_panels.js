@@ -1,7 +1,7 @@
 /** Stiffness and amplitude against time, over a span and at an order that the reader chooses. */
 
 import { amplitudeUnit } from "../amplitudes.js";
-import { NotReachable, ask } from "../api.js";
+import { ask } from "../api.js";
 import { askBeside, besideWords, expectedTraces, markTraces, namedOnce } from "../charts/beside.js";
 import { panel } from "../charts/panel.js";
 import { X_COLOUR, Y_COLOUR } from "../charts/style.js";
@@ -78,25 +78,21 @@ export function trendPanels(path) {
 
   const questions = poll(async (signal) => {
     if (view?.serviceTimeMs == null) return;
-    try {
-      const lines = [stiffnessLines(which.value()), amplitudeLines(order.value())];
-      const endMs = Math.ceil(view.serviceTimeMs / WHOLE_MS) * WHOLE_MS;
-      const range = [endMs - span.value() * 1000, endMs];
-      const names = lines[0].map(([name]) => name);
-      const key = [...names, ...range].join();
-      if (beside?.key !== key) beside = { key, answer: askBeside([path[1], path[3]], names, range, signal) }; // once a minute
-      const [newest, marked] = await Promise.all([askTrends(path, lines.flat(), range, signal), beside.answer]);
-      trends = newest;
-      const asked = { trends, beside: marked, view, span, scale: scale.value(), latest };
-      await showTrends(stiffness, asked, lines[0], "Film stiffness, GN/m");
-      await showTrends(amplitude, asked, lines[1], `Vibration amplitude, ${amplitudeUnit()}`);
-    } catch (failure) {
-      beside = null;
-      if (signal.aborted) return;
-      const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
-      for (const box of boxes) box.trouble(words);
-    }
-  }, () => periodS(trends));
+    const lines = [stiffnessLines(which.value()), amplitudeLines(order.value())];
+    const endMs = Math.ceil(view.serviceTimeMs / WHOLE_MS) * WHOLE_MS;
+    const range = [endMs - span.value() * 1000, endMs];
+    const names = lines[0].map(([name]) => name);
+    const key = [...names, ...range].join();
+    if (beside?.key !== key) beside = { key, answer: askBeside([path[1], path[3]], names, range) }; // once a minute
+    const [newest, marked] = await Promise.all([askTrends(path, lines.flat(), range, signal), beside.answer]);
+    trends = newest;
+    const asked = { trends, beside: marked, view, span, scale: scale.value(), latest };
+    await showTrends(stiffness, asked, lines[0], "Film stiffness, GN/m");
+    await showTrends(amplitude, asked, lines[1], `Vibration amplitude, ${amplitudeUnit()}`);
+  }, () => periodS(trends), (failure) => {
+    beside = null;
+    for (const box of boxes) box.trouble(failure.message);
+  });
 
   return {
     nodes: [element("div", { class: "choices" }, span.node, scale.node, more, hint()), ...boxes.map((box) => box.node)],

@@ -41,14 +41,9 @@ export function budgetPanel(path) {
     rows.replaceChildren(...budget.lines.map((line) => budgetRow(budget.quantity, line)));
   }
 
-  async function refresh(quantity, signal) {
-    try {
-      show(await ask([...path, "budgets", quantity], [], signal));
-    } catch (failure) {
-      if (signal.aborted) return;
-      show(null);
-      setText(sentence, `No budget now. ${failure.message}`);
-    }
+  function fail(failure) {
+    show(null);
+    setText(sentence, `No budget now. ${failure.message}`);
   }
 
   function toggle(quantity, label, opener) {
@@ -61,7 +56,8 @@ export function budgetPanel(path) {
     node.hidden = false;
     node.dataset.quantity = quantity;
     opener.setAttribute("aria-expanded", "true");
-    open = { opener, questions: poll((signal) => refresh(quantity, signal), () => PERIOD_S) };
+    const refresh = async (signal) => show(await ask([...path, "budgets", quantity], [], signal));
+    open = { opener, questions: poll(refresh, () => PERIOD_S, fail) };
   }
 
   closing.addEventListener("click", () => {
