@@ -8,6 +8,7 @@ import { element } from "../dom.js";
 import { formatTime } from "../format.js";
 import { stateWords } from "../film_words.js";
 import { byAxis } from "../quantity_groups.js";
+import { isOverTime } from "./explorer_state.js";
 
 /** A double click also makes the chart reset itself, which is not a zoom of the user. */
 const AFTER_DOUBLE_MS = 500;
@@ -81,30 +82,21 @@ async function showAxis(box, { parts }, found, state, refreshS) {
     return;
   }
   const units = parts.map(({ unit }) => unit);
-  const isOverTime = state.form === "" || state.form === "two";
-  const beside = isOverTime ? besideTraces(full, found) : [];
-  const view = { against: state.form, colour: state.colour };
-  const layout = isOverTime ? compareLayout(full, units, state.colour, beside) : againstLayout(full, units[0], view);
-  const traces = isOverTime ? [...compareTraces(full, state.colour), ...beside] : againstTraces(full, view);
-  const nBeyond = full.reduce((sum, { pieces, scale }) => sum + nOutside(pieces, layout[scale.replace("y", "yaxis")].range), 0);
+  const isTime = isOverTime(state);
+  const beside = isTime ? besideTraces(full, found) : [];
+  const layout = isTime ? compareLayout(full, units, beside) : againstLayout(full, units[0], state.form);
+  const traces = isTime ? [...compareTraces(full), ...beside] : againstTraces(full, state.form);
+  const pieces = full.map((line) => line.pieces);
+  const nBeyond = full.reduce((sum, line) => sum + nOutside(line.pieces, layout[line.scale.replace("y", "yaxis")].range), 0);
   const sentences = [
-    isOverTime ? trendCaption(full.map(({ pieces }) => (state.colour ? withoutRandom(pieces) : pieces)), nBeyond) : `${spanCaption(full.map(({ pieces }) => pieces))} Points: means.`,
+    isTime ? trendCaption(pieces, nBeyond) : `${spanCaption(pieces)} Points: means.`,
     simulatedSentence(full[0].trends).trim(),
     besideWords(beside, found.find((one) => one.beside.film)?.beside.film),
-    COLOURED[state.colour] ?? "",
     empty.length ? `No value in this time: ${empty.map(({ label }) => label).join("; ")}.` : "",
     pairs.length > shown.length ? `Only the first ${MOST_LINES} of ${pairs.length} lines are drawn; choose fewer quantities or bearings.` : "",
   ];
   await box.show(traces, layout, sentences.filter(Boolean).join(" "));
 }
-
-const COLOURED = {
-  oil_temperature_c: "Colour: oil temperature, where it is known; shapes tell the lines apart.",
-  eccentricity_ratio: "Colour: eccentricity, where it is known; shapes tell the lines apart.",
-};
-
-/** Coloured points go without the lines of their uncertainty. */
-const withoutRandom = (pieces) => pieces.map((piece) => piece.map((bucket) => ({ ...bucket, random: null })));
 
 const hasData = ({ pieces }) => pieces.length > 0;
 
