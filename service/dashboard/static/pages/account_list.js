@@ -5,7 +5,7 @@ import { ask, tell } from "../api.js";
 import { element, setAttribute, setText } from "../dom.js";
 import { formatTime } from "../format.js";
 import { listing, listingCell, listingName, rowBelow } from "../parts/listing.js";
-import { question } from "../parts/question.js";
+import { labelled, question } from "../parts/question.js";
 import { session } from "../session.js";
 
 const HEADS = ["Name", "Role", "Added", "Password set", ""];
@@ -70,5 +70,3 @@ export function roleChoice(chosen) {
   choice.value = chosen;
   return choice;
 }
-
-export const labelled = (words, field) => element("label", {}, words, field);

@@ -6,8 +6,8 @@ import { element, setText } from "../dom.js";
 import { formatTime } from "../format.js";
 import { listing, listingCell, listingName, rowBelow } from "../parts/listing.js";
 import { mark } from "../parts/mark.js";
-import { question } from "../parts/question.js";
-import { labelled, opener, roleChoice } from "./account_list.js";
+import { labelled, question } from "../parts/question.js";
+import { opener, roleChoice } from "./account_list.js";
 import { newKey } from "./new_key.js";
 
 const HEADS = ["For", "Id", "Role", "Units", "State", "Ends", "Last used", ""];

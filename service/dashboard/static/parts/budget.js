@@ -4,6 +4,7 @@ import { ask } from "../api.js";
 import { element, setText } from "../dom.js";
 import { formatInterval, formatQuantity, formatSignificant, formatTime, kindOf } from "../format.js";
 import { poll } from "../poll.js";
+import { listingCell, listingName, tableOf } from "./listing.js";
 
 const PERIOD_S = 5;
 const MORE_DECIMALS = 2;
@@ -20,8 +21,7 @@ export function budgetPanel(path) {
   const title = element("h3");
   const closing = element("button", { type: "button", class: "closing" }, "Close");
   const sentence = element("p", { class: "sentence", role: "status" });
-  const rows = element("tbody", { role: "rowgroup" });
-  const table = budgetTable(rows);
+  const table = tableOf("Uncertainty budget", HEADS);
   const help = element("p", { class: "help" }, READING_HELP);
   const head = element("div", { class: "panel-head" }, title, closing);
   const node = element("section", { class: "budget", id, hidden: "" }, head, sentence, table, help);
@@ -38,7 +38,7 @@ export function budgetPanel(path) {
     table.hidden = help.hidden = budget === null;
     if (budget === null) return;
     setText(sentence, budgetSentence(budget));
-    rows.replaceChildren(...budget.lines.map((line) => budgetRow(budget.quantity, line)));
+    table.tBodies[0].replaceChildren(...budget.lines.map((line) => budgetRow(budget.quantity, line)));
   }
 
   function fail(failure) {
@@ -68,20 +68,10 @@ export function budgetPanel(path) {
   return { node, id, toggle, close };
 }
 
-function budgetTable(rows) {
-  const heads = HEADS.map((head) => element("th", { scope: "col", role: "columnheader" }, head));
-  const headRow = element("tr", { role: "row" }, ...heads);
-  return element("table", { role: "table" }, element("thead", { role: "rowgroup" }, headRow), rows);
-}
-
 function budgetRow(quantity, line) {
-  const cells = [line.kind, line.distribution, widthWords(quantity, line), contributionWords(quantity, line)];
-  return element(
-    "tr",
-    { role: "row", "data-kind": line.kind },
-    element("th", { scope: "row", role: "rowheader" }, line.name),
-    ...cells.map((words, index) => element("td", { role: "cell", "data-head": HEADS[index + 1] }, words)),
-  );
+  const contents = [line.kind, line.distribution, widthWords(quantity, line), withUnit(quantity, line.contribution)];
+  const cells = contents.map((words, index) => listingCell(HEADS[index + 1], words));
+  return element("tr", { role: "row", "data-kind": line.kind }, listingName(line.name), ...cells);
 }
 
 const united = (quantity, digits) => `${digits} ${kindOf(quantity).unit}`.trimEnd();
@@ -91,8 +81,6 @@ const withUnit = (quantity, value) => united(quantity, formatQuantity(quantity, 
 function widthWords(quantity, { kind, width }) {
   return kind === "random" ? withUnit(quantity, width) : formatSignificant(width);
 }
-
-const contributionWords = (quantity, { contribution }) => withUnit(quantity, contribution);
 
 function budgetSentence({ quantity, value, uncertainty, time }) {
   const interval = united(quantity, formatInterval(quantity, uncertainty));

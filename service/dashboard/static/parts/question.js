@@ -2,6 +2,9 @@
 
 import { element, setText } from "../dom.js";
 
+/** A field of a form with its words. */
+export const labelled = (words, field) => element("label", {}, words, field);
+
 /**
  * Returns `{ node, open(opener) }`; `fields` stand before the button that carries `act` out.
  *
