@@ -1,5 +1,10 @@
 /** Asking again and again: one question at a time, at once after the tab becomes visible. */
 
+const [SHORTEST_S, LONGEST_S] = [5, 60];
+
+/** Period of a question about results gathered over some seconds each: a year does not change within five seconds. */
+export const periodFor = (bucketS) => Math.min(Math.max(bucketS, SHORTEST_S), LONGEST_S);
+
 /**
  * Run `task(signal)` now and then `periodS()` seconds after it finished, until stopped.
  *

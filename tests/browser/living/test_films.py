@@ -99,7 +99,8 @@ UNWELL = {"verdict": "danger", "level": "danger", "change_percent": -12.4}
 UNWELL |= {"deviation_percent": -29.8, "stiffness_n_per_m": 0.231e9, "expected_n_per_m": 0.33e9}
 ALARM = {"unit": "U2", "subject": "LJB", "level": "danger", "is_active": True, "value": -12.4}
 ALARM |= {"raised": "2026-01-01T22:10:00Z", "condition_reason": "film_changed", "state": "normal"}
-TWO_ALARMS = {"alarms": [ALARM | {"kind": f"stiffness_{axis}"} for axis in "xy"], "unjudged": []}
+ALARM |= {"kind": "film_stiffness", "directions": "xy"}
+ALARMS = {"alarms": [ALARM], "unjudged": []}
 MAX_WORDS = 150
 COUNT_WORDS = "document.querySelector('#main').innerText.split(/\\s+/).filter(Boolean).length"
 LOOKS = "marks => marks.map((mark) => mark.dataset.look)"
@@ -114,7 +115,7 @@ async def test_the_first_screen_says_which_bearing_is_unwell_by_how_much_since_w
         film = other["bearings"][1]["film"]
         film |= {"x": film["x"] | UNWELL, "y": film["y"] | UNWELL}
         overview["units"].append(other)
-        await shown.route("**/api/v1/alarms", lambda route: route.fulfill(json=TWO_ALARMS))
+        await shown.route("**/api/v1/alarms", lambda route: route.fulfill(json=ALARMS))
         await shown.goto(plant.url)
         row = shown.locator("[data-unit=U2] [data-bearing=LJB]")
         verdict = row.locator(".film-brief")

@@ -2,7 +2,7 @@
 
 import { ask } from "../api.js";
 import { chainWords } from "../audit_words.js";
-import { element, setText } from "../dom.js";
+import { button, element, setText } from "../dom.js";
 import { listing } from "../parts/listing.js";
 import { mark } from "../parts/mark.js";
 import { auditFilter } from "./audit_filter.js";
@@ -15,7 +15,7 @@ export function auditPage(main) {
   const chain = mark();
   const sentence = element("p", { class: "sentence", role: "status" });
   const table = listing("Audit trail, the newest first", AUDIT_HEADS, "No entry fits.", ({ chain, number }) => `${chain} ${number}`, auditRow);
-  const older = element("button", { type: "button", hidden: "" }, "Older entries");
+  const older = button("Older entries", () => look(nextBefore), { hidden: "" });
   const filter = auditFilter(() => look());
   const head = element("div", { class: "page-head" }, element("h1", {}, "Audit trail"), chain.node);
   main.append(head, filter.node, element("section", { class: "panel listing audit" }, sentence, table.node, older));
@@ -46,7 +46,6 @@ export function auditPage(main) {
     setText(sentence, "");
   }
 
-  older.addEventListener("click", () => look(nextBefore));
   chain.draw("absent", "Not read yet");
   look();
   return { draw() {}, close: () => question.abort() };

@@ -1,6 +1,6 @@
 /** Versions of a bearing's baseline: where each comes from, where it stands, and what may be done. */
 
-import { element, setAttribute, setText } from "../dom.js";
+import { button, element, setAttribute, setText } from "../dom.js";
 import { learningSentence } from "../film_words.js";
 import { formatTime } from "../format.js";
 import { listing, listingCell } from "../parts/listing.js";
@@ -74,10 +74,4 @@ function stepRow(step) {
   const contents = [formatTime(Date.parse(step.time)), step.step + event, step.version === null ? "" : String(step.version), step.actor, step.reason];
   const cells = contents.map((content, index) => listingCell(STEP_HEADS[index], content));
   return { nodes: [element("tr", { role: "row", "data-step": step.step }, ...cells)], draw() {} };
-}
-
-function button(words, onClick) {
-  const node = element("button", { type: "button" }, words);
-  node.addEventListener("click", onClick);
-  return node;
 }

@@ -6,7 +6,7 @@ import { element, setText } from "../dom.js";
 import { stateWords } from "../film_words.js";
 import { choice } from "../parts/choice.js";
 import { picker } from "../parts/picker.js";
-import { poll } from "../poll.js";
+import { periodFor, poll } from "../poll.js";
 import { grouped } from "../quantity_groups.js";
 import { explorerCharts } from "./explorer_charts.js";
 import { explorerFiles } from "./explorer_files.js";
@@ -15,8 +15,6 @@ import { FORMS, MOST_BEARINGS, MOST_QUANTITIES, STATES, addressOf, isOverTime, r
 import { timeBar } from "./explorer_time.js";
 
 const MAX_POINTS = 800;
-const SHORTEST_PERIOD_S = 5;
-const LONGEST_PERIOD_S = 60;
 const LEAST_ZOOM = 0.002;
 
 /** Returns `{ draw(view), close() }`. */
@@ -80,7 +78,7 @@ export function explorerPage(main) {
     if (view?.serviceTimeMs == null) return;
     catalogue ??= await offered(signal);
     await showTrends(signal);
-  }, () => (state.spanS === null ? LONGEST_PERIOD_S : Math.min(Math.max(bucketS, SHORTEST_PERIOD_S), LONGEST_PERIOD_S)), charts.trouble);
+  }, () => periodFor(state.spanS === null ? Infinity : bucketS), charts.trouble);
 
   async function offered(signal) {
     const found = await ask(["quantities"], [], signal);

@@ -10,12 +10,10 @@ import { element, setAttribute } from "../dom.js";
 import { formatTime } from "../format.js";
 import { choice } from "../parts/choice.js";
 import { readingOf } from "../parts/reading.js";
-import { poll } from "../poll.js";
+import { periodFor, poll } from "../poll.js";
 import { reasonWords } from "../words.js";
 import { addressOf } from "./explorer_state.js";
 
-const SHORTEST_PERIOD_S = 5;
-const LONGEST_PERIOD_S = 60;
 const MAX_POINTS = 500;
 
 /** The end of the span is a whole minute, so that the same question is asked again until then. */
@@ -89,7 +87,7 @@ export function trendPanels(path) {
     const asked = { trends, beside: marked, view, span, scale: scale.value(), latest };
     await showTrends(stiffness, asked, lines[0], "Film stiffness, GN/m");
     await showTrends(amplitude, asked, lines[1], `Vibration amplitude, ${amplitudeUnit()}`);
-  }, () => periodS(trends), (failure) => {
+  }, () => periodFor(trends?.bucket_s ?? 0), (failure) => {
     beside = null;
     for (const box of boxes) box.trouble(failure.message);
   });
@@ -108,11 +106,6 @@ export function trendPanels(path) {
 }
 
 const hint = () => element("span", { class: "hint" }, "Drag in a chart to zoom, double-click to go back.");
-
-/** A year of trends does not change within five seconds. */
-function periodS(trends) {
-  return Math.min(Math.max(trends?.bucket_s ?? 0, SHORTEST_PERIOD_S), LONGEST_PERIOD_S);
-}
 
 function askTrends(path, lines, [startMs, endMs], signal) {
   const query = [...lines.map(([name]) => name), ...CENTRE].map((name) => ["quantity", name]);

@@ -1,7 +1,7 @@
 /** Uncertainty budget of one result, requested only while it is open. */
 
 import { ask } from "../api.js";
-import { element, setText } from "../dom.js";
+import { button, element, setText } from "../dom.js";
 import { formatInterval, formatQuantity, formatSignificant, formatTime, kindOf } from "../format.js";
 import { poll } from "../poll.js";
 import { listingCell, listingName, tableOf } from "./listing.js";
@@ -19,7 +19,7 @@ let nPanels = 0;
 export function budgetPanel(path) {
   const id = `budget-${(nPanels += 1)}`;
   const title = element("h3");
-  const closing = element("button", { type: "button", class: "closing" }, "Close");
+  const closing = button("Close", leave, { class: "closing" });
   const sentence = element("p", { class: "sentence", role: "status" });
   const table = tableOf("Uncertainty budget", HEADS);
   const help = element("p", { class: "help" }, READING_HELP);
@@ -60,11 +60,11 @@ export function budgetPanel(path) {
     open = { opener, questions: poll(refresh, () => PERIOD_S, fail) };
   }
 
-  closing.addEventListener("click", () => {
+  function leave() {
     const opener = open?.opener;
     close();
     opener?.focus();
-  });
+  }
   return { node, id, toggle, close };
 }
 
