@@ -2,7 +2,7 @@
 
 import { formatTime, kindOf } from "../format.js";
 import { expectedTraces, markTraces, namedOnce } from "./beside.js";
-import { SERIES, axis } from "./style.js";
+import { SERIES, axis, points } from "./style.js";
 import { doubtTrace, piecesOf, trendLayout, trendTraces, valueRange } from "./trend.js";
 
 const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot", "12px 3px", "3px 6px"];
@@ -39,18 +39,14 @@ export function besideTraces(lines, found) {
 export function againstTraces(lines, against) {
   return lines.map(({ trends, pieces, name, label, number, refreshS }) => {
     const conditions = new Map(piecesOf(trends, against, refreshS).flat().map(({ timeS, mean }) => [timeS, mean]));
-    const points = pieces.flat().filter(({ timeS }) => conditions.has(timeS));
+    const known = pieces.flat().filter(({ timeS }) => conditions.has(timeS));
     const { decimals, unit } = kindOf(name);
-    return {
-      x: points.map(({ timeS }) => conditions.get(timeS)),
-      y: points.map(({ mean }) => mean),
-      type: "scatter",
-      mode: "markers",
+    return points(known.map(({ timeS }) => conditions.get(timeS)), known.map(({ mean }) => mean), {
       name: label,
       marker: { symbol: SYMBOLS[number % SYMBOLS.length], size: 6, color: colourOf(number), opacity: 0.7 },
-      text: points.map(({ timeS }) => formatTime(timeS * 1000)),
+      text: known.map(({ timeS }) => formatTime(timeS * 1000)),
       hovertemplate: `${label}: %{y:.${decimals}f} ${unit} at %{x}, %{text}<extra></extra>`,
-    };
+    });
   });
 }
 

@@ -39,9 +39,7 @@ export function baselineTable(path, actor, again) {
       versions.draw(found.versions);
       steps.draw(found.steps);
     },
-    fail(words) {
-      setText(learning, `Baselines cannot be read: ${words}`);
-    },
+    fail: (words) => setText(learning, `Baselines cannot be read: ${words}`),
   };
 }
 

@@ -27,31 +27,36 @@ const NO_SPREAD = () => null;
 
 /** Returns `{ node, draw(unit, alarmsOf, historyOf) }`; `alarm` is the unit's mark of open alarms. */
 export function unitCard(unit, alarm) {
-  const running = element("span", { class: "running" });
-  const link = mark();
   const rows = unit.bearings.map((one) => bearingRow(unit.id, one));
-  const title = element("h2", { dir: "auto" }, element("a", { href: unitAddress(unit.id) }, unit.name));
   const heads = HEADS.map(([words, of]) => [words, " ", element("small", {}, of)]);
   const table = tableOf(`Bearings of ${unit.name}`, heads, ...rows.map((row) => row.node));
-  const head = element("div", { class: "unit-head" }, title, running, alarm.node, link.node);
-  const node = element("section", { class: "unit-card", "data-unit": unit.id }, head, table);
+  const head = unitTitle(unit, alarm, "unit-head");
+  const node = element("section", { class: "unit-card", "data-unit": unit.id }, head.node, table);
   return {
     node,
     draw(now, alarmsOf, historyOf) {
-      setText(running, runningWords(now));
-      drawLink(link, now.source);
-      alarm.draw();
+      head.draw(now);
       setAttribute(node, "data-worst", alarm.node.dataset.look ?? null);
       rows.forEach((row, n) => row.draw(now.bearings[n], now.films[n], alarmsOf(now.bearings[n].bearing), historyOf(now.bearings[n].bearing)));
     },
   };
 }
 
-/** The link to the data source, while something is wrong with it. */
-export function drawLink(link, source) {
-  const { level, words } = sourceState(source.state);
-  link.node.hidden = level === "good";
-  link.draw(level, source.reason ? `${words}: ${source.reason}` : words);
+/** Name of a unit, how it runs, its open alarms, and its data source while something is wrong with it. */
+export function unitTitle({ id, name }, alarm, style) {
+  const running = element("span", { class: "running" });
+  const link = mark();
+  const title = element("h2", { dir: "auto" }, element("a", { href: unitAddress(id) }, name));
+  return {
+    node: element("div", { class: style }, title, running, alarm.node, link.node),
+    draw(now) {
+      const { level, words } = sourceState(now.source.state);
+      setText(running, runningWords(now));
+      link.node.hidden = level === "good";
+      link.draw(level, now.source.reason ? `${words}: ${now.source.reason}` : words);
+      alarm.draw();
+    },
+  };
 }
 
 function bearingRow(unit, { bearing, name }) {
