@@ -18,7 +18,8 @@ const LINE_WORDS = { order1: "1×", vortex: "vortex" };
 const present = (spectrum) => CHANNELS.filter(([id]) => spectrum.channels[id]?.amplitude);
 
 export function spectrumTraces(spectrum) {
-  return present(spectrum).map(([id, name, colour, dash, yaxis]) => curve(spectrum.frequency_hz, spectrum.channels[id].amplitude.map(shownAmplitude), {
+  const { frequency_hz: hz, channels } = spectrum;
+  return present(spectrum).map(([id, name, colour, dash, yaxis]) => curve(hz, channels[id].amplitude.map(shownAmplitude), {
     name: name.replace(/.* /, ""),
     legendgroup: name.replace(/.* /, ""),
     showlegend: yaxis === "y" || !present(spectrum).some(([other]) => other === id.replace("bearing", "shaft")),

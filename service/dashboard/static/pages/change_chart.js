@@ -21,8 +21,9 @@ export function changeChart(path) {
   const box = panel("Change of film stiffness against the baseline", "change", span.node);
   const questions = poll(async (signal) => {
     if (film === null) return;
-    if (film.is_watched) await show(box, film.limits, await askReadings(path, serviceTimeMs(), span.value(), MAX_POINTS, signal), span.words());
-    else box.explain(`This film is not watched: ${film.why_not}.`);
+    if (!film.is_watched) return box.explain(`This film is not watched: ${film.why_not}.`);
+    const readings = await askReadings(path, serviceTimeMs(), span.value(), MAX_POINTS, signal);
+    await show(box, film.limits, readings, span.words());
   }, () => PERIOD_S, (failure) => box.trouble(failure.message));
   return {
     node: box.node,

@@ -5,6 +5,7 @@ import { formatFixed } from "../format.js";
 
 const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 4, 8];
 const STEP_TURNS = 1 / 36;
+const STEPS = [["◂◂ Turn", -1], ["◂ Step", -STEP_TURNS], ["Step ▸", STEP_TURNS], ["Turn ▸▸", 1]];
 
 /** Elements that have their own use for the space bar, and for the arrows. */
 const OWN_SPACE = "button, a, select, textarea, input:not([type=range], [type=radio])";
@@ -16,7 +17,7 @@ export function orbitControls(acts) {
   const scrub = element("input", { type: "range", id: "orbit-at", step: "any", "aria-label": "Moment" });
   const speed = element("input", { type: "range", id: "orbit-speed", min: "0", max: String(SPEEDS.length - 1), step: "1" });
   const speedWords = element("output", { for: "orbit-speed" });
-  const steps = [["◂◂ Turn", -1], ["◂ Step", -STEP_TURNS], ["Step ▸", STEP_TURNS], ["Turn ▸▸", 1]].map(([words, turns]) => button(words, () => acts.step(turns)));
+  const steps = STEPS.map(([words, turns]) => button(words, () => acts.step(turns)));
   const hold = button("Hold as reference", () => acts.hold(), { "aria-pressed": "false" });
   const keys = element("p", { class: "hint" }, "Space: play or pause. ← and →: a step of 10°. With Shift: a turn.");
   scrub.addEventListener("input", () => acts.seek(Number(scrub.value)));

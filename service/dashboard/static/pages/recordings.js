@@ -36,11 +36,11 @@ function captureList() {
 
 /** Stretches of all samples; not there where none are kept. */
 function continuousList() {
-  const list = recordingList("Continuous recordings", "continuous", "continuous", "None yet.", ({ recordings, continuous: units, continuous_error: error }) => {
+  const list = recordingList("Continuous recordings", "continuous", "continuous", "None yet.", ({ recordings, continuous: units, ...found }) => {
     list.node.hidden = recordings.length === 0 && units.length === 0;
     return [
       units.length ? `All samples of ${units.join(", ")} are recorded.` : "No unit is recorded continuously now.",
-      error && `Not all samples are recorded just now: ${error}.`,
+      found.continuous_error && `Not all samples are recorded just now: ${found.continuous_error}.`,
     ];
   });
   list.node.hidden = true;

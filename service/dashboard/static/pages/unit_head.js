@@ -21,7 +21,8 @@ export function unitHead(unitId) {
     node: element("header", { class: "bearing-head" }, nav, title, element("div", { class: "state" }, state, origin), source.node),
     draw(unit, view) {
       const wanted = JSON.stringify(view.units.map((one) => [one.id, one.name]));
-      if (wanted !== drawn) nav.replaceChildren(linkTo("#/", "Overview"), ...view.units.map(({ id, name }) => linkTo(unitAddress(id), name, id === unitId)));
+      const links = view.units.map(({ id, name }) => linkTo(unitAddress(id), name, id === unitId));
+      if (wanted !== drawn) nav.replaceChildren(linkTo("#/", "Overview"), ...links);
       drawn = wanted;
       setText(title, unit.name);
       setText(state, runningWords(unit) || "Operating state not known");
