@@ -8,8 +8,12 @@ const TIMEOUT_MS = 8000;
 /** An action may be carried out even if its answer is late, so that it is given up on later than a question. */
 const ACTION_TIMEOUT_MS = 30_000;
 
-/** The service does not answer at all. */
-export class NotReachable extends Error {}
+/** The service does not answer at all; `why` is a sentence. */
+export class NotReachable extends Error {
+  constructor(why) {
+    super(`Service not reachable. ${why}`);
+  }
+}
 
 /** The service answered that it cannot give this; the message is a sentence for people. */
 export class Refused extends Error {

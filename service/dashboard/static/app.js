@@ -67,8 +67,8 @@ function draw() {
 }
 
 function failureWords(failure) {
-  const what = failure instanceof NotReachable ? "Service not reachable." : "Service answers with an error.";
-  return `${what} ${failure.message} Trying again every ${OVERVIEW_PERIOD_S} s.`;
+  const what = failure instanceof NotReachable ? "" : "Service answers with an error. ";
+  return `${what}${failure.message} Trying again every ${OVERVIEW_PERIOD_S} s.`;
 }
 
 function openPage() {

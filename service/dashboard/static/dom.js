@@ -7,7 +7,14 @@ export function element(tag, attributes = {}, ...children) {
   return fill(document.createElement(tag), attributes, children);
 }
 
-/** The same for a shape inside an SVG picture. */
+/** A button that calls `onClick`. */
+export function button(words, onClick, attributes = {}) {
+  const node = element("button", { type: "button", ...attributes }, words);
+  node.addEventListener("click", onClick);
+  return node;
+}
+
+/** Build a shape inside an SVG picture, as an element. */
 export function shape(tag, attributes = {}, ...children) {
   return fill(document.createElementNS(SVG, tag), attributes, children);
 }

@@ -62,20 +62,20 @@ export function formatCount(count) {
   return String(count).replace(/\B(?=(\d{3})+$)/g, " ");
 }
 
+const two = (number) => String(number).padStart(2, "0");
+
 /** A duration in the two units that matter: 4 s, 2 min 05 s, 3 h 07 min, 12 d 4 h. */
 export function formatAge(durationS) {
   const whole = Math.max(0, Math.floor(durationS));
-  const pad = (number) => String(number).padStart(2, "0");
   if (whole < 60) return `${whole} s`;
-  if (whole < 3600) return `${Math.floor(whole / 60)} min ${pad(whole % 60)} s`;
-  if (whole < 86400) return `${Math.floor(whole / 3600)} h ${pad(Math.floor((whole % 3600) / 60))} min`;
+  if (whole < 3600) return `${Math.floor(whole / 60)} min ${two(whole % 60)} s`;
+  if (whole < 86400) return `${Math.floor(whole / 3600)} h ${two(Math.floor((whole % 3600) / 60))} min`;
   return `${Math.floor(whole / 86400)} d ${Math.floor((whole % 86400) / 3600)} h`;
 }
 
 /** Local date and time of the browser, `2026-07-01 03:12:45`; plotly reads it the same way. */
 export function formatTime(timeMs) {
   const date = new Date(timeMs);
-  const two = (number) => String(number).padStart(2, "0");
   const day = `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())}`;
   return `${day} ${two(date.getHours())}:${two(date.getMinutes())}:${two(date.getSeconds())}`;
 }
@@ -84,7 +84,6 @@ export function formatTime(timeMs) {
 export function formatZone(timeMs) {
   const minutes = -new Date(timeMs).getTimezoneOffset();
   if (minutes === 0) return "UTC";
-  const two = (number) => String(number).padStart(2, "0");
   const size = Math.abs(minutes);
   return `UTC${minutes < 0 ? "−" : "+"}${two(Math.floor(size / 60))}:${two(size % 60)}`;
 }

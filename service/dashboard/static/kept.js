@@ -6,18 +6,19 @@ export function kept(key, allowed) {
   return allowed.includes(found) ? found : allowed[0];
 }
 
-/** Remember a word. */
-export function keep(key, word) {
+/** Remember a word, for ever or, in `sessionStorage`, until the page is left. */
+export function keep(key, word, storage = "localStorage") {
   try {
-    localStorage.setItem(key, word);
+    window[storage].setItem(key, word);
   } catch {
     // it is asked for again next time
   }
 }
 
-function read(key) {
+/** The remembered word; null without one. */
+export function read(key, storage = "localStorage") {
   try {
-    return localStorage.getItem(key);
+    return window[storage].getItem(key);
   } catch {
     return null;
   }

@@ -1,12 +1,17 @@
 /** Asking again and again: one question at a time, at once after the tab becomes visible. */
 
+const [SHORTEST_S, LONGEST_S] = [5, 60];
+
+/** Period of a question about results gathered over some seconds each: a year does not change within five seconds. */
+export const periodFor = (bucketS) => Math.min(Math.max(bucketS, SHORTEST_S), LONGEST_S);
+
 /**
  * Run `task(signal)` now and then `periodS()` seconds after it finished, until stopped.
  *
- * The task deals with its own failures; what it throws beyond that is a bug and reaches the console.
+ * `fail(failure)` receives what the task throws, unless its question was dropped.
  * Returns `{ again, stop }`: `again` drops a question under way and asks afresh at once.
  */
-export function poll(task, periodS) {
+export function poll(task, periodS, fail = console.error) {
   let question = new AbortController();
   let timer = null;
 
@@ -17,9 +22,10 @@ export function poll(task, periodS) {
     try {
       await task(mine.signal);
     } catch (failure) {
-      if (!mine.signal.aborted) console.error(failure);
+      if (!mine.signal.aborted) fail(failure);
+    } finally {
+      if (!mine.signal.aborted) timer = setTimeout(ask, periodS() * 1000);
     }
-    if (!mine.signal.aborted) timer = setTimeout(ask, periodS() * 1000);
   }
 
   const onVisible = () => document.visibilityState === "visible" && ask();

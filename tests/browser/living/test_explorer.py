@@ -1,4 +1,4 @@
-"""The trend explorer: comparing, zooming, colouring, and what it says where there is nothing."""
+"""The trend explorer: comparing, zooming, and what it says where there is nothing."""
 
 import csv
 import re
@@ -47,7 +47,7 @@ async def test_two_bearings_are_compared_and_the_address_says_so(plant, page, co
     assert complaints == []
 
 
-async def test_quantities_are_found_by_words_coloured_and_taken_away(plant, page) -> None:
+async def test_quantities_are_found_by_words_and_taken_away(plant, page) -> None:
     await page.goto(plant.url + COMPARED + "&last=2592000")
     await await_curve(page)
 
@@ -61,17 +61,6 @@ async def test_quantities_are_found_by_words_coloured_and_taken_away(plant, page
     heading = page.locator("[data-chart=trend-operation-c] h2")
     await expect(heading).to_have_text("U1 UJB, U1 LJB: Oil temperature, °C")
     assert "q=oil_temperature_c" in await page.evaluate("location.hash")
-
-    colour = page.get_by_role("group", name="Colour")
-    await colour.get_by_role("radio", name="Oil temperature").check()
-
-    await expect(page.locator(f"{STIFFNESS} .cbtitle")).to_contain_text("oil")
-    fills = await page.locator(f"{STIFFNESS} .points path.point").evaluate_all(
-        "points => new Set(points.map((point) => getComputedStyle(point).fill)).size"
-    )
-    assert fills > 5
-    await expect(page.locator(f"{STIFFNESS} figcaption")).to_contain_text("Colour: oil temp")
-    assert "colour=oil_temperature_c" in await page.evaluate("location.hash")
 
     async with page.expect_download() as started:
         await page.get_by_role("link", name="U1 LJB as CSV").click()
@@ -176,17 +165,12 @@ async def test_a_time_without_results_says_so(plant, page) -> None:
 async def test_an_address_restores_what_was_shown_and_is_complained_of_in_words(
     plant, page
 ) -> None:
-    address = (
-        "#/trends?b=U1/TJB&q=speed_rpm&q=power_mw&last=604800&state=full_load"
-        "&colour=eccentricity_ratio"
-    )
+    address = "#/trends?b=U1/TJB&q=speed_rpm&q=power_mw&last=604800&state=full_load"
     await page.goto(plant.url + address)
 
     await expect(page.locator("[data-chart=trend-operation-r-min]")).to_be_visible()
     await expect(page.locator("[data-chart=trend-operation-mw]")).to_be_visible()
     await expect(page.get_by_role("radio", name="Week")).to_be_checked()
-    colour = page.get_by_role("group", name="Colour")
-    await expect(colour.get_by_role("radio", name="Eccentricity")).to_be_checked()
     await expect(page.get_by_label("While at")).to_have_value("full_load")
     await expect(page.locator("summary").first).to_have_text("Bearings: 1")
 

@@ -203,7 +203,7 @@ async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(
     oils = [bearing["readings"]["oil_temperature_c"]["value"] for bearing in bearings]
     await expect(oil).to_have_text([f"{value:.1f}" for value in oils])
     heads = await table.get_by_role("columnheader").all_inner_texts()
-    assert heads == ["UJB upper guide", "LJB lower guide", "TJB turbine guide"]
+    assert heads == ["Quantity", "UJB upper guide", "LJB lower guide", "TJB turbine guide"]
     await expect(page.locator(".operating-state")).to_contain_text("oad")
     await expect(table.locator(".centre-picture").first).to_be_visible()
     await expect(table.locator(".film-brief .mark").first).to_be_visible()

@@ -1,7 +1,7 @@
 /** The baseline as a map: eccentricity × oil temperature, colour = stiffness, support visible. */
 
 import { formatFixed } from "../format.js";
-import { FAINT, INK, PLOT, axis, baseLayout } from "./style.js";
+import { FAINT, INK, PLOT, axis, baseLayout, points } from "./style.js";
 
 const SCALE = "Cividis"; // even to the eye, also without red or green
 const GN = 1e9;
@@ -81,16 +81,8 @@ function surface(cells, [x, y], widths, name, opacity) {
 }
 
 function marks(cells, name, marker) {
-  return {
-    type: "scatter",
-    mode: "markers",
-    name,
-    x: cells.map((cell) => middle(cell)[0]),
-    y: cells.map((cell) => middle(cell)[1]),
-    text: cells.map(words),
-    marker,
-    hovertemplate: "%{text}<extra></extra>",
-  };
+  const [x, y] = [0, 1].map((n) => cells.map((cell) => middle(cell)[n]));
+  return points(x, y, { name, text: cells.map(words), marker, hovertemplate: "%{text}<extra></extra>" });
 }
 
 /** Layout with the current cell outlined; `revision` keeps a zoom. */

@@ -3,7 +3,7 @@
 import { changeWords, kindWords } from "../alarm_words.js";
 import { ask } from "../api.js";
 import { formatTime } from "../format.js";
-import { DOUBT_COLOUR, FAINT, INK } from "./style.js";
+import { DOUBT_COLOUR, FAINT, INK, curve, points } from "./style.js";
 
 const MAX_EVENTS = "1000";
 const MAX_READINGS = "500";
@@ -52,19 +52,16 @@ export function markTraces({ events, notes }, place = "") {
 
 /** Symbols at the top of the chart, each with a line down to the time axis. */
 function marks(name, found, wordsOf, look) {
-  return {
-    x: found.map(({ time }) => formatTime(Date.parse(time))),
-    y: found.map(() => 0.97),
+  const x = found.map(({ time }) => formatTime(Date.parse(time)));
+  return points(x, found.map(() => 0.97), {
     yaxis: "y2",
-    type: "scatter",
-    mode: "markers",
     name,
     meta: "mark",
     marker: { ...look, size: 10 },
     error_y: { type: "data", symmetric: false, array: found.map(() => 0), arrayminus: found.map(() => 0.97), width: 0, thickness: 1, color: look.color },
     text: found.map(wordsOf),
     hovertemplate: "%{text}<extra></extra>",
-  };
+  });
 }
 
 /** Traces of the stiffness that the baseline expects, and of the limits of its change; none for another quantity. */
@@ -88,18 +85,10 @@ function expectedGn({ stiffness_n_per_m: stiffness, deviation_percent: deviation
 const scaled = (expected, ln) => expected.map(([timeS, gn]) => [timeS, gn === null ? null : gn * Math.exp(ln)]);
 
 function levelTrace(name, curves, line) {
-  const points = curves.flatMap((curve) => [...curve, [null, null]]);
-  return {
-    x: points.map(([timeS]) => (timeS === null ? null : formatTime(timeS * 1000))),
-    y: points.map(([, gn]) => gn),
-    type: "scatter",
-    mode: "lines",
-    name,
-    meta: "level",
-    line: { width: 1, ...line },
-    connectgaps: false,
-    hoverinfo: "skip",
-  };
+  const column = curves.flatMap((one) => [...one, [null, null]]);
+  const x = column.map(([timeS]) => (timeS === null ? null : formatTime(timeS * 1000)));
+  const looks = { name, meta: "level", line: { width: 1, ...line }, connectgaps: false, hoverinfo: "skip" };
+  return curve(x, column.map(([, gn]) => gn), looks);
 }
 
 /** The same traces, with each name once in the legend. */

@@ -1,7 +1,7 @@
 /** Plane charts with equal axes: the orbit, and the shaft centre in its clearance circle. */
 
 import { formatFixed, formatTime } from "../format.js";
-import { FAINT, INK, X_BAND, X_COLOUR, axis, baseLayout } from "./style.js";
+import { FAINT, INK, X_BAND, X_COLOUR, axis, baseLayout, curve, points } from "./style.js";
 
 const MARGIN = 1.12;
 
@@ -20,15 +20,8 @@ const HOVER = "x %{x:.2f} µm, y %{y:.2f} µm<extra></extra>";
 
 /** The path of the shaft in the bearing, its newest point marked. */
 export function orbitTraces(orbit) {
-  const path = {
-    x: orbit.shaft_x_um,
-    y: orbit.shaft_y_um,
-    type: "scatter",
-    mode: "lines",
-    name: "path",
-    line: { color: X_COLOUR, width: 1.2 },
-    hovertemplate: HOVER,
-  };
+  const looks = { name: "path", line: { color: X_COLOUR, width: 1.2 }, hovertemplate: HOVER };
+  const path = curve(orbit.shaft_x_um, orbit.shaft_y_um, looks);
   return [path, point(orbit.shaft_x_um.at(-1), orbit.shaft_y_um.at(-1), "newest sample")];
 }
 
@@ -40,22 +33,18 @@ export function orbitLayout(orbit) {
 
 /** Trail of means from the trends, and the current point unless there is none. */
 export function centreTraces(trail, current) {
-  const way = {
-    x: trail.map((centre) => centre.x),
-    y: trail.map((centre) => centre.y),
-    type: "scatter",
+  const way = curve(trail.map(({ x }) => x), trail.map(({ y }) => y), {
     mode: "lines+markers",
     name: "trail",
     line: { color: FAINT, width: 1 },
     marker: { color: X_BAND, size: 4, line: { color: X_COLOUR, width: 0.5 } },
     hovertemplate: HOVER,
-  };
+  });
   return current ? [way, point(current.x, current.y, "now")] : [way];
 }
 
 export function centreLayout(clearanceUm, trail, current) {
-  const points = current ? [...trail, current] : trail;
-  const reach = points.reduce((far, { x, y }) => Math.max(far, Math.hypot(x, y)), clearanceUm);
+  const reach = (current ? [...trail, current] : trail).reduce((far, { x, y }) => Math.max(far, Math.hypot(x, y)), clearanceUm);
   const circle = {
     type: "circle",
     x0: -clearanceUm,
@@ -80,13 +69,6 @@ function referenceWords({ set, author, note }) {
 }
 
 function point(x, y, name) {
-  return {
-    x: [x],
-    y: [y],
-    type: "scatter",
-    mode: "markers",
-    name,
-    marker: { symbol: "cross-thin", size: 15, color: INK, line: { color: INK, width: 2.5 } },
-    hovertemplate: HOVER,
-  };
+  const marker = { symbol: "cross-thin", size: 15, color: INK, line: { color: INK, width: 2.5 } };
+  return points([x], [y], { name, marker, hovertemplate: HOVER });
 }

@@ -1,7 +1,7 @@
 /** Stiffness against the condition that it was read under: learned cells, history, today on top. */
 
 import { formatFixed, formatTime } from "../format.js";
-import { FAINT, INK, axis, baseLayout } from "./style.js";
+import { FAINT, INK, axis, baseLayout, points } from "./style.js";
 
 const GN = 1e9;
 const NORMAL_95 = 1.96;
@@ -37,27 +37,19 @@ export function conditionTraces({ cells, history, today }, against) {
 function withKey(trace) {
   if (!trace.marker.coloraxis) return [trace];
   const { symbol = "circle", size, line } = trace.marker;
-  const key = { x: [null], y: [null], type: "scatter", mode: "markers", name: trace.name, marker: { symbol, size, line, color: FAINT }, hoverinfo: "skip" };
+  const key = points([null], [null], { name: trace.name, marker: { symbol, size, line, color: FAINT }, hoverinfo: "skip" });
   return [{ ...trace, showlegend: false }, key];
 }
 
-function historyTrace(points, against) {
-  return {
-    ...placed(points, against),
-    name: "history",
-    marker: { size: 3.5, color: FAINT, opacity: 0.35 },
-    text: points.map(pointWords),
-  };
+function historyTrace(readings, against) {
+  return placed(readings, against, "history", { size: 3.5, color: FAINT, opacity: 0.35 });
 }
 
 function cellTrace(cells, against) {
   const learned = cells.filter((cell) => cell.support !== "none" && cell.n_readings > 0);
   const other = otherOf(against);
-  return {
-    x: learned.map((cell) => cell[against]),
-    y: learned.map((cell) => cell.stiffness_n_per_m / GN),
-    type: "scatter",
-    mode: "markers",
+  const x = learned.map((cell) => cell[against]);
+  return points(x, learned.map((cell) => cell.stiffness_n_per_m / GN), {
     name: "learned cells ± 95 %",
     error_y: {
       type: "data",
@@ -69,31 +61,18 @@ function cellTrace(cells, against) {
     marker: { symbol: "square", size: 7, color: learned.map((cell) => cell[other]), coloraxis: "coloraxis" },
     text: learned.map((cell) => `learned: ${formatFixed(cell.stiffness_n_per_m / GN, 3)} GN/m, ${conditionOf(cell)}<br>${cell.n_readings} readings on ${cell.n_days} days, ${cell.support}`),
     hovertemplate: "%{text}<extra></extra>",
-  };
+  });
 }
 
-function todayTrace(points, against) {
-  return {
-    ...placed(points, against),
-    name: "today",
-    marker: {
-      size: 9,
-      color: points.map((one) => one[otherOf(against)]),
-      coloraxis: "coloraxis",
-      line: { color: INK, width: 1.5 },
-    },
-    text: points.map(pointWords),
-  };
+function todayTrace(readings, against) {
+  const color = readings.map((one) => one[otherOf(against)]);
+  return placed(readings, against, "today", { size: 9, color, coloraxis: "coloraxis", line: { color: INK, width: 1.5 } });
 }
 
-function placed(points, against) {
-  return {
-    x: points.map((one) => one[against]),
-    y: points.map((one) => one.gn),
-    type: "scatter",
-    mode: "markers",
-    hovertemplate: "%{text}<extra></extra>",
-  };
+function placed(readings, against, name, marker) {
+  const x = readings.map((one) => one[against]);
+  const text = readings.map(pointWords);
+  return points(x, readings.map((one) => one.gn), { name, marker, text, hovertemplate: "%{text}<extra></extra>" });
 }
 
 const conditionOf = (one) => `eccentricity ${formatFixed(one.eccentricity_ratio, 3)}, oil ${formatFixed(one.oil_temperature_c, 1)} °C`;

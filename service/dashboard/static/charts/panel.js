@@ -1,5 +1,6 @@
 /** The frame of a chart: a chart with a caption, or a sentence why there is none. Never blank. */
 
+import { NotReachable } from "../api.js";
 import { element, setText } from "../dom.js";
 import { formatAge } from "../format.js";
 import { mark } from "../parts/mark.js";
@@ -7,7 +8,7 @@ import { onTheme } from "../theme.js";
 import { plotly } from "./plotly.js";
 import { CONFIG, coloured } from "./style.js";
 
-/** Returns `{ node, show(traces, layout, caption), explain(sentence), trouble(sentence), draw(ageS, currentWords) }`. */
+/** Returns `{ node, show(traces, layout, caption), explain(sentence), trouble(sentence), fail(failure), draw(ageS, currentWords) }`. */
 export function panel(title, name, ...controls) {
   const chart = element("div", { class: "chart", hidden: "" });
   const sentence = element("p", { class: "sentence" }, "Asking the service.");
@@ -38,6 +39,10 @@ export function panel(title, name, ...controls) {
   });
   return {
     node,
+    /** A question failed: the service does not answer, or refuses. */
+    fail(failure) {
+      this[failure instanceof NotReachable ? "trouble" : "explain"](failure.message);
+    },
     async show(traces, layout, words) {
       const library = await plotly();
       reveal(chart, sentence, foot, true);

@@ -3,7 +3,7 @@
 import { amplitudeFactor, amplitudeUnit, shownAmplitude } from "../amplitudes.js";
 import { formatFixed } from "../format.js";
 import { label, marker } from "./moment_spectrum.js";
-import { X_COLOUR, Y_COLOUR, axis, baseLayout } from "./style.js";
+import { X_COLOUR, Y_COLOUR, axis, baseLayout, curve } from "./style.js";
 import { SCALE_FROM_HZ } from "./waterfall_scale.js";
 
 const CHANNELS = [
@@ -18,11 +18,8 @@ const LINE_WORDS = { order1: "1×", vortex: "vortex" };
 const present = (spectrum) => CHANNELS.filter(([id]) => spectrum.channels[id]?.amplitude);
 
 export function spectrumTraces(spectrum) {
-  return present(spectrum).map(([id, name, colour, dash, yaxis]) => ({
-    x: spectrum.frequency_hz,
-    y: spectrum.channels[id].amplitude.map(shownAmplitude),
-    type: "scatter",
-    mode: "lines",
+  const { frequency_hz: hz, channels } = spectrum;
+  return present(spectrum).map(([id, name, colour, dash, yaxis]) => curve(hz, channels[id].amplitude.map(shownAmplitude), {
     name: name.replace(/.* /, ""),
     legendgroup: name.replace(/.* /, ""),
     showlegend: yaxis === "y" || !present(spectrum).some(([other]) => other === id.replace("bearing", "shaft")),

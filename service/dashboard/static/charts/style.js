@@ -60,6 +60,12 @@ export function axis(title, changes = {}) {
   };
 }
 
+/** A trace of a line; `looks` are other settings of the trace. */
+export const curve = (x, y, looks) => ({ type: "scatter", mode: "lines", x, y, ...looks });
+
+/** A trace of single points. */
+export const points = (x, y, looks) => ({ type: "scatter", mode: "markers", x, y, ...looks });
+
 export const CONFIG = {
   responsive: true,
   displaylogo: false,

@@ -1,7 +1,7 @@
 /** A quantity against time: the band between smallest and largest, the mean as a line. */
 
 import { formatTime, formatZone, kindOf } from "../format.js";
-import { DOUBT_COLOUR, X_BAND, X_COLOUR, Y_BAND, Y_COLOUR, axis, baseLayout } from "./style.js";
+import { DOUBT_COLOUR, X_BAND, X_COLOUR, Y_BAND, Y_COLOUR, axis, baseLayout, curve, points } from "./style.js";
 
 /** Half-width of the interval that holds 95 % of a normal distribution, over its standard deviation. */
 const NORMAL_95 = 1.96;
@@ -66,17 +66,14 @@ function randomTraces(pieces, look, label) {
     [null, null],
   ];
   return [
-    {
-      ...column([...known.flatMap(edge(1)), ...known.flatMap(edge(-1))]),
-      type: "scatter",
-      mode: "lines",
+    curve(...columns([...known.flatMap(edge(1)), ...known.flatMap(edge(-1))]), {
       line: { color: look.colour, width: 1, dash: "dot" },
       connectgaps: false,
       hoverinfo: "skip",
       legendgroup: label,
       showlegend: false,
       meta: "random",
-    },
+    }),
   ];
 }
 
@@ -86,26 +83,20 @@ function bandTrace(pieces, look, label) {
     ...piece.toReversed().map((bucket) => [at(bucket), bucket.minimum]),
     [null, null], // ends the closed shape, so that no band spans an interruption
   ];
-  const points = pieces.flatMap(outline);
-  return {
-    ...column(points),
-    type: "scatter",
-    mode: "lines",
+  return curve(...columns(pieces.flatMap(outline)), {
     fill: "toself",
     fillcolor: look.band,
     line: { width: 0 },
     hoverinfo: "skip",
     legendgroup: label,
     showlegend: false,
-  };
+  });
 }
 
 function meanTrace(pieces, look, name, label) {
   const kind = kindOf(name);
-  const points = pieces.flatMap((piece) => [...piece.map((bucket) => [at(bucket), bucket.mean]), [null, null]]);
-  return {
-    ...column(points),
-    type: "scatter",
+  const means = pieces.flatMap((piece) => [...piece.map((bucket) => [at(bucket), bucket.mean]), [null, null]]);
+  return curve(...columns(means), {
     mode: pieces.some((piece) => piece.length === 1) ? "lines+markers" : "lines",
     name: label,
     legendgroup: label,
@@ -113,29 +104,23 @@ function meanTrace(pieces, look, name, label) {
     marker: { color: look.colour, size: 4 },
     connectgaps: false,
     hovertemplate: `${label}: %{y:.${kind.decimals}f} ${kind.unit}<extra></extra>`,
-  };
+  });
 }
 
 /** Triangles along the foot of the chart wherever one of the series is to be doubted. */
 export function doubtTrace(allPieces) {
   const doubted = new Set(allPieces.flat(2).filter((bucket) => bucket.level !== "good").map(at));
   const times = [...doubted].sort();
-  return {
-    x: times,
-    y: times.map(() => 0.015),
+  return points(times, times.map(() => 0.015), {
     yaxis: "y2",
-    type: "scatter",
-    mode: "markers",
     name: "uncertain",
     marker: { symbol: "triangle-up", size: 8, color: DOUBT_COLOUR },
     hoverinfo: "skip",
     showlegend: times.length > 0,
-  };
+  });
 }
 
-function column(points) {
-  return { x: points.map((point) => point[0]), y: points.map((point) => point[1]) };
-}
+const columns = (pairs) => [0, 1].map((n) => pairs.map((pair) => pair[n]));
 
 /** A sentence on what of a trend was simulated, not measured on the machine; empty if nothing was. */
 export function simulatedSentence(trends) {

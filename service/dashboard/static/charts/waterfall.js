@@ -2,7 +2,7 @@
 
 import { amplitudeUnit, shownAmplitude } from "../amplitudes.js";
 import { colourOf } from "../theme.js";
-import { DOUBT_COLOUR, INK, MARK, PLOT, axis, baseLayout } from "./style.js";
+import { DOUBT_COLOUR, INK, MARK, PLOT, axis, baseLayout, points } from "./style.js";
 import { localMs, withHoles } from "./waterfall_rows.js";
 import { contrastOf, scaleOf } from "./waterfall_scale.js";
 
@@ -86,17 +86,13 @@ export function markTraces({ rows, axis: along }) {
 export function alarmTraces(alarms, toUpper) {
   if (alarms.length === 0) return [];
   return [
-    {
-      type: "scatter",
-      mode: "markers",
+    points(alarms.map(() => toUpper), alarms.map(({ timeS }) => localMs(timeS)), {
       name: "alarm raised",
-      x: alarms.map(() => toUpper),
-      y: alarms.map(({ timeS }) => localMs(timeS)),
       text: alarms.map(({ words }) => words),
       marker: { symbol: "triangle-left", size: 12, color: DOUBT_COLOUR, line: { color: INK, width: 1 } },
       cliponaxis: false,
       hovertemplate: "%{text}<br>%{y|%Y-%m-%d %H:%M:%S}<extra></extra>",
-    },
+    }),
   ];
 }
 

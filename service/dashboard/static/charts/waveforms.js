@@ -1,6 +1,6 @@
 /** Waveforms of every transducer of a bearing, one below the other, and of the key-phase. */
 
-import { NotReachable, ask } from "../api.js";
+import { ask } from "../api.js";
 import { formatTime } from "../format.js";
 import { poll } from "../poll.js";
 import { panel } from "./panel.js";
@@ -16,15 +16,11 @@ export function waveforms(unit, bearing, absence) {
   let channels = null;
   const questions = poll(async (signal) => {
     if (absence() !== null) return box.explain(absence());
-    try {
-      channels ??= await channelsOf(unit, bearing, signal);
-      const found = await ask(["units", unit, "waveform"], [["seconds", SECONDS], ...channels.map((id) => ["channel", id])], signal);
-      const names = Object.keys(found.channels);
-      await box.show(names.map((name, n) => traceOf(found, name, n)), layoutOf(found, names), `As sampled, from ${formatTime(Date.parse(found.time))} on.`);
-    } catch (failure) {
-      if (!signal.aborted) box[failure instanceof NotReachable ? "trouble" : "explain"](failure.message);
-    }
-  }, () => PERIOD_S);
+    channels ??= await channelsOf(unit, bearing, signal);
+    const found = await ask(["units", unit, "waveform"], [["seconds", SECONDS], ...channels.map((id) => ["channel", id])], signal);
+    const names = Object.keys(found.channels);
+    await box.show(names.map((name, n) => traceOf(found, name, n)), layoutOf(found, names), `As sampled, from ${formatTime(Date.parse(found.time))} on.`);
+  }, () => PERIOD_S, (failure) => box.fail(failure));
   return { node: box.node, again: questions.again, close: questions.stop };
 }
 

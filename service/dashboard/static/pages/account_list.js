@@ -2,10 +2,10 @@
 
 import { ROLES } from "../access_words.js";
 import { ask, tell } from "../api.js";
-import { element, setAttribute, setText } from "../dom.js";
+import { button, element, setText } from "../dom.js";
 import { formatTime } from "../format.js";
 import { listing, listingCell, listingName, rowBelow } from "../parts/listing.js";
-import { question } from "../parts/question.js";
+import { labelled, question } from "../parts/question.js";
 import { session } from "../session.js";
 
 const HEADS = ["Name", "Role", "Added", "Password set", ""];
@@ -20,9 +20,8 @@ export function accountList(again) {
   const role = roleChoice("viewer");
   const password = element("input", PASSWORD);
   const fields = [labelled("Name", name), labelled("Role", role), labelled(PASSWORD_HELP, password)];
-  const add = element("button", { type: "button" }, "Add account…");
+  const add = button("Add account…", () => form.open(add));
   const form = question("A new account", "Add", fields, () => tell(["accounts"], { name: name.value.trim(), role: role.value, password: password.value }), again);
-  add.addEventListener("click", () => form.open(add));
   const head = element("div", { class: "panel-head" }, element("h2", {}, "People"), add);
   return {
     node: element("section", { class: "panel listing accounts" }, head, form.node, table.node),
@@ -56,13 +55,11 @@ function accountRow({ name }, again) {
 
 /** A button that opens its question and shuts the others of its row. */
 export function opener(words, about, form, siblings) {
-  const button = element("button", { type: "button" }, words);
-  setAttribute(button, "aria-label", `${words.replace("…", "")} ${about}`);
-  button.addEventListener("click", () => {
+  const opening = button(words, () => {
     for (const one of siblings()) one.node.hidden = true;
-    form.open(button);
-  });
-  return button;
+    form.open(opening);
+  }, { "aria-label": `${words.replace("…", "")} ${about}` });
+  return opening;
 }
 
 export function roleChoice(chosen) {
@@ -70,5 +67,3 @@ export function roleChoice(chosen) {
   choice.value = chosen;
   return choice;
 }
-
-export const labelled = (words, field) => element("label", {}, words, field);

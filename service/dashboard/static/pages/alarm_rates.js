@@ -9,12 +9,8 @@ export function ratesLine() {
   const node = element("section", { class: "panel alarm-rates", "aria-label": "Alarm rates" }, "");
   return {
     node,
-    draw(rates) {
-      setText(node, ratesWords(rates));
-    },
-    fail(words) {
-      setText(node, `How often alarms come is not known: ${words}`);
-    },
+    draw: (rates) => setText(node, ratesWords(rates)),
+    fail: (words) => setText(node, `How often alarms come is not known: ${words}`),
   };
 }
 

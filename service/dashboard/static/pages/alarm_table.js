@@ -2,7 +2,7 @@
 
 import { conditionWords, holdWords, levelMark, placeWords, raisedWords, stateWords, valueWords, waitWords, whatWords } from "../alarm_words.js";
 import { alarmPlace } from "../alarm_place.js";
-import { element, setAttribute, setText } from "../dom.js";
+import { button, element, setAttribute, setText } from "../dom.js";
 import { formatTime } from "../format.js";
 import { evidenceLinks } from "../parts/evidence.js";
 import { listing, listingCell } from "../parts/listing.js";
@@ -30,8 +30,7 @@ function alarmRow(again, onSelect, onCell) {
   select.addEventListener("change", () => onSelect(alarm.id, select.checked));
   const texts = HEADS.slice(1, 7).map((head) => element(head === "Where" ? "a" : "span"));
   const [hold, raisedAt, waits] = [0, 1, 2].map(() => element("span", { class: "hold" }));
-  const cell = element("button", { type: "button", class: "same-cell", title: "Show alarms raised in the same condition cell" }, "Same cell");
-  cell.addEventListener("click", () => onCell(alarm));
+  const cell = button("Same cell", () => onCell(alarm), { class: "same-cell", title: "Show alarms raised in the same condition cell" });
   const evidence = evidenceLinks();
   const actions = alarmActions(again);
   const cells = [priority.node, ...texts, evidence.node, actions.node].map((content, n) => listingCell(HEADS[n], content));

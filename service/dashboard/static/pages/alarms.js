@@ -61,61 +61,38 @@ export function alarmsPage(main) {
   }
 
   async function askList(signal) {
-    try {
-      const found = await ask(["alarms"], filter.query(), signal);
-      [receivedAt, failure] = [moment(), null];
-      const alarms = filter.sorted(found.alarms);
-      shown = alarms.filter((alarm) => !isHidden(alarm));
-      keepingFocus(main.querySelector("h1"), () => {
-        listed.draw(shown);
-        hidden.draw(alarms.filter(isHidden));
-        group.draw(shown, selected);
-      });
-      filtered.hidden = filter.query().length === 0;
-      setText(filtered, `Filtered: only alarms that match are shown; ${found.count.n_active} of the plant are active.`);
-      unjudged.draw(found.unjudged);
-    } catch (error) {
-      if (signal.aborted) return;
-      failure = error.message;
-    }
+    const found = await ask(["alarms"], filter.query(), signal);
+    [receivedAt, failure] = [moment(), null];
+    const alarms = filter.sorted(found.alarms);
+    shown = alarms.filter((alarm) => !isHidden(alarm));
+    keepingFocus(main.querySelector("h1"), () => {
+      listed.draw(shown);
+      hidden.draw(alarms.filter(isHidden));
+      group.draw(shown, selected);
+    });
+    filtered.hidden = filter.query().length === 0;
+    setText(filtered, `Filtered: only alarms that match are shown; ${found.count.n_active} of the plant are active.`);
+    unjudged.draw(found.unjudged);
     draw();
   }
 
-  async function askHistory(signal) {
-    try {
-      history.draw((await ask(["alarms", "events"], [["limit", N_EVENTS], ...filter.eventQuery()], signal)).events);
-    } catch (error) {
-      if (!signal.aborted) history.fail(error.message);
-    }
+  /** Keep a part of the page up to date with the answer at `path`. */
+  function polled(part, periodS, path, queryOf = () => []) {
+    const refresh = async (signal) => part.draw(await ask(path, queryOf(), signal));
+    return poll(refresh, () => periodS, (error) => part.fail(error.message));
   }
 
-  async function askDelivery(signal) {
-    try {
-      delivery.draw(await ask(["delivery"], [], signal));
-    } catch (error) {
-      if (!signal.aborted) delivery.fail(error.message);
-    }
-  }
-
-  async function askRates(signal) {
-    try {
-      rates.draw(await ask(["alarms", "rates"], [], signal));
-    } catch (error) {
-      if (!signal.aborted) rates.fail(error.message);
-    }
-  }
-
-  const lists = poll(askList, () => LIST_PERIOD_S);
-  const histories = poll(askHistory, () => HISTORY_PERIOD_S);
-  const counts = poll(askRates, () => RATES_PERIOD_S);
-  const deliveries = poll(askDelivery, () => HISTORY_PERIOD_S);
+  const lists = poll(askList, () => LIST_PERIOD_S, (error) => {
+    failure = error.message;
+    draw();
+  });
+  const histories = polled(history, HISTORY_PERIOD_S, ["alarms", "events"], () => [["limit", N_EVENTS], ...filter.eventQuery()]);
+  const counts = polled(rates, RATES_PERIOD_S, ["alarms", "rates"]);
+  const deliveries = polled(delivery, HISTORY_PERIOD_S, ["delivery"]);
   return {
     draw,
     close() {
-      lists.stop();
-      histories.stop();
-      counts.stop();
-      deliveries.stop();
+      for (const questions of [lists, histories, counts, deliveries]) questions.stop();
     },
   };
 }

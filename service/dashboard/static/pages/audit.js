@@ -1,8 +1,8 @@
 /** The audit trail: who did what to what, before and after, newest first. */
 
-import { NotReachable, ask } from "../api.js";
+import { ask } from "../api.js";
 import { chainWords } from "../audit_words.js";
-import { element, setText } from "../dom.js";
+import { button, element, setText } from "../dom.js";
 import { listing } from "../parts/listing.js";
 import { mark } from "../parts/mark.js";
 import { auditFilter } from "./audit_filter.js";
@@ -15,7 +15,7 @@ export function auditPage(main) {
   const chain = mark();
   const sentence = element("p", { class: "sentence", role: "status" });
   const table = listing("Audit trail, the newest first", AUDIT_HEADS, "No entry fits.", ({ chain, number }) => `${chain} ${number}`, auditRow);
-  const older = element("button", { type: "button", hidden: "" }, "Older entries");
+  const older = button("Older entries", () => look(nextBefore), { hidden: "" });
   const filter = auditFilter(() => look());
   const head = element("div", { class: "page-head" }, element("h1", {}, "Audit trail"), chain.node);
   main.append(head, filter.node, element("section", { class: "panel listing audit" }, sentence, table.node, older));
@@ -31,9 +31,7 @@ export function auditPage(main) {
       const query = [...filter.query(), ["limit", PAGE], ...(before === null ? [] : [["before", before]])];
       show(await ask(["audit"], query, mine.signal), before);
     } catch (failure) {
-      if (mine.signal.aborted) return;
-      const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
-      setText(sentence, `The audit trail cannot be read now. ${words}`);
+      if (!mine.signal.aborted) setText(sentence, `The audit trail cannot be read now. ${failure.message}`);
     }
   }
 
@@ -48,7 +46,6 @@ export function auditPage(main) {
     setText(sentence, "");
   }
 
-  older.addEventListener("click", () => look(nextBefore));
   chain.draw("absent", "Not read yet");
   look();
   return { draw() {}, close: () => question.abort() };

@@ -1,8 +1,9 @@
 /** Versions of a bearing's baseline: where each comes from, where it stands, and what may be done. */
 
-import { element, setAttribute, setText } from "../dom.js";
+import { button, element, setAttribute, setText } from "../dom.js";
 import { learningSentence } from "../film_words.js";
 import { formatTime } from "../format.js";
+import { listing, listingCell } from "../parts/listing.js";
 import { mark } from "../parts/mark.js";
 import { estimatorWords } from "../words.js";
 import { baselineForm } from "./baseline_form.js";
@@ -24,11 +25,10 @@ export function baselineTable(path, actor, again) {
   const thaw = button("Thaw…", () => form.open("thaw", null, thaw));
   const renew = button("Renew after a machine event…", () => form.open("renew", null, renew));
   const buttons = element("div", { class: "actions", hidden: "" }, freeze, thaw, renew);
-  const versions = table("Baselines", HEADS);
-  const steps = table("What was done", STEP_HEADS);
+  const versions = listing("Baselines", HEADS, "None yet.", (one) => JSON.stringify(one), (version) => versionRow(version, path, form, actor.may));
+  const steps = listing("What was done", STEP_HEADS, "None yet.", (one) => JSON.stringify(one), stepRow);
   const head = element("div", { class: "baselines-head" }, element("h2", {}, "Baselines"), learning);
   const nodes = [head, versions.node, buttons, form.node, element("h2", {}, "What was done"), steps.node];
-  let drawn = "";
   return {
     node: element("section", { class: "panel alarm-list baselines" }, ...nodes),
     draw(found) {
@@ -36,30 +36,10 @@ export function baselineTable(path, actor, again) {
       buttons.hidden = found.learning === null || !actor.may;
       freeze.hidden = found.is_frozen || found.in_force === null;
       thaw.hidden = !found.is_frozen;
-      const now = JSON.stringify([found.versions, found.steps]);
-      if (now === drawn) return;
-      drawn = now;
-      versions.fill(found.versions.map((version) => versionRow(version, path, form, actor.may)));
-      steps.fill(found.steps.map(stepRow));
+      versions.draw(found.versions);
+      steps.draw(found.steps);
     },
-    fail(words) {
-      setText(learning, `Baselines cannot be read: ${words}`);
-    },
-  };
-}
-
-function table(title, heads) {
-  const body = element("tbody", { role: "rowgroup" });
-  const cells = heads.map((head) => element("th", { scope: "col", role: "columnheader" }, head || element("span", { class: "hidden" }, "Actions")));
-  const whole = element("table", { role: "table", "aria-label": title, hidden: "" }, element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...cells)), body);
-  const none = element("p", { class: "sentence" }, "None yet.");
-  return {
-    node: element("div", {}, none, whole),
-    fill(rows) {
-      whole.hidden = rows.length === 0;
-      none.hidden = rows.length > 0;
-      body.replaceChildren(...rows);
-    },
+    fail: (words) => setText(learning, `Baselines cannot be read: ${words}`),
   };
 }
 
@@ -83,20 +63,13 @@ function versionRow(version, path, form, mayChange) {
     [version.event, version.remark].filter(Boolean).join("; "),
     element("span", { class: "actions" }, accept, reject, save),
   ];
-  node.append(...contents.map((content, index) => cell(HEADS[index], content)));
-  return node;
+  node.append(...contents.map((content, index) => listingCell(HEADS[index], content)));
+  return { nodes: [node], draw() {} };
 }
 
 function stepRow(step) {
   const event = step.event_time ? `, event ${formatTime(Date.parse(step.event_time))}` : "";
   const contents = [formatTime(Date.parse(step.time)), step.step + event, step.version === null ? "" : String(step.version), step.actor, step.reason];
-  return element("tr", { role: "row", "data-step": step.step }, ...contents.map((content, index) => cell(STEP_HEADS[index], content)));
-}
-
-const cell = (head, content) => element("td", { role: "cell", "data-head": head }, content);
-
-function button(words, onClick) {
-  const node = element("button", { type: "button" }, words);
-  node.addEventListener("click", onClick);
-  return node;
+  const cells = contents.map((content, index) => listingCell(STEP_HEADS[index], content));
+  return { nodes: [element("tr", { role: "row", "data-step": step.step }, ...cells)], draw() {} };
 }

@@ -1,6 +1,6 @@
 /** The charts of a bearing and the questions they ask. */
 
-import { NotReachable, ask } from "../api.js";
+import { ask } from "../api.js";
 import { centreCaption, centreLayout, centreTraces, orbitLayout, orbitTraces } from "../charts/circle.js";
 import { panel } from "../charts/panel.js";
 import { spectrumAbsence, spectrumCaption, spectrumLayout, spectrumTraces } from "../charts/spectrum.js";
@@ -41,18 +41,9 @@ export function bearingCharts(path) {
  */
 function asking(box, path, show, absence = () => null) {
   return poll(async (signal) => {
-    if (absence() !== null) {
-      box.explain(absence());
-      return;
-    }
-    try {
-      await show(await ask(path, [], signal));
-    } catch (failure) {
-      if (signal.aborted) return;
-      if (failure instanceof NotReachable) box.trouble(`Service not reachable. ${failure.message}`);
-      else box.explain(failure.message);
-    }
-  }, () => PERIOD_S);
+    if (absence() === null) await show(await ask(path, [], signal));
+    else box.explain(absence());
+  }, () => PERIOD_S, (failure) => box.fail(failure));
 }
 
 function orbitChart(path) {

@@ -1,6 +1,5 @@
 /** Change of the stiffness of a film against time, with its limits. */
 
-import { NotReachable } from "../api.js";
 import { panel } from "../charts/panel.js";
 import { X_COLOUR, Y_COLOUR, axis, baseLayout } from "../charts/style.js";
 import { askReadings } from "../film_readings.js";
@@ -22,17 +21,10 @@ export function changeChart(path) {
   const box = panel("Change of film stiffness against the baseline", "change", span.node);
   const questions = poll(async (signal) => {
     if (film === null) return;
-    if (!film.is_watched) {
-      box.explain(`This film is not watched: ${film.why_not}.`);
-      return;
-    }
-    try {
-      await show(box, film.limits, await askReadings(path, serviceTimeMs(), span.value(), MAX_POINTS, signal), span.words());
-    } catch (failure) {
-      if (signal.aborted) return;
-      box.trouble(failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message);
-    }
-  }, () => PERIOD_S);
+    if (!film.is_watched) return box.explain(`This film is not watched: ${film.why_not}.`);
+    const readings = await askReadings(path, serviceTimeMs(), span.value(), MAX_POINTS, signal);
+    await show(box, film.limits, readings, span.words());
+  }, () => PERIOD_S, (failure) => box.trouble(failure.message));
   return {
     node: box.node,
     update(found) {

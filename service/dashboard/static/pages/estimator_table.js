@@ -2,6 +2,7 @@
 
 import { element, setText } from "../dom.js";
 import { budgetPanel } from "../parts/budget.js";
+import { listingCell, listingName, tableOf } from "../parts/listing.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { readingOf, readingView } from "../parts/reading.js";
 import { budgetSpread } from "../parts/spread.js";
@@ -35,15 +36,8 @@ const DAMPING_INCLUDED = "not available from equation (5)";
 export function estimatorTable(path) {
   const budget = budgetPanel(path);
   const rows = Object.entries(ROWS).map(([estimator, names]) => estimatorRow(estimator, names, budget));
-  const heads = HEADS.map(([head, unit]) =>
-    element("th", { scope: "col", role: "columnheader" }, head, element("small", {}, unit)),
-  );
-  const table = element(
-    "table",
-    { role: "table", "aria-label": "Estimators" },
-    element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...heads)),
-    element("tbody", { role: "rowgroup" }, ...rows.map((row) => row.node)),
-  );
+  const heads = HEADS.map(([head, unit]) => [head, element("small", {}, unit)]);
+  const table = tableOf("Estimators", heads, ...rows.map((row) => row.node));
   const hint = element("p", { class: "help" }, "±: half the 95 % interval; press one for its uncertainty budget.");
   return {
     node: element("section", { class: "panel estimators" }, element("h2", {}, "Estimators"), table, hint, budget.node),
@@ -63,7 +57,7 @@ function estimatorRow(estimator, { k, c, coherence }, budget) {
   if (!c) cells.splice(2, 0, element("td", { role: "cell", colspan: 2, class: "none" }, DAMPING_INCLUDED));
   const preferred = element("small");
   const quality = mark();
-  const head = element("th", { scope: "row", role: "rowheader" }, estimatorWords(estimator), " ", preferred);
+  const head = listingName(estimatorWords(estimator), " ", preferred);
   const node = element("tr", { role: "row", "data-estimator": estimator }, head, ...cells, cell(quality.node, HEADS.at(-1)));
   return {
     node,
@@ -77,8 +71,7 @@ function estimatorRow(estimator, { k, c, coherence }, budget) {
   };
 }
 
-const cell = (node, [head, unit]) =>
-  element("td", { role: "cell", "data-head": unit ? `${head}, ${unit}` : head }, node);
+const cell = (node, [head, unit]) => listingCell(unit ? `${head}, ${unit}` : head, node);
 
 function worstOf(readings) {
   const first = (level) => readings.find((reading) => reading.level === level);

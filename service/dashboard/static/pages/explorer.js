@@ -6,17 +6,15 @@ import { element, setText } from "../dom.js";
 import { stateWords } from "../film_words.js";
 import { choice } from "../parts/choice.js";
 import { picker } from "../parts/picker.js";
-import { poll } from "../poll.js";
+import { periodFor, poll } from "../poll.js";
 import { grouped } from "../quantity_groups.js";
 import { explorerCharts } from "./explorer_charts.js";
 import { explorerFiles } from "./explorer_files.js";
 import { explorerNotes } from "./explorer_notes.js";
-import { COLOURS, FORMS, MOST_BEARINGS, MOST_QUANTITIES, STATES, addressOf, rangeOf, stateOf } from "./explorer_state.js";
+import { FORMS, MOST_BEARINGS, MOST_QUANTITIES, STATES, addressOf, isOverTime, rangeOf, stateOf } from "./explorer_state.js";
 import { timeBar } from "./explorer_time.js";
 
 const MAX_POINTS = 800;
-const SHORTEST_PERIOD_S = 5;
-const LONGEST_PERIOD_S = 60;
 const LEAST_ZOOM = 0.002;
 
 /** Returns `{ draw(view), close() }`. */
@@ -30,7 +28,6 @@ export function explorerPage(main) {
 
   const quantities = picker("Quantities", MOST_QUANTITIES, (names) => change({ quantities: names }));
   const bearings = picker("Bearings", MOST_BEARINGS, (ids) => change({ bearings: ids.map((id) => id.split("/")) }));
-  const colour = choice("Colour", COLOURS, state.colour, () => change({ colour: colour.value() }));
   const form = choice("Over", FORMS, state.form, () => change({ form: form.value() }));
   const states = stateSelect(state.state, (name) => change({ state: name }));
   const time = timeBar(go, back);
@@ -39,7 +36,7 @@ export function explorerPage(main) {
   const notes = explorerNotes(() => questions.again());
   const note = element("p", { class: "sentence", role: "status", hidden: "" });
   const pickers = element("div", { class: "explorer-pickers" }, bearings.node, quantities.node);
-  const looks = element("div", { class: "choices" }, form.node, colour.node, states, hint());
+  const looks = element("div", { class: "choices" }, form.node, states, hint());
   main.append(element("div", { class: "explorer" }, element("h1", {}, "Trends"), pickers, time.node, looks, note, charts.node, notes.node, files.node));
 
   charts.explain("Asking the service.");
@@ -79,13 +76,9 @@ export function explorerPage(main) {
 
   const questions = poll(async (signal) => {
     if (view?.serviceTimeMs == null) return;
-    try {
-      catalogue ??= await offered(signal);
-      await showTrends(signal);
-    } catch (failure) {
-      if (!signal.aborted) charts.trouble(failure);
-    }
-  }, () => (state.spanS === null ? LONGEST_PERIOD_S : Math.min(Math.max(bucketS, SHORTEST_PERIOD_S), LONGEST_PERIOD_S)));
+    catalogue ??= await offered(signal);
+    await showTrends(signal);
+  }, () => periodFor(state.spanS === null ? Infinity : bucketS), charts.trouble);
 
   async function offered(signal) {
     const found = await ask(["quantities"], [], signal);
@@ -154,7 +147,7 @@ function worstBearing(units) {
 async function recordedRange(bearing, toMs) {
   let fromMs = 0;
   for (let n = 0; n < 2; n += 1) {
-    const range = queryFor({ quantities: ["speed_rpm"], colour: "", form: "" }, [fromMs, toMs]);
+    const range = queryFor({ quantities: ["speed_rpm"], form: "" }, [fromMs, toMs]);
     const { time } = await ask(pathOf(bearing), range);
     fromMs = (time[0] ?? 0) * 1000;
   }
@@ -164,7 +157,7 @@ async function recordedRange(bearing, toMs) {
 const pathOf = ([unit, bearing]) => ["units", unit, "bearings", bearing, "trends"];
 
 function queryFor(state, range) {
-  const conditions = [state.colour, state.form].filter((name) => COLOURS.some(([one]) => one !== "" && one === name));
+  const conditions = isOverTime(state) ? [] : [state.form];
   const query = [...new Set([...state.quantities, ...conditions])].map((name) => ["quantity", name]);
   const [start, end] = range.map((ms) => new Date(ms).toISOString());
   query.push(["start", start], ["end", end], ["max_points", String(MAX_POINTS)]);

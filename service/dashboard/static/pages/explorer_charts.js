@@ -1,6 +1,5 @@
 /** The charts of the trend explorer: one for each kind of quantity, a sentence where there is nothing. */
 
-import { NotReachable } from "../api.js";
 import { besideWords } from "../charts/beside.js";
 import { MOST_LINES, againstLayout, againstTraces, besideTraces, compareLayout, compareTraces, lineOf } from "../charts/compare.js";
 import { panel } from "../charts/panel.js";
@@ -9,11 +8,12 @@ import { element } from "../dom.js";
 import { formatTime } from "../format.js";
 import { stateWords } from "../film_words.js";
 import { byAxis } from "../quantity_groups.js";
+import { isOverTime } from "./explorer_state.js";
 
 /** A double click also makes the chart reset itself, which is not a zoom of the user. */
 const AFTER_DOUBLE_MS = 500;
 
-/** Returns `{ node, show(found, state, labels, refreshS), trouble(failure), draw(notCurrent) }`. */
+/** Returns `{ node, show(found, state, labels, refreshS), explain(sentence), trouble(failure), draw(notCurrent) }`. */
 export function explorerCharts(onZoom, onBack) {
   const node = element("div", { class: "charts explorer-charts" });
   const panels = new Map();
@@ -23,6 +23,11 @@ export function explorerCharts(onZoom, onBack) {
     for (const one of axes) if (!panels.has(keyOf(one))) panels.set(keyOf(one), panel(one.title, nameOf(one)));
     const wanted = axes.map((one) => panels.get(keyOf(one)).node);
     if (wanted.some((one, n) => node.children[n] !== one) || node.childElementCount !== wanted.length) node.replaceChildren(...wanted);
+  }
+
+  function explain(words) {
+    panels.clear();
+    node.replaceChildren(element("p", { class: "sentence panel" }, words));
   }
 
   return {
@@ -37,14 +42,10 @@ export function explorerCharts(onZoom, onBack) {
         wire(box.node.querySelector(".chart"), onZoom, onBack);
       }
     },
-    explain(words) {
-      panels.clear();
-      node.replaceChildren(element("p", { class: "sentence panel" }, words));
-    },
-    trouble(failure) {
-      const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
-      if (panels.size === 0) this.explain(words);
-      for (const box of panels.values()) box.trouble(words);
+    explain,
+    trouble({ message }) {
+      if (panels.size === 0) explain(message);
+      for (const box of panels.values()) box.trouble(message);
     },
     draw(notCurrent) {
       for (const box of panels.values()) box.draw(null, notCurrent);
@@ -81,30 +82,21 @@ async function showAxis(box, { parts }, found, state, refreshS) {
     return;
   }
   const units = parts.map(({ unit }) => unit);
-  const isOverTime = state.form === "" || state.form === "two";
-  const beside = isOverTime ? besideTraces(full, found) : [];
-  const view = { against: state.form, colour: state.colour };
-  const layout = isOverTime ? compareLayout(full, units, state.colour, beside) : againstLayout(full, units[0], view);
-  const traces = isOverTime ? [...compareTraces(full, state.colour), ...beside] : againstTraces(full, view);
-  const nBeyond = full.reduce((sum, { pieces, scale }) => sum + nOutside(pieces, layout[scale.replace("y", "yaxis")].range), 0);
+  const isTime = isOverTime(state);
+  const beside = isTime ? besideTraces(full, found) : [];
+  const layout = isTime ? compareLayout(full, units, beside) : againstLayout(full, units[0], state.form);
+  const traces = isTime ? [...compareTraces(full), ...beside] : againstTraces(full, state.form);
+  const pieces = full.map((line) => line.pieces);
+  const nBeyond = full.reduce((sum, line) => sum + nOutside(line.pieces, layout[line.scale.replace("y", "yaxis")].range), 0);
   const sentences = [
-    isOverTime ? trendCaption(full.map(({ pieces }) => (state.colour ? withoutRandom(pieces) : pieces)), nBeyond) : `${spanCaption(full.map(({ pieces }) => pieces))} Points: means.`,
+    isTime ? trendCaption(pieces, nBeyond) : `${spanCaption(pieces)} Points: means.`,
     simulatedSentence(full[0].trends).trim(),
     besideWords(beside, found.find((one) => one.beside.film)?.beside.film),
-    COLOURED[state.colour] ?? "",
     empty.length ? `No value in this time: ${empty.map(({ label }) => label).join("; ")}.` : "",
     pairs.length > shown.length ? `Only the first ${MOST_LINES} of ${pairs.length} lines are drawn; choose fewer quantities or bearings.` : "",
   ];
   await box.show(traces, layout, sentences.filter(Boolean).join(" "));
 }
-
-const COLOURED = {
-  oil_temperature_c: "Colour: oil temperature, where it is known; shapes tell the lines apart.",
-  eccentricity_ratio: "Colour: eccentricity, where it is known; shapes tell the lines apart.",
-};
-
-/** Coloured points go without the lines of their uncertainty. */
-const withoutRandom = (pieces) => pieces.map((piece) => piece.map((bucket) => ({ ...bucket, random: null })));
 
 const hasData = ({ pieces }) => pieces.length > 0;
 

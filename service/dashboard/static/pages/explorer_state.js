@@ -13,11 +13,6 @@ export const SPANS = [
   [30 * 86400, "Month"],
   [365 * 86400, "Year"],
 ];
-export const COLOURS = [
-  ["", "Line"],
-  ["oil_temperature_c", "Oil temperature"],
-  ["eccentricity_ratio", "Eccentricity"],
-];
 
 /** What the charts are drawn over, and whether two units share a chart. */
 export const FORMS = [
@@ -26,6 +21,8 @@ export const FORMS = [
   ["oil_temperature_c", "Oil temperature"],
   ["eccentricity_ratio", "Eccentricity"],
 ];
+
+export const isOverTime = ({ form }) => form === "" || form === "two";
 
 export const STATES = ["standstill", "run_up", "speed_no_load", "part_load", "full_load", "run_down", "unknown"];
 
@@ -40,14 +37,13 @@ export function stateOf(hash) {
   const query = queryOf(hash);
   const fixed = fixedRange(query);
   const spanS = Number(query.get("last"));
-  const [colour, form] = ["colour", "over"].map((name) => query.get(name) ?? "");
+  const form = query.get("over") ?? "";
   return {
     quantities: query.has("q") ? query.getAll("q").filter(Boolean).slice(0, MOST_QUANTITIES) : USUAL,
     bearings: query.getAll("b").map((one) => one.split("/")).filter((parts) => parts.length === 2).slice(0, MOST_BEARINGS),
     spanS: fixed ? null : spanS >= 60 && spanS <= MOST_SPAN_S ? spanS : A_DAY_S,
     ...(fixed ?? { fromMs: null, toMs: null }),
     state: query.get("state") ?? "",
-    colour: COLOURS.some(([name]) => name === colour) ? colour : "",
     form: FORMS.some(([name]) => name === form) ? form : "",
   };
 }
@@ -58,13 +54,12 @@ function fixedRange(query) {
 }
 
 /** The address of a state; what is not given is as usual. */
-export function addressOf({ quantities, bearings, spanS = A_DAY_S, fromMs, toMs, state, colour, form }) {
+export function addressOf({ quantities, bearings, spanS = A_DAY_S, fromMs, toMs, state, form }) {
   const pairs = bearings.map((one) => ["b", one.join("/")]);
   pairs.push(...(quantities.length ? quantities : [""]).map((name) => ["q", name]));
   if (spanS === null) pairs.push(["from", new Date(fromMs).toISOString()], ["to", new Date(toMs).toISOString()]);
   else pairs.push(["last", String(spanS)]);
   if (state) pairs.push(["state", state]);
-  if (colour) pairs.push(["colour", colour]);
   if (form) pairs.push(["over", form]);
   return `#/trends?${new URLSearchParams(pairs)}`;
 }

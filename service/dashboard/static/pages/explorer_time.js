@@ -1,6 +1,6 @@
 /** Which time the trend explorer shows: a span until now, from one moment to another, and steps from there. */
 
-import { element, setText } from "../dom.js";
+import { button, element, setText } from "../dom.js";
 import { formatZone } from "../format.js";
 import { choice } from "../parts/choice.js";
 import { SPANS, changedRange, rangeOf } from "./explorer_state.js";
@@ -28,13 +28,9 @@ export function timeBar(onRange, onBack) {
     wrong.hidden = words === "";
     setText(wrong, words);
   };
-  const steps = STEPS.map(([words, factor, move]) => {
-    const button = element("button", { type: "button" }, words);
-    button.addEventListener("click", () => onRange(changedRange(rangeOf(state, nowMs), factor, move, nowMs)));
-    return button;
-  });
-  const back = element("button", { type: "button" }, "Back");
-  back.addEventListener("click", onBack);
+  const go = (factor, move) => onRange(changedRange(rangeOf(state, nowMs), factor, move, nowMs));
+  const steps = STEPS.map(([words, factor, move]) => button(words, () => go(factor, move)));
+  const back = button("Back", onBack);
   const buttons = element("div", { class: "asking", role: "group", "aria-label": "Change the time" }, ...steps, back);
 
   form.addEventListener("submit", (submitted) => {

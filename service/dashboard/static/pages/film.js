@@ -28,15 +28,11 @@ export function filmPage(main, unitId, bearingId) {
   let baseline = null;
 
   const questions = poll(async (signal) => {
-    try {
-      const found = await ask([...path, "baselines"], [], signal);
-      baseline = await shownBaseline(path, found, baseline, signal);
-      baselines.draw(found);
-      charts.learned(found, baseline);
-    } catch (failure) {
-      if (!signal.aborted) baselines.fail(failure.message);
-    }
-  }, () => PERIOD_S);
+    const found = await ask([...path, "baselines"], [], signal);
+    baseline = await shownBaseline(path, found, baseline, signal);
+    baselines.draw(found);
+    charts.learned(found, baseline);
+  }, () => PERIOD_S, (failure) => baselines.fail(failure.message));
 
   return {
     draw(view) {

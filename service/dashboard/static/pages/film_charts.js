@@ -1,6 +1,5 @@
 /** The baseline map, and stiffness against the condition that it was read under. */
 
-import { NotReachable } from "../api.js";
 import { cellsOf, mapCaption, mapLayout, mapTraces } from "../charts/baseline_map.js";
 import { AXES, conditionCaption, conditionLayout, conditionTraces, pointsOf } from "../charts/condition.js";
 import { panel } from "../charts/panel.js";
@@ -28,19 +27,13 @@ export function filmCharts(path) {
 
   const questions = poll(async (signal) => {
     if (known.nowMs === null || !known.film?.is_watched) return;
-    try {
-      const [history, today] = await Promise.all([
-        askReadings(path, known.nowMs, span.value() * DAY_S, MAX_POINTS, signal),
-        askReadings(path, known.nowMs, DAY_S, MAX_POINTS, signal),
-      ]);
-      Object.assign(known, { history, today });
-      await show();
-    } catch (failure) {
-      if (signal.aborted) return;
-      const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
-      for (const [, box] of plots) box.trouble(words);
-    }
-  }, () => PERIOD_S);
+    const [history, today] = await Promise.all([
+      askReadings(path, known.nowMs, span.value() * DAY_S, MAX_POINTS, signal),
+      askReadings(path, known.nowMs, DAY_S, MAX_POINTS, signal),
+    ]);
+    Object.assign(known, { history, today });
+    await show();
+  }, () => PERIOD_S, (failure) => plots.forEach(([, box]) => box.trouble(failure.message)));
 
   async function show() {
     await Promise.all([showMap(map, known, direction.value()), ...plots.map(([against, box]) => showPlot(box, known, against, direction.value(), span.words()))]);

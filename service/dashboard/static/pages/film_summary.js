@@ -1,6 +1,6 @@
 /** The film of a bearing on its page: the verdict, and the way to its baseline. */
 
-import { NotReachable, ask } from "../api.js";
+import { ask } from "../api.js";
 import { element } from "../dom.js";
 import { poll } from "../poll.js";
 import { filmAddress } from "../route.js";
@@ -17,15 +17,10 @@ export function filmSummary(path, unit, bearing, onAnswer) {
 }
 
 /** Requests the film periodically; `onAnswer` receives every answer. */
-export function askFilm(path, panel, onAnswer = () => {}) {
+export function askFilm(path, panel, onAnswer) {
   return poll(async (signal) => {
-    try {
-      const film = await ask([...path, "film"], [], signal);
-      panel.draw(film);
-      onAnswer(film);
-    } catch (failure) {
-      if (signal.aborted) return;
-      panel.fail(failure instanceof NotReachable ? `service not reachable. ${failure.message}` : failure.message);
-    }
-  }, () => PERIOD_S);
+    const film = await ask([...path, "film"], [], signal);
+    panel.draw(film);
+    onAnswer(film);
+  }, () => PERIOD_S, (failure) => panel.fail(failure.message));
 }

@@ -35,7 +35,7 @@ export function verdictPanel(link = "") {
     fail(words) {
       verdicts.hidden = facts.hidden = true;
       sentence.hidden = false;
-      setText(sentence, `Nothing is known of the film now: ${words}`);
+      setText(sentence, `Nothing is known of the film now. ${words}`);
     },
   };
 }

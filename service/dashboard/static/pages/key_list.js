@@ -2,12 +2,12 @@
 
 import { keyMark, unitsOf, unitsWords, usedWords } from "../access_words.js";
 import { ask, tell } from "../api.js";
-import { element, setText } from "../dom.js";
+import { button, element, setText } from "../dom.js";
 import { formatTime } from "../format.js";
 import { listing, listingCell, listingName, rowBelow } from "../parts/listing.js";
 import { mark } from "../parts/mark.js";
-import { question } from "../parts/question.js";
-import { labelled, opener, roleChoice } from "./account_list.js";
+import { labelled, question } from "../parts/question.js";
+import { opener, roleChoice } from "./account_list.js";
 import { newKey } from "./new_key.js";
 
 const HEADS = ["For", "Id", "Role", "Units", "State", "Ends", "Last used", ""];
@@ -22,11 +22,10 @@ export function keyList(again) {
   const days = element("input", { type: "number", required: "", min: "1", max: "3650", value: "365" });
   const fields = [labelled("What it is for", name), labelled("Role", role), labelled("Only these units", units), labelled("Days valid", days)];
   const shown = newKey();
-  const create = element("button", { type: "button" }, "Create a key…");
+  const create = button("Create a key…", () => form.open(create));
   const form = question("A new key for a machine", "Create", fields, async () => {
     shown.show(await tell(["keys"], { name: name.value.trim(), role: role.value, units: unitsOf(units.value), days: Number(days.value) }));
   }, again);
-  create.addEventListener("click", () => form.open(create));
   const head = element("div", { class: "panel-head" }, element("h2", {}, "Keys of machines"), create);
   return {
     node: element("section", { class: "panel listing keys" }, head, form.node, shown.node, table.node),
@@ -38,16 +37,16 @@ function keyRow({ id, name }, again) {
   const state = mark();
   const texts = ["role", "units", "expires", "used"].map(() => element("span"));
   const revoke = question(`Take the key of ${name} back for ever? What uses it is shut out at once.`, "Revoke", [], () => tell(["keys", id], undefined, "DELETE"), again);
-  const button = opener("Revoke…", `${name} ${id}`, revoke, () => []);
+  const revoking = opener("Revoke…", `${name} ${id}`, revoke, () => []);
   const below = rowBelow(HEADS, revoke.node);
   below.hidden = false;
   const [role, units, ends, used] = texts;
-  const cells = [element("code", {}, id), role, units, state.node, ends, used, button].map((node, n) => listingCell(HEADS[n + 1], node));
+  const cells = [element("code", {}, id), role, units, state.node, ends, used, revoking].map((node, n) => listingCell(HEADS[n + 1], node));
   return {
     nodes: [element("tr", { role: "row", "data-key": id }, listingName(name), ...cells), below],
     draw(key) {
       state.draw(...keyMark(key, Date.now()));
-      button.hidden = key.state !== "valid";
+      revoking.hidden = key.state !== "valid";
       [key.role, unitsWords(key), formatTime(Date.parse(key.expires)), usedWords(key)].forEach((words, n) => setText(texts[n], words));
     },
   };

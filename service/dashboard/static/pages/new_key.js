@@ -1,21 +1,19 @@
 /** A key that has just been made, this once: to be copied now, since it is not shown again. */
 
-import { element, setText } from "../dom.js";
+import { button, element, setText } from "../dom.js";
 
 /** Returns `{ node, show(key) }`. */
 export function newKey() {
   const words = element("strong");
   const key = element("input", { readonly: "", "aria-label": "The new key", spellcheck: "false" });
-  const copy = element("button", { type: "button" }, "Copy");
-  const done = element("button", { type: "button" }, "Done");
-  const said = element("span", { role: "status" });
-  const node = element("div", { class: "asking new-key", hidden: "" }, words, key, copy, done, said);
-  key.addEventListener("focus", () => key.select());
-  copy.addEventListener("click", async () => setText(said, (await copied(key)) ? "Copied." : "Press Ctrl+C to copy."));
-  done.addEventListener("click", () => {
+  const copy = button("Copy", async () => setText(said, (await copied(key)) ? "Copied." : "Press Ctrl+C to copy."));
+  const done = button("Done", () => {
     node.hidden = true;
     key.value = "";
   });
+  const said = element("span", { role: "status" });
+  const node = element("div", { class: "asking new-key", hidden: "" }, words, key, copy, done, said);
+  key.addEventListener("focus", () => key.select());
   return {
     node,
     show(made) {

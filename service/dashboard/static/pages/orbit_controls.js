@@ -1,10 +1,11 @@
 /** Play, pause, step, scrub and speed: by mouse, by finger and from the keyboard. */
 
-import { element, setAttribute, setText } from "../dom.js";
+import { button, element, setAttribute, setText } from "../dom.js";
 import { formatFixed } from "../format.js";
 
 const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 4, 8];
 const STEP_TURNS = 1 / 36;
+const STEPS = [["◂◂ Turn", -1], ["◂ Step", -STEP_TURNS], ["Step ▸", STEP_TURNS], ["Turn ▸▸", 1]];
 
 /** Elements that have their own use for the space bar, and for the arrows. */
 const OWN_SPACE = "button, a, select, textarea, input:not([type=range], [type=radio])";
@@ -12,19 +13,13 @@ const OWN_ARROWS = "select, textarea, input:not(#orbit-at)";
 
 /** `acts` is `{ play(), step(turns), seek(s), hasten(speed), hold() }`. Returns `{ node, draw(at, clip, source), close() }`. */
 export function orbitControls(acts) {
-  const play = element("button", { type: "button", class: "play" }, "▶ Play");
+  const play = button("▶ Play", () => acts.play(), { class: "play" });
   const scrub = element("input", { type: "range", id: "orbit-at", step: "any", "aria-label": "Moment" });
   const speed = element("input", { type: "range", id: "orbit-speed", min: "0", max: String(SPEEDS.length - 1), step: "1" });
   const speedWords = element("output", { for: "orbit-speed" });
-  const steps = [["◂◂ Turn", -1], ["◂ Step", -STEP_TURNS], ["Step ▸", STEP_TURNS], ["Turn ▸▸", 1]].map(([words, turns]) => {
-    const button = element("button", { type: "button" }, words);
-    button.addEventListener("click", () => acts.step(turns));
-    return button;
-  });
-  const hold = element("button", { type: "button", "aria-pressed": "false" }, "Hold as reference");
-  hold.addEventListener("click", () => acts.hold());
+  const steps = STEPS.map(([words, turns]) => button(words, () => acts.step(turns)));
+  const hold = button("Hold as reference", () => acts.hold(), { "aria-pressed": "false" });
   const keys = element("p", { class: "hint" }, "Space: play or pause. ← and →: a step of 10°. With Shift: a turn.");
-  play.addEventListener("click", () => acts.play());
   scrub.addEventListener("input", () => acts.seek(Number(scrub.value)));
   speed.addEventListener("input", () => acts.hasten(SPEEDS[Number(speed.value)]));
 

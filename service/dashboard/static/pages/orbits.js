@@ -1,6 +1,5 @@
 /** The orbit player: a shaft's motion as it is now, or at any moment of a recording. */
 
-import { NotReachable } from "../api.js";
 import { reachOf, trailAt } from "../charts/orbit_clip.js";
 import { orbitPicture } from "../charts/orbit_picture.js";
 import { timebasePicture } from "../charts/timebase_picture.js";
@@ -64,15 +63,12 @@ export function orbitsPage(main, unit, bearing) {
   const questions = poll(async (signal) => {
     if (!wants()) return;
     const mine = source;
-    try {
-      const found = await mine.clip(at.atS, signal);
-      if (mine === source) take(found);
-    } catch (failure) {
-      if (signal.aborted) return;
-      trouble = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
-      paint();
-    }
-  }, () => PERIOD_S);
+    const found = await mine.clip(at.atS, signal);
+    if (mine === source) take(found);
+  }, () => PERIOD_S, (failure) => {
+    trouble = failure.message;
+    paint();
+  });
 
   /** A new piece is here: stay at the same moment, unless that is gone. */
   function take(found) {

@@ -1,7 +1,7 @@
 /** Reports of alarms: every time one was raised, with its page to print and its evidence to take away. */
 
 import { levelMark, placeWords, valueWords, whatWords } from "../alarm_words.js";
-import { NotReachable, Refused, ask } from "../api.js";
+import { Refused, ask } from "../api.js";
 import { element, setText } from "../dom.js";
 import { formatTime } from "../format.js";
 import { evidenceLinks } from "../parts/evidence.js";
@@ -30,18 +30,12 @@ export function reportList() {
   const sentence = element("p", { class: "sentence", role: "status" }, "Asking the service.");
   let known = new Map();
   const questions = poll(async (signal) => {
-    try {
-      const { events } = await ask(["alarms", "events"], [["limit", N_EVENTS]], signal);
-      const raised = events.filter(({ change }) => ["raised", "escalated"].includes(change));
-      const kept = (known = await occurrencesOf(raised, known, signal));
-      table.draw(raised.filter(({ alarm }) => kept.has(alarm)).map((event) => ({ event, kept: kept.get(event.alarm).get(event.occurrence) })));
-      setText(sentence, "");
-    } catch (failure) {
-      if (signal.aborted) return;
-      const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
-      setText(sentence, `Reports cannot be listed now. ${words}`);
-    }
-  }, () => PERIOD_S);
+    const { events } = await ask(["alarms", "events"], [["limit", N_EVENTS]], signal);
+    const raised = events.filter(({ change }) => ["raised", "escalated"].includes(change));
+    const kept = (known = await occurrencesOf(raised, known, signal));
+    table.draw(raised.filter(({ alarm }) => kept.has(alarm)).map((event) => ({ event, kept: kept.get(event.alarm).get(event.occurrence) })));
+    setText(sentence, "");
+  }, () => PERIOD_S, (failure) => setText(sentence, `Reports cannot be listed now. ${failure.message}`));
   const node = element("section", { class: "panel listing reports" }, element("h2", {}, "Reports of alarms"), sentence, table.node);
   return { node, close: questions.stop };
 }

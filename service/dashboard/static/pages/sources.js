@@ -1,6 +1,6 @@
 /** Where all samples come from: every unit's device, how its samples arrive, the worst first. */
 
-import { NotReachable, ask } from "../api.js";
+import { ask } from "../api.js";
 import { element, setText } from "../dom.js";
 import { formatAge } from "../format.js";
 import { CURRENT_LIMIT_S, ageAt, moment, secondsBetween } from "../live.js";
@@ -32,16 +32,11 @@ export function sourcesPage(main) {
   let failure = null;
 
   const questions = poll(async (signal) => {
-    try {
-      const [sources, { alarms }] = await Promise.all([ask(["sources"], [], signal), ask(["alarms"], [], signal)]);
-      const settings = known?.settings ?? (await settingsOf(signal));
-      known = { sources, alarms, settings, receivedAt: moment(), lost: sources.map(lost.of) };
-      failure = null;
-    } catch (error) {
-      if (signal.aborted) return;
-      failure = error instanceof NotReachable ? `Service not reachable. ${error.message}` : error.message;
-    }
-  }, () => PERIOD_S);
+    const [sources, { alarms }] = await Promise.all([ask(["sources"], [], signal), ask(["alarms"], [], signal)]);
+    const settings = known?.settings ?? (await settingsOf(signal));
+    known = { sources, alarms, settings, receivedAt: moment(), lost: sources.map(lost.of) };
+    failure = null;
+  }, () => PERIOD_S, (error) => (failure = error.message));
 
   function drawState() {
     const silenceS = known && secondsBetween(known.receivedAt, moment());

@@ -1,7 +1,7 @@
 /** Stiffness and amplitude against time, over a span and at an order that the reader chooses. */
 
 import { amplitudeUnit } from "../amplitudes.js";
-import { NotReachable, ask } from "../api.js";
+import { ask } from "../api.js";
 import { askBeside, besideWords, expectedTraces, markTraces, namedOnce } from "../charts/beside.js";
 import { panel } from "../charts/panel.js";
 import { X_COLOUR, Y_COLOUR } from "../charts/style.js";
@@ -10,12 +10,10 @@ import { element, setAttribute } from "../dom.js";
 import { formatTime } from "../format.js";
 import { choice } from "../parts/choice.js";
 import { readingOf } from "../parts/reading.js";
-import { poll } from "../poll.js";
+import { periodFor, poll } from "../poll.js";
 import { reasonWords } from "../words.js";
 import { addressOf } from "./explorer_state.js";
 
-const SHORTEST_PERIOD_S = 5;
-const LONGEST_PERIOD_S = 60;
 const MAX_POINTS = 500;
 
 /** The end of the span is a whole minute, so that the same question is asked again until then. */
@@ -78,25 +76,21 @@ export function trendPanels(path) {
 
   const questions = poll(async (signal) => {
     if (view?.serviceTimeMs == null) return;
-    try {
-      const lines = [stiffnessLines(which.value()), amplitudeLines(order.value())];
-      const endMs = Math.ceil(view.serviceTimeMs / WHOLE_MS) * WHOLE_MS;
-      const range = [endMs - span.value() * 1000, endMs];
-      const names = lines[0].map(([name]) => name);
-      const key = [...names, ...range].join();
-      if (beside?.key !== key) beside = { key, answer: askBeside([path[1], path[3]], names, range, signal) }; // once a minute
-      const [newest, marked] = await Promise.all([askTrends(path, lines.flat(), range, signal), beside.answer]);
-      trends = newest;
-      const asked = { trends, beside: marked, view, span, scale: scale.value(), latest };
-      await showTrends(stiffness, asked, lines[0], "Film stiffness, GN/m");
-      await showTrends(amplitude, asked, lines[1], `Vibration amplitude, ${amplitudeUnit()}`);
-    } catch (failure) {
-      beside = null;
-      if (signal.aborted) return;
-      const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
-      for (const box of boxes) box.trouble(words);
-    }
-  }, () => periodS(trends));
+    const lines = [stiffnessLines(which.value()), amplitudeLines(order.value())];
+    const endMs = Math.ceil(view.serviceTimeMs / WHOLE_MS) * WHOLE_MS;
+    const range = [endMs - span.value() * 1000, endMs];
+    const names = lines[0].map(([name]) => name);
+    const key = [...names, ...range].join();
+    if (beside?.key !== key) beside = { key, answer: askBeside([path[1], path[3]], names, range) }; // once a minute
+    const [newest, marked] = await Promise.all([askTrends(path, lines.flat(), range, signal), beside.answer]);
+    trends = newest;
+    const asked = { trends, beside: marked, view, span, scale: scale.value(), latest };
+    await showTrends(stiffness, asked, lines[0], "Film stiffness, GN/m");
+    await showTrends(amplitude, asked, lines[1], `Vibration amplitude, ${amplitudeUnit()}`);
+  }, () => periodFor(trends?.bucket_s ?? 0), (failure) => {
+    beside = null;
+    for (const box of boxes) box.trouble(failure.message);
+  });
 
   return {
     nodes: [element("div", { class: "choices" }, span.node, scale.node, more, hint()), ...boxes.map((box) => box.node)],
@@ -112,11 +106,6 @@ export function trendPanels(path) {
 }
 
 const hint = () => element("span", { class: "hint" }, "Drag in a chart to zoom, double-click to go back.");
-
-/** A year of trends does not change within five seconds. */
-function periodS(trends) {
-  return Math.min(Math.max(trends?.bucket_s ?? 0, SHORTEST_PERIOD_S), LONGEST_PERIOD_S);
-}
 
 function askTrends(path, lines, [startMs, endMs], signal) {
   const query = [...lines.map(([name]) => name), ...CENTRE].map((name) => ["quantity", name]);

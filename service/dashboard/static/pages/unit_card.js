@@ -4,6 +4,7 @@ import { element, setAttribute, setText } from "../dom.js";
 import { signedPercent } from "../film_words.js";
 import { formatAge } from "../format.js";
 import { filmBrief } from "../parts/film_brief.js";
+import { listingCell, listingName, tableOf } from "../parts/listing.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { pairView, readingOf, readingView } from "../parts/reading.js";
 import { runningWords } from "../parts/running.js";
@@ -26,39 +27,36 @@ const NO_SPREAD = () => null;
 
 /** Returns `{ node, draw(unit, alarmsOf, historyOf) }`; `alarm` is the unit's mark of open alarms. */
 export function unitCard(unit, alarm) {
-  const running = element("span", { class: "running" });
-  const link = mark();
   const rows = unit.bearings.map((one) => bearingRow(unit.id, one));
-  const title = element("h2", { dir: "auto" }, element("a", { href: unitAddress(unit.id) }, unit.name));
-  const head = element("div", { class: "unit-head" }, title, running, alarm.node, link.node);
-  const node = element("section", { class: "unit-card", "data-unit": unit.id }, head, table(unit, rows));
+  const heads = HEADS.map(([words, of]) => [words, " ", element("small", {}, of)]);
+  const table = tableOf(`Bearings of ${unit.name}`, heads, ...rows.map((row) => row.node));
+  const head = unitTitle(unit, alarm, "unit-head");
+  const node = element("section", { class: "unit-card", "data-unit": unit.id }, head.node, table);
   return {
     node,
     draw(now, alarmsOf, historyOf) {
-      setText(running, runningWords(now));
-      drawLink(link, now.source);
-      alarm.draw();
+      head.draw(now);
       setAttribute(node, "data-worst", alarm.node.dataset.look ?? null);
       rows.forEach((row, n) => row.draw(now.bearings[n], now.films[n], alarmsOf(now.bearings[n].bearing), historyOf(now.bearings[n].bearing)));
     },
   };
 }
 
-/** The link to the data source, while something is wrong with it. */
-export function drawLink(link, source) {
-  const { level, words } = sourceState(source.state);
-  link.node.hidden = level === "good";
-  link.draw(level, source.reason ? `${words}: ${source.reason}` : words);
-}
-
-function table(unit, rows) {
-  const heads = HEADS.map(([head, of]) => element("th", { scope: "col", role: "columnheader" }, head, " ", element("small", {}, of)));
-  return element(
-    "table",
-    { role: "table", "aria-label": `Bearings of ${unit.name}` },
-    element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...heads)),
-    element("tbody", { role: "rowgroup" }, ...rows.map((row) => row.node)),
-  );
+/** Name of a unit, how it runs, its open alarms, and its data source while something is wrong with it. */
+export function unitTitle({ id, name }, alarm, style) {
+  const running = element("span", { class: "running" });
+  const link = mark();
+  const title = element("h2", { dir: "auto" }, element("a", { href: unitAddress(id) }, name));
+  return {
+    node: element("div", { class: style }, title, running, alarm.node, link.node),
+    draw(now) {
+      const { level, words } = sourceState(now.source.state);
+      setText(running, runningWords(now));
+      link.node.hidden = level === "good";
+      link.draw(level, now.source.reason ? `${words}: ${now.source.reason}` : words);
+      alarm.draw();
+    },
+  };
 }
 
 function bearingRow(unit, { bearing, name }) {
@@ -73,9 +71,9 @@ function bearingRow(unit, { bearing, name }) {
   const data = element("span", { class: "quality" }, quality.node, age);
   const change = element("span", { class: "pair change" }, ...changes);
   const nodes = [stiffness.node, change, trend.node, eccentricity.node, oil.node, film.node, data];
-  const cells = nodes.map((node, n) => element("td", { role: "cell", "data-head": HEADS[n + 1].join(" ") }, node));
+  const cells = nodes.map((node, n) => listingCell(HEADS[n + 1].join(" "), node));
   const link = element("a", { href: bearingAddress(unit, bearing) }, bearing);
-  const title = element("th", { scope: "row", role: "rowheader" }, link, " ", element("small", { dir: "auto" }, name ?? ""));
+  const title = listingName(link, " ", element("small", { dir: "auto" }, name ?? ""));
   return {
     node: element("tr", { role: "row", "data-bearing": bearing }, title, ...cells),
     draw(latest, itsFilm, alarms, history) {

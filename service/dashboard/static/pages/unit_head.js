@@ -1,8 +1,9 @@
 /** Where we are, how the unit runs, and whether its samples arrive. */
 
-import { element, setAttribute, setText } from "../dom.js";
+import { element, setText } from "../dom.js";
 import { runningWords } from "../parts/running.js";
 import { sourceView } from "../parts/source.js";
+import { linkTo } from "../parts/ways.js";
 import { SOURCES_ADDRESS, unitAddress } from "../route.js";
 import { speedOrigin } from "../words.js";
 
@@ -20,7 +21,8 @@ export function unitHead(unitId) {
     node: element("header", { class: "bearing-head" }, nav, title, element("div", { class: "state" }, state, origin), source.node),
     draw(unit, view) {
       const wanted = JSON.stringify(view.units.map((one) => [one.id, one.name]));
-      if (wanted !== drawn) nav.replaceChildren(element("a", { href: "#/" }, "Overview"), ...view.units.map((one) => unitLink(one, unitId)));
+      const links = view.units.map(({ id, name }) => linkTo(unitAddress(id), name, id === unitId));
+      if (wanted !== drawn) nav.replaceChildren(linkTo("#/", "Overview"), ...links);
       drawn = wanted;
       setText(title, unit.name);
       setText(state, runningWords(unit) || "Operating state not known");
@@ -28,10 +30,4 @@ export function unitHead(unitId) {
       source.draw(unit.source);
     },
   };
-}
-
-function unitLink({ id, name }, here) {
-  const link = element("a", { href: unitAddress(id) }, name);
-  setAttribute(link, "aria-current", id === here ? "page" : null);
-  return link;
 }

@@ -6,9 +6,10 @@ import { nowSentence } from "../film_words.js";
 import { formatAge } from "../format.js";
 import { centrePicture } from "../parts/centre_picture.js";
 import { filmBrief } from "../parts/film_brief.js";
+import { listingName, tableOf } from "../parts/listing.js";
 import { drawQuality, mark } from "../parts/mark.js";
 import { pairView, readingView } from "../parts/reading.js";
-import { wayLinks } from "../parts/ways.js";
+import { linkTo, wayLinks } from "../parts/ways.js";
 import { bearingAddress } from "../route.js";
 import { qualityOf, reasonSentence } from "../words.js";
 
@@ -32,16 +33,9 @@ const rows = () => [
 export function unitTable(unit) {
   const bearings = unit.bearings.map(({ bearing }) => bearing);
   const drawn = rows().map((row) => tableRow(unit.id, bearings, row));
-  const heads = unit.bearings.map(({ bearing, name }) =>
-    element("th", { scope: "col", role: "columnheader" }, element("a", { href: bearingAddress(unit.id, bearing) }, bearing), " ", element("small", { dir: "auto" }, name ?? "")),
-  );
-  const corner = element("td", { role: "cell" });
-  const table = element(
-    "table",
-    { role: "table", "aria-label": `Bearings of ${unit.name} side by side` },
-    element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, corner, ...heads)),
-    element("tbody", { role: "rowgroup" }, ...drawn.map((row) => row.node)),
-  );
+  const heads = unit.bearings.map(({ bearing, name }) => [linkTo(bearingAddress(unit.id, bearing), bearing), " ", element("small", { dir: "auto" }, name ?? "")]);
+  const corner = [element("span", { class: "hidden" }, "Quantity")];
+  const table = tableOf(`Bearings of ${unit.name} side by side`, [corner, ...heads], ...drawn.map((row) => row.node));
   return {
     node: element("section", { class: "panel side-by-side" }, table),
     draw(now) {
@@ -53,7 +47,7 @@ export function unitTable(unit) {
 function tableRow(unit, bearings, [head, words, view]) {
   const cells = bearings.map((bearing) => (view ? view() : { node: wayLinks(unit, bearing), draw() {} }));
   const boxes = cells.map((cell, n) => element("td", { role: "cell", "data-head": bearings[n], "data-bearing": bearings[n] }, cell.node));
-  const title = element("th", { scope: "row", role: "rowheader" }, head, element("small", {}, words));
+  const title = listingName(head, element("small", {}, words));
   return { cells, node: element("tr", { role: "row" }, title, ...boxes) };
 }
 

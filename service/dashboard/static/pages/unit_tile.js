@@ -4,11 +4,10 @@ import { element, setAttribute, setText } from "../dom.js";
 import { formatQuantity } from "../format.js";
 import { mark } from "../parts/mark.js";
 import { readingOf } from "../parts/reading.js";
-import { runningWords } from "../parts/running.js";
-import { bearingAddress, unitAddress } from "../route.js";
+import { bearingAddress } from "../route.js";
 import { bearingVerdict } from "../verdict_words.js";
 import { NOT_CURRENT, briefWords, lookOf, qualityOf, sourceState } from "../words.js";
-import { asCompared, changeOf, drawLink } from "./unit_card.js";
+import { asCompared, changeOf, unitTitle } from "./unit_card.js";
 
 const DASH = "—";
 const STIFFNESS = ["stiffness_xx_n_per_m", "stiffness_yy_n_per_m"];
@@ -19,18 +18,13 @@ export const TILE_LEGEND =
 
 /** Returns `{ node, draw(unit, alarmsOf) }`; `alarm` is the unit's mark of open alarms. */
 export function unitTile(unit, alarm) {
-  const running = element("span", { class: "running" });
-  const link = mark();
   const rows = unit.bearings.map((one) => bearingLine(unit.id, one));
-  const title = element("h2", { dir: "auto" }, element("a", { href: unitAddress(unit.id) }, unit.name));
-  const head = element("div", { class: "tile-head" }, title, running, link.node, alarm.node);
+  const head = unitTitle(unit, alarm, "tile-head");
   const body = element("tbody", {}, ...rows.map((row) => row.node));
   return {
-    node: element("section", { class: "unit-tile", "data-unit": unit.id }, head, element("table", { "aria-label": `Bearings of ${unit.name}` }, body)),
+    node: element("section", { class: "unit-tile", "data-unit": unit.id }, head.node, element("table", { "aria-label": `Bearings of ${unit.name}` }, body)),
     draw(now, alarmsOf) {
-      setText(running, runningWords(now));
-      drawLink(link, now.source);
-      alarm.draw();
+      head.draw(now);
       const isSaid = sourceState(now.source.state).level !== "good";
       rows.forEach((row, n) => row.draw(now.bearings[n], now.films[n], alarmsOf(now.bearings[n].bearing), isSaid));
     },

@@ -1,6 +1,6 @@
 /** Spectra of a bearing over time, and the one of a chosen moment. */
 
-import { NotReachable, ask } from "../api.js";
+import { ask } from "../api.js";
 import { changeWords, kindWords } from "../alarm_words.js";
 import { fullTraces, momentCaption, momentLayout, momentTraces } from "../charts/moment_spectrum.js";
 import { panel } from "../charts/panel.js";
@@ -44,17 +44,12 @@ export function waterfallPage(main, unit, bearing) {
   const questions = poll(async (signal) => {
     if (view?.serviceTimeMs == null) return;
     const range = choices.range(view.serviceTimeMs);
-    try {
-      found = await askSpectra(path, choices.place(), range, signal);
-      await show();
-    } catch (failure) {
-      if (!signal.aborted) tell(failure);
-    }
-  }, () => PERIOD_S);
+    found = await askSpectra(path, choices.place(), range, signal);
+    await show();
+  }, () => PERIOD_S, tell);
 
   function tell(failure) {
-    const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
-    for (const box of panels) box.trouble(words);
+    for (const box of panels) box.trouble(failure.message);
   }
   function redraw() {
     show().catch(tell);

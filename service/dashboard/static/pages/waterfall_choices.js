@@ -1,6 +1,6 @@
 /** What a waterfall shows: channel, time, scale, axis, picture. */
 
-import { element } from "../dom.js";
+import { button, element } from "../dom.js";
 import { keptChoice } from "../parts/kept_choice.js";
 
 const PLACES = [["shaft_x", "Shaft x"], ["shaft_y", "Shaft y"], ["bearing_x", "Bearing x"], ["bearing_y", "Bearing y"]];
@@ -23,8 +23,6 @@ export function waterfallChoices(ask, show) {
   const axis = keptChoice("axis", "Axis", AXES, "hz", show);
   const upper = keptChoice("to", "Up to", UPPERS, 6, show);
   const picture = keptChoice("picture", "Picture", PICTURES, "map", show);
-  const earlier = element("button", { type: "button" }, "◂ Earlier");
-  const later = element("button", { type: "button", disabled: "" }, "Later ▸");
   const shift = (by) => () => {
     shiftS = Math.max(0, shiftS + by * (span.value() / 2));
     moved();
@@ -33,8 +31,8 @@ export function waterfallChoices(ask, show) {
     later.disabled = shiftS === 0;
     ask();
   }
-  earlier.addEventListener("click", shift(1));
-  later.addEventListener("click", shift(-1));
+  const earlier = button("◂ Earlier", shift(1));
+  const later = button("Later ▸", shift(-1), { disabled: "" });
   const walk = element("span", { class: "walk" }, earlier, later);
   return {
     node: element("div", { class: "choices" }, place.node, span.node, walk, picture.node, scale.node, axis.node, upper.node),

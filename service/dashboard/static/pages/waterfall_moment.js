@@ -1,6 +1,6 @@
 /** Which of the spectra is looked at: by a click into the picture, or with a slider from the keyboard. */
 
-import { element, setAttribute } from "../dom.js";
+import { button, element, setAttribute } from "../dom.js";
 import { formatTime } from "../format.js";
 import { localMs } from "../charts/waterfall_rows.js";
 
@@ -8,7 +8,7 @@ import { localMs } from "../charts/waterfall_rows.js";
 export function momentSlider(onChange) {
   const slider = element("input", { type: "range", min: "0", max: "0", step: "1", id: "moment" });
   const words = element("output", { for: "moment" });
-  const newest = element("button", { type: "button" }, "Newest");
+  const newest = button("Newest", () => choose(offered.time.length - 1));
   const node = element("div", { class: "moment", hidden: "" }, element("label", { for: "moment" }, "Moment"), slider, words, newest);
   let offered = null;
   let chosenS = null; // null: the newest, whatever comes
@@ -28,7 +28,6 @@ export function momentSlider(onChange) {
     newest.disabled = chosenS === null;
   }
   slider.addEventListener("input", () => choose(Number(slider.value)));
-  newest.addEventListener("click", () => choose(offered.time.length - 1));
   return {
     node,
     offer(spectra, isThere) {

@@ -1,6 +1,7 @@
 /** In whose name something is done: who is logged in; where no login is needed, a name is asked for once. */
 
-import { element, setText } from "../dom.js";
+import { button, element, setText } from "../dom.js";
+import { keep, read } from "../kept.js";
 import { limitSentence, may, session } from "../session.js";
 
 const KEY = "padwatch-actor";
@@ -30,35 +31,24 @@ export function actorField(permission, what) {
     return { node: element("p", { class: "actor limit" }, limitSentence(permission, what)), may: false, draw() {} };
   }
   const words = element("span");
-  const other = element("button", { type: "button" }, "Not you?");
+  const other = button("Not you?", () => {
+    remember("");
+    draw();
+  });
   const node = element("span", { class: "actor", hidden: "" }, words, " ", other);
   function draw() {
     node.hidden = Boolean(session()?.name) || given() === null;
     setText(words, `You act as ${given()}.`);
   }
-  other.addEventListener("click", () => {
-    remember("");
-    draw();
-  });
   draw();
   return { node, may: true, draw };
 }
 
-let typed = null; // of a browser that keeps nothing
+let typed = ""; // of a browser that keeps nothing
 
-function given() {
-  try {
-    return sessionStorage.getItem(KEY) || null;
-  } catch {
-    return typed;
-  }
-}
+const given = () => read(KEY, "sessionStorage") || typed || null;
 
 function remember(name) {
-  typed = name || null;
-  try {
-    sessionStorage.setItem(KEY, name);
-  } catch {
-    // kept until the page is left
-  }
+  typed = name;
+  keep(KEY, name, "sessionStorage");
 }

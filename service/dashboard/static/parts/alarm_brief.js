@@ -37,22 +37,19 @@ function alarmBrief(title, isMine, sentenceOf = null) {
   const drawRows = keyedRows(list, ({ id }) => id, () => alarmLine((done) => questions.again(done)));
   node.hidden = sentenceOf === null;
   const questions = poll(async (signal) => {
-    try {
-      const { alarms, unjudged } = await ask(["alarms"], [], signal);
-      const mine = alarms.filter(isMine);
-      const open = mine.filter((alarm) => !isHidden(alarm));
-      const shown = sentenceOf ? open : open.slice(0, MOST);
-      const n = { open: open.length, hidden: mine.length - open.length, unjudged: unjudged.filter(isMine).length };
-      keepingFocus(link, () => drawRows(shown));
-      setText(link, shown.length < open.length ? `Alarm list (${open.length - shown.length} more)` : "Alarm list");
-      setText(sentence, sentenceOf?.(n) ?? "");
-      node.hidden = sentenceOf === null && open.length === 0;
-    } catch (failure) {
-      if (signal.aborted) return;
-      drawRows([]);
-      setText(sentence, `Alarms are not known now. ${failure.message}`);
-    }
-  }, () => PERIOD_S);
+    const { alarms, unjudged } = await ask(["alarms"], [], signal);
+    const mine = alarms.filter(isMine);
+    const open = mine.filter((alarm) => !isHidden(alarm));
+    const shown = sentenceOf ? open : open.slice(0, MOST);
+    const n = { open: open.length, hidden: mine.length - open.length, unjudged: unjudged.filter(isMine).length };
+    keepingFocus(link, () => drawRows(shown));
+    setText(link, shown.length < open.length ? `Alarm list (${open.length - shown.length} more)` : "Alarm list");
+    setText(sentence, sentenceOf?.(n) ?? "");
+    node.hidden = sentenceOf === null && open.length === 0;
+  }, () => PERIOD_S, (failure) => {
+    drawRows([]);
+    setText(sentence, `Alarms are not known now. ${failure.message}`);
+  });
   return { node, draw() {}, close: questions.stop };
 }
 

@@ -1,9 +1,10 @@
 /** Uncertainty budget of one result, requested only while it is open. */
 
 import { ask } from "../api.js";
-import { element, setText } from "../dom.js";
+import { button, element, setText } from "../dom.js";
 import { formatInterval, formatQuantity, formatSignificant, formatTime, kindOf } from "../format.js";
 import { poll } from "../poll.js";
+import { listingCell, listingName, tableOf } from "./listing.js";
 
 const PERIOD_S = 5;
 const MORE_DECIMALS = 2;
@@ -18,10 +19,9 @@ let nPanels = 0;
 export function budgetPanel(path) {
   const id = `budget-${(nPanels += 1)}`;
   const title = element("h3");
-  const closing = element("button", { type: "button", class: "closing" }, "Close");
+  const closing = button("Close", leave, { class: "closing" });
   const sentence = element("p", { class: "sentence", role: "status" });
-  const rows = element("tbody", { role: "rowgroup" });
-  const table = budgetTable(rows);
+  const table = tableOf("Uncertainty budget", HEADS);
   const help = element("p", { class: "help" }, READING_HELP);
   const head = element("div", { class: "panel-head" }, title, closing);
   const node = element("section", { class: "budget", id, hidden: "" }, head, sentence, table, help);
@@ -38,17 +38,12 @@ export function budgetPanel(path) {
     table.hidden = help.hidden = budget === null;
     if (budget === null) return;
     setText(sentence, budgetSentence(budget));
-    rows.replaceChildren(...budget.lines.map((line) => budgetRow(budget.quantity, line)));
+    table.tBodies[0].replaceChildren(...budget.lines.map((line) => budgetRow(budget.quantity, line)));
   }
 
-  async function refresh(quantity, signal) {
-    try {
-      show(await ask([...path, "budgets", quantity], [], signal));
-    } catch (failure) {
-      if (signal.aborted) return;
-      show(null);
-      setText(sentence, `No budget now. ${failure.message}`);
-    }
+  function fail(failure) {
+    show(null);
+    setText(sentence, `No budget now. ${failure.message}`);
   }
 
   function toggle(quantity, label, opener) {
@@ -61,31 +56,22 @@ export function budgetPanel(path) {
     node.hidden = false;
     node.dataset.quantity = quantity;
     opener.setAttribute("aria-expanded", "true");
-    open = { opener, questions: poll((signal) => refresh(quantity, signal), () => PERIOD_S) };
+    const refresh = async (signal) => show(await ask([...path, "budgets", quantity], [], signal));
+    open = { opener, questions: poll(refresh, () => PERIOD_S, fail) };
   }
 
-  closing.addEventListener("click", () => {
+  function leave() {
     const opener = open?.opener;
     close();
     opener?.focus();
-  });
+  }
   return { node, id, toggle, close };
 }
 
-function budgetTable(rows) {
-  const heads = HEADS.map((head) => element("th", { scope: "col", role: "columnheader" }, head));
-  const headRow = element("tr", { role: "row" }, ...heads);
-  return element("table", { role: "table" }, element("thead", { role: "rowgroup" }, headRow), rows);
-}
-
 function budgetRow(quantity, line) {
-  const cells = [line.kind, line.distribution, widthWords(quantity, line), contributionWords(quantity, line)];
-  return element(
-    "tr",
-    { role: "row", "data-kind": line.kind },
-    element("th", { scope: "row", role: "rowheader" }, line.name),
-    ...cells.map((words, index) => element("td", { role: "cell", "data-head": HEADS[index + 1] }, words)),
-  );
+  const contents = [line.kind, line.distribution, widthWords(quantity, line), withUnit(quantity, line.contribution)];
+  const cells = contents.map((words, index) => listingCell(HEADS[index + 1], words));
+  return element("tr", { role: "row", "data-kind": line.kind }, listingName(line.name), ...cells);
 }
 
 const united = (quantity, digits) => `${digits} ${kindOf(quantity).unit}`.trimEnd();
@@ -95,8 +81,6 @@ const withUnit = (quantity, value) => united(quantity, formatQuantity(quantity, 
 function widthWords(quantity, { kind, width }) {
   return kind === "random" ? withUnit(quantity, width) : formatSignificant(width);
 }
-
-const contributionWords = (quantity, { contribution }) => withUnit(quantity, contribution);
 
 function budgetSentence({ quantity, value, uncertainty, time }) {
   const interval = united(quantity, formatInterval(quantity, uncertainty));

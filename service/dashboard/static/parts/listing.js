@@ -1,25 +1,36 @@
-/** A table with one row for each thing; a row stays the same row for as long as its thing is there. */
+/** Tables; in one with a row for each thing, a row stays the same row for as long as its thing is there. */
 
-import { element, setAttribute } from "../dom.js";
+import { element, setAttribute, setText } from "../dom.js";
+
+/** A table with its roles, which it keeps where a narrow screen shows it otherwise; `heads` are words, or lists of contents. */
+export function tableOf(title, heads, ...rows) {
+  const actions = () => element("span", { class: "hidden" }, "Actions");
+  const cells = heads.map((head) => element("th", { scope: "col", role: "columnheader" }, ...[head || actions()].flat()));
+  const head = element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...cells));
+  return element("table", { role: "table", "aria-label": title }, head, element("tbody", { role: "rowgroup" }, ...rows));
+}
 
 /**
- * Returns `{ node, draw(things) }`; `nothing` is said where there are none.
+ * Returns `{ node, draw(things, nothing), fail(sentence), setCurrent(isCurrent) }`; `nothing` is said where there are none.
  *
  * `keyOf(thing)` identifies a thing; `rowOf(thing)` makes `{ nodes, draw(thing) }`.
  */
 export function listing(title, heads, nothing, keyOf, rowOf) {
-  const cells = heads.map((head) => element("th", { scope: "col", role: "columnheader" }, head || element("span", { class: "hidden" }, "Actions")));
-  const body = element("tbody", { role: "rowgroup" });
-  const head = element("thead", { role: "rowgroup" }, element("tr", { role: "row" }, ...cells));
-  const table = element("table", { role: "table", "aria-label": title, hidden: "" }, head, body);
-  const empty = element("p", { class: "sentence", hidden: "" }, nothing);
-  const drawRows = keyedRows(body, keyOf, rowOf);
+  const table = tableOf(title, heads);
+  const empty = element("p", { class: "sentence" });
+  const drawRows = keyedRows(table.tBodies[0], keyOf, rowOf);
+  table.hidden = empty.hidden = true;
   return {
     node: element("div", {}, empty, table),
-    draw(things) {
+    draw(things, words = nothing) {
       table.hidden = things.length === 0;
       empty.hidden = things.length > 0;
+      setText(empty, words);
       drawRows(things);
+    },
+    fail(words) {
+      empty.hidden = false;
+      setText(empty, words);
     },
     setCurrent: (current) => setAttribute(table, "data-current", String(current)),
   };

@@ -1,7 +1,7 @@
 /** The way to every page, and how this browser shows them; behind a button where the screen is narrow. */
 
 import { AMPLITUDES, amplitudes, chooseAmplitudes } from "../amplitudes.js";
-import { element, setAttribute } from "../dom.js";
+import { button, element, setAttribute } from "../dom.js";
 import { isLocked, may } from "../session.js";
 import { THEMES, chooseTheme, theme } from "../theme.js";
 
@@ -12,16 +12,16 @@ export function navigation(pages) {
   const look = select("Look", THEMES, theme(), chooseTheme);
   const amplitude = select("Amplitudes", AMPLITUDES, amplitudes(), chooseAmplitudes);
   const node = element("div", { id: "menu", class: "menu" }, element("nav", { "aria-label": "Pages" }, list), look, amplitude);
-  const button = element("button", { type: "button", class: "menu-button", "aria-expanded": "false", "aria-controls": "menu" }, "Menu");
-  const unfold = (open) => setAttribute(button, "aria-expanded", String(open));
-  button.addEventListener("click", () => unfold(button.getAttribute("aria-expanded") !== "true"));
+  const isOpen = () => opener.getAttribute("aria-expanded") === "true";
+  const opener = button("Menu", () => unfold(!isOpen()), { class: "menu-button", "aria-expanded": "false", "aria-controls": "menu" });
+  const unfold = (open) => setAttribute(opener, "aria-expanded", String(open));
   node.addEventListener("keydown", (key) => {
-    if (key.key !== "Escape" || button.getAttribute("aria-expanded") !== "true") return;
+    if (key.key !== "Escape" || !isOpen()) return;
     unfold(false);
-    button.focus();
+    opener.focus();
   });
   return {
-    button,
+    button: opener,
     node,
     show(here) {
       for (const [page, link] of links) setAttribute(link, "aria-current", page === here ? "page" : null);

@@ -2,7 +2,7 @@
 
 import { placeWords, whatWords } from "../alarm_words.js";
 import { tell } from "../api.js";
-import { element, setText } from "../dom.js";
+import { button, element, setText } from "../dom.js";
 import { may } from "../session.js";
 import { actorName, nameField } from "./actor.js";
 
@@ -14,7 +14,7 @@ import { actorName, nameField } from "./actor.js";
 export function operation(words, fields, act) {
   const opener = element("button", { type: "button" }, words + (fields.length ? "…" : ""));
   const who = nameField();
-  const cancel = element("button", { type: "button" }, "Cancel");
+  const cancel = button("Cancel", close);
   const send = element("button", { type: "submit" }, words);
   const form = element("form", { class: "shelf-form", hidden: "" }, who.node, ...fields, send, cancel);
 
@@ -30,7 +30,6 @@ export function operation(words, fields, act) {
     opener.hidden = true;
     form.querySelector("input:enabled, select").focus();
   });
-  cancel.addEventListener("click", close);
   form.addEventListener("keydown", (key) => key.key === "Escape" && close());
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
@@ -54,12 +53,12 @@ export const acknowledge = (alarm, actor) => tell(["alarms", alarm.id, "acknowle
 export function acknowledgeButton(again) {
   let alarm = null;
   const failure = element("span", { class: "action-failure", role: "alert" });
-  const button = operation("Acknowledge", [], (name) => reported(() => acknowledge(alarm, name), failure, again, () => doneWords(alarm, "acknowledged")));
+  const acknowledging = operation("Acknowledge", [], (name) => reported(() => acknowledge(alarm, name), failure, again, () => doneWords(alarm, "acknowledged")));
   return {
-    node: element("span", { class: "actions" }, ...button.nodes, failure),
+    node: element("span", { class: "actions" }, ...acknowledging.nodes, failure),
     draw(now) {
       alarm = now;
-      button.draw(may("act_on_alarms") && !now.is_acknowledged);
+      acknowledging.draw(may("act_on_alarms") && !now.is_acknowledged);
     },
   };
 }

@@ -1,6 +1,9 @@
 /** A question below a row before something is done that cannot be taken back; Escape leaves it. */
 
-import { element, setText } from "../dom.js";
+import { button, element, setText } from "../dom.js";
+
+/** A field of a form with its words. */
+export const labelled = (words, field) => element("label", {}, words, field);
 
 /**
  * Returns `{ node, open(opener) }`; `fields` stand before the button that carries `act` out.
@@ -10,7 +13,7 @@ import { element, setText } from "../dom.js";
 export function question(sentence, words, fields, act, done) {
   const failure = element("span", { class: "action-failure", role: "alert" });
   const send = element("button", { type: "submit" }, words);
-  const cancel = element("button", { type: "button" }, "Cancel");
+  const cancel = button("Cancel", close);
   const node = element("form", { class: "asking question", hidden: "" }, element("strong", {}, sentence), ...fields, send, cancel, failure);
   let opener = null;
 
@@ -35,7 +38,6 @@ export function question(sentence, words, fields, act, done) {
     }
   });
   node.addEventListener("keydown", (key) => key.key === "Escape" && close());
-  cancel.addEventListener("click", close);
   return {
     node,
     open(from) {

@@ -1,6 +1,6 @@
 /** The newest recordings of one unit in a few lines. */
 
-import { NotReachable, ask } from "../api.js";
+import { ask } from "../api.js";
 import { element, setText } from "../dom.js";
 import { poll } from "../poll.js";
 import { beingMadeWords, lengthWords, occasionWords, recordingTime } from "../recording_words.js";
@@ -16,19 +16,15 @@ export function recordingsBrief(unit) {
   const link = element("a", { class: "more", href: RECORDINGS_ADDRESS }, "All recordings and reports");
   const head = element("div", { class: "panel-head" }, element("h2", {}, "Newest recordings"), link);
   const questions = poll(async (signal) => {
-    try {
-      const found = await ask(["recordings"], [["unit", unit], ["kind", "capture"], ["limit", MOST]], signal);
-      const running = found.being_made.filter(({ alarm }) => alarm.startsWith(`${unit}:`));
-      const lines = [...running.map((one) => element("li", {}, beingMadeWords(one))), ...found.recordings.map(recordingLine)];
-      list.replaceChildren(...lines);
-      setText(sentence, whatElse(lines.length, found.error));
-    } catch (failure) {
-      if (signal.aborted) return;
-      list.replaceChildren();
-      const words = failure instanceof NotReachable ? `Service not reachable. ${failure.message}` : failure.message;
-      setText(sentence, `Recordings are not known now. ${words}`);
-    }
-  }, () => PERIOD_S);
+    const found = await ask(["recordings"], [["unit", unit], ["kind", "capture"], ["limit", MOST]], signal);
+    const running = found.being_made.filter(({ alarm }) => alarm.startsWith(`${unit}:`));
+    const lines = [...running.map((one) => element("li", {}, beingMadeWords(one))), ...found.recordings.map(recordingLine)];
+    list.replaceChildren(...lines);
+    setText(sentence, whatElse(lines.length, found.error));
+  }, () => PERIOD_S, (failure) => {
+    list.replaceChildren();
+    setText(sentence, `Recordings are not known now. ${failure.message}`);
+  });
   return {
     node: element("section", { class: "panel unit-recordings" }, head, list, sentence),
     draw() {},

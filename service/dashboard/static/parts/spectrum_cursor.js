@@ -2,7 +2,7 @@
 
 import { amplitudeUnit, shownAmplitude } from "../amplitudes.js";
 import { AXES, harmonicsOf, peaksOf } from "../charts/spectrum_reading.js";
-import { element } from "../dom.js";
+import { button, element } from "../dom.js";
 import { formatFixed } from "../format.js";
 import { queryOf } from "../route.js";
 import { keepInAddress } from "./kept_choice.js";
@@ -14,7 +14,7 @@ const ORDERS_DIGITS = [3, 1, 3];
 /** Returns `{ node, hz(), draw(spectrum), choosePoint(point) }`; `hz` is null without a cursor. */
 export function spectrumCursor(onChange) {
   const input = element("input", { type: "number", min: "0", id: "cursor" });
-  const none = element("button", { type: "button" }, "No cursor");
+  const none = button("No cursor", () => set(null));
   const unit = element("span");
   const [harmonics, peaks] = [element("tbody"), element("tbody")];
   const note = element("p", { class: "hint" });
@@ -28,7 +28,6 @@ export function spectrumCursor(onChange) {
     onChange();
   }
   input.addEventListener("change", () => set(Number(input.value) / (axis.of(1, turnHz) ?? 1)));
-  none.addEventListener("click", () => set(null));
   return {
     node: element("div", { class: "cursor" }, element("div", { class: "choices" }, field, none), listOf("Cursor and harmonics", harmonics), listOf("Peaks", peaks), note),
     hz: () => hz,

@@ -18,13 +18,9 @@ export function openAlarms() {
   let alarms = null;
   let receivedAt = null;
   const questions = poll(async (signal) => {
-    try {
-      ({ alarms } = await ask(["alarms"], [], signal));
-      receivedAt = moment();
-    } catch {
-      // the head of the page says that alarms are not known
-    }
-  }, () => PERIOD_S);
+    ({ alarms } = await ask(["alarms"], [], signal));
+    receivedAt = moment();
+  }, () => PERIOD_S, () => {}); // the head of the page says that alarms are not known
   function open(isWanted) {
     const isCurrent = receivedAt !== null && secondsBetween(receivedAt, moment()) <= CURRENT_LIMIT_S;
     return isCurrent ? alarms.filter((alarm) => !isHidden(alarm) && isWanted(alarm)) : null;
