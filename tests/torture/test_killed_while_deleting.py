@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from harness.deeds import HOP_NS, T0_NS, Build, value
-from harness.summary import Torture
 from harness.tape import environment, python
 from rigs.rolled_trends import gather_all
 
@@ -57,9 +56,7 @@ def by_the_hour(store: SqliteStore) -> Trend:
     return store.trend(TrendQuery("U1", "UJB", ("speed_rpm",), T0_NS, T0_NS + 6 * HOUR_NS, 7, 1))
 
 
-def test_killed_while_deleting_every_hour_says_what_it_said(
-    old_file: bytes, tmp_path: Path, torture: Torture
-) -> None:
+def test_killed_while_deleting_every_hour_says_what_it_said(old_file, tmp_path, torture):
     rng = np.random.default_rng(torture.seed)
     path = tmp_path / "old.sqlite3"
     path.write_bytes(old_file)
@@ -102,8 +99,8 @@ def require_same(found: Trend, before: Trend) -> None:
 @pytest.mark.planted("mark of what is deleted in a transaction of its own")
 @pytest.mark.long
 def test_planted_bug_of_a_mark_in_a_transaction_of_its_own_is_found(
-    old_file: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    old_file, tmp_path, monkeypatch
+):
     """A kill between two transactions leaves readings deleted and nobody who knows of it."""
     path = tmp_path / "old.sqlite3"
     path.write_bytes(old_file)

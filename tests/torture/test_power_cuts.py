@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from harness.deeds import Build, Loss, deed, loss
 from harness.disk import Disk
-from harness.summary import Torture, planted
+from harness.summary import planted
 from harness.tape import Acknowledged, Step, environment, python, record
 
 from service.store.sqlite import SqliteStore
@@ -78,8 +78,8 @@ def damage(path: Path) -> list[str]:
 
 @pytest.mark.timeout(3600)
 def test_nothing_that_was_acknowledged_is_lost_by_a_power_cut(
-    recorded: Record, tmp_path: Path, assessment: Build, torture: Torture
-) -> None:
+    recorded, tmp_path, assessment, torture
+):
     n_cuts = N_CUTS if torture.is_whole else N_FEW
     for acknowledged, files in cuts(recorded(""), n_cuts, torture.seed):
         path = left_in(tmp_path / "data", files)
@@ -101,8 +101,8 @@ def test_nothing_that_was_acknowledged_is_lost_by_a_power_cut(
     ],
 )
 def test_a_store_that_promises_too_much_is_found_out(
-    recorded: Record, tmp_path: Path, assessment: Build, bug: str, what: str, torture: Torture
-) -> None:
+    recorded, tmp_path, assessment, bug, what, torture
+):
     for acknowledged, files in cuts(recorded(bug), N_CUTS, torture.seed):
         path = left_in(tmp_path / "data", files)
         if getattr(found_after(path, torture.seed, acknowledged, assessment)[0], what):

@@ -15,7 +15,6 @@ from harness.nats_server import NatsServer, nats_cluster, nats_server_command
 from harness.postgres_server import PostgresServer, why_not
 from harness.replicas import Replicas, replicas
 from harness.service_rig import until
-from harness.summary import Torture
 from harness.watch import silent_healthy_s
 
 N_ROUNDS, N_KILLS = 5, 10
@@ -57,7 +56,7 @@ def running(
 
 
 @pytest.mark.timeout(3600)
-def test_whatever_is_killed_nothing_is_lost(running: Replicas, seed: int, torture: Torture) -> None:
+def test_whatever_is_killed_nothing_is_lost(running, seed, torture):
     """Kill each kind so often, at random moments; then look at all that is left."""
     does = {role: partial(running.kill, role) for role in running.rigs}
     does["postgres"] = running.restart_postgres

@@ -78,7 +78,7 @@ async def test_between_replies_no_connection_is_held(plant):
 
 
 @pytest.mark.parametrize("other", ["vendor", "signature"])
-async def test_another_device_is_noticed_at_the_next_poll(plant, other: str):
+async def test_another_device_is_noticed_at_the_next_poll(plant, other):
     device, _, source = plant
 
     async with source(keeps_connection=False).connect() as stream:
@@ -134,7 +134,7 @@ def port() -> Iterator[int]:
         thread.join()
 
 
-async def test_it_is_a_lost_link_each_time_and_nothing_else(port: int) -> None:
+async def test_it_is_a_lost_link_each_time_and_nothing_else(port):
     settings = LinkSettings(
         transport=TcpTransport(host="127.0.0.1", port=port),
         identity=ExpectedIdentification(vendor="any"),

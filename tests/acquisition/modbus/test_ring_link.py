@@ -152,7 +152,7 @@ def readings(drift_ppm: float, period_s: float, slot_samples: int, seed: int):
 @pytest.mark.parametrize("drift_ppm", [-50.0, 0.0, 10.0, 100.0, 150.0, 1000.0])
 def test_a_ring_that_is_polled_in_step_with_its_slots_tells_its_drift(
     drift_ppm, period_s, slot_samples
-) -> None:
+):
     for seed in range(5):
         found = list(readings(drift_ppm, period_s, slot_samples, seed))
         assert found[-1].u_drift_ppm < 5.0
@@ -163,7 +163,7 @@ def test_a_ring_that_is_polled_in_step_with_its_slots_tells_its_drift(
 
 
 @pytest.mark.parametrize("slot_s", [0.01, 0.0833, 0.1, 0.24, 0.25, 0.26, 0.5, 1.0, 7.0])
-def test_polls_come_no_later_than_asked_for_and_not_much_sooner(slot_s) -> None:
+def test_polls_come_no_later_than_asked_for_and_not_much_sooner(slot_s):
     period_s = incommensurate_period_s(0.25, slot_s)
     assert 0.5 * 0.25 < period_s <= 0.25
     if slot_s > 1.0 or slot_s < 0.05:

@@ -35,9 +35,7 @@ N = 25
     [({"last": "24h"}, 1), ({"last": "3d"}, 3), ({"last": "1440min"}, 1)],
     ids=str,
 )
-async def test_the_last_hours_end_at_the_next_whole_minute(
-    stored: Any, parameters: dict[str, str], n_days: int
-) -> None:
+async def test_the_last_hours_end_at_the_next_whole_minute(stored, parameters, n_days):
     now_ns = stored.clock.now_ns()
 
     body = await stored.json(f"{UJB}/trends", **parameters, quantity=K)
@@ -53,9 +51,7 @@ async def test_the_last_hours_end_at_the_next_whole_minute(
     [{}, {"last": "1h", "start": WHOLE["start"]}, {"last": "0h"}, {"last": "1 y"}, {"last": "٣h"}],
     ids=str,
 )
-async def test_a_period_without_one_clear_start_is_refused(
-    stored: Any, parameters: dict[str, str]
-) -> None:
+async def test_a_period_without_one_clear_start_is_refused(stored, parameters):
     await stored.problem(f"{UJB}/trends", 422, **parameters, quantity=K)
 
 

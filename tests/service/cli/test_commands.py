@@ -222,7 +222,7 @@ def command_paths() -> Iterator[tuple[str, ...]]:
     return below(typer.main.get_command(commands.app), ())
 
 
-def test_every_command_has_a_help_text() -> None:
+def test_every_command_has_a_help_text():
     paths = list(command_paths())
     for path in paths:
         shown = padwatch(*path, "--help")
@@ -231,7 +231,7 @@ def test_every_command_has_a_help_text() -> None:
     assert len(paths) > 40
 
 
-def test_the_version_is_that_of_the_package() -> None:
+def test_the_version_is_that_of_the_package():
     shown = padwatch("--version")
     assert (shown.exit_code, shown.stdout) == (0, f"padwatch {version('padwatch')}\n")
 
