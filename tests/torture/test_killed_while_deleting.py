@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from harness.deeds import HOP_NS, T0_NS, Build, value
+from harness.deeds import HOP_NS, T0_NS, value
 from harness.tape import environment, python
 from rigs.rolled_trends import gather_all
 
@@ -35,9 +35,7 @@ print("done", flush=True)
 
 
 @pytest.fixture(scope="module")
-def old_file(
-    tmp_path_factory: pytest.TempPathFactory, torture_seed: int, assessment: Build
-) -> bytes:
+def old_file(tmp_path_factory, torture_seed, assessment) -> bytes:
     """A database with five hours of results, gathered."""
     path = tmp_path_factory.mktemp("old") / "old.sqlite3"
     with closing(SqliteStore(path)) as store:

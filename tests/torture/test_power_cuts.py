@@ -28,9 +28,7 @@ Record = Callable[[str], list[Step]]
 
 
 @pytest.fixture(scope="session")
-def recorded(
-    tmp_path_factory: pytest.TempPathFactory, torture_seed: int, assessment: Build
-) -> Record:
+def recorded(tmp_path_factory, torture_seed, assessment) -> Record:
     """Records what a store asks of its disk while transactions are appended to it."""
 
     def run(bug: str = "") -> list[Step]:

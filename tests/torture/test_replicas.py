@@ -4,12 +4,10 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 from harness.checker import check
-from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer, nats_cluster, nats_server_command
 from harness.postgres_server import PostgresServer, why_not
@@ -41,9 +39,7 @@ def plant(seed: int) -> LedgerPlant:
 
 
 @pytest.fixture(params=["a single process", "the whole chain"])
-def running(
-    request: pytest.FixtureRequest, plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path
-) -> Iterator[Replicas]:
+def running(request, plant, daq, tmp_path) -> Iterator[Replicas]:
     """Processes of a plant; the whole chain takes five and three servers of a stream."""
     with ExitStack() as stack:
         nodes: Sequence[NatsServer] = ()

@@ -110,9 +110,7 @@ def job_for(job: ImportJob, placed: Placed) -> Callable[[str], ImportJob]:
 
 
 @pytest.fixture
-def imported(
-    tmp_path: Path, run: Any, read: Read, job_for: Callable[[str], ImportJob]
-) -> Callable[..., Any]:
+def imported(tmp_path, run, read, job_for) -> Callable[..., Any]:
     """Writes samples of the run into a file and reads it, by a job that some change."""
 
     def through(kind: str, samples: np.ndarray, change: Change = lambda job: job) -> Any:

@@ -164,9 +164,7 @@ def test_a_lost_link_is_told_after_its_delay_whatever_the_clock_is_set_to(host, 
 
 
 @pytest.fixture
-def stored(
-    database: Callable[[], Path], host: Any, tools: Any
-) -> Callable[[], tuple[Any, Any, Any]]:
+def stored(database, host, tools) -> Callable[[], tuple[Any, Any, Any]]:
     """An engine, its recorder and its store, begun anew on the same file each time."""
     path = database()
 
