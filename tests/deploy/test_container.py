@@ -109,9 +109,7 @@ def health() -> Iterator[HTTPServer]:
 
 
 @pytest.mark.parametrize(("status", "is_healthy"), [(200, True), (503, False), (404, False)])
-def test_the_health_check_fails_unless_the_service_is_ready(
-    health, status, is_healthy, monkeypatch
-):
+def test_the_health_check_fails_without_a_ready_service(health, status, is_healthy, monkeypatch):
     monkeypatch.setattr(Health, "status", status)
     python, option, script = health_command()
     assert (python, option) == ("python", "-c")

@@ -113,9 +113,7 @@ async def manager(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncItera
         await asyncio.wait([manager.listening])
 
 
-async def test_the_service_manager_is_told_from_the_start_to_the_end(
-    start, write_plant, tmp_path, manager
-):
+async def test_the_service_manager_is_told_from_start_to_end(start, write_plant, tmp_path, manager):
     program = await start("run", str(write_plant(tmp_path)), "--port", "0")
     await program.wait_for_url()
     await manager.until(lambda told: f"READY=1\n{STATUS}" in told)
@@ -165,9 +163,7 @@ async def test_over_tls_a_trusted_service_lets_the_first_account_be_made_with_wh
     assert token not in service.errors
 
 
-async def test_on_a_socket_everybody_logs_in_and_the_proxy_says_who_it_speaks_for(
-    start, write_plant, tmp_path
-):
+async def test_on_a_socket_all_log_in_and_the_proxy_names_its_client(start, write_plant, tmp_path):
     path = tmp_path / "http.sock"
     service = await start("run", str(write_plant(tmp_path, service=f'socket = "{path}"\n')))
     assert await service.wait_for_url() == f"unix:{path}"

@@ -186,9 +186,7 @@ def test_a_replay_that_only_shall_be_stored_ends_by_itself_and_is_mixed_with_not
     assert "holds replay results and cannot be used for live ones" in refused.stderr
 
 
-async def test_a_replay_whose_daq_is_killed_ends_and_says_that_results_are_incomplete(
-    start, daq_of
-):
+async def test_a_replay_whose_daq_is_killed_ends_and_says_results_are_incomplete(start, daq_of):
     program = await start(
         *("replay", str(RECORDINGS / "full_load"), "--plant", str(RECORDINGS / "plant.toml")),
         *("--speed", "0.1", "--through", "modbus_tcp", "--out", "results"),

@@ -102,9 +102,7 @@ async def test_a_killed_measuring_process_ends_the_program_which_can_start_again
     assert again.url == program.url
 
 
-async def test_a_serving_process_that_hangs_is_killed_and_started_again(
-    tmp_path, demo_file, monkeypatch
-):
+async def test_a_hanging_serving_process_is_killed_and_restarted(tmp_path, demo_file, monkeypatch):
     (tmp_path / "deaf.py").write_text("import signal\nsignal.pause()\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setattr(child, "PROGRAM", "deaf")

@@ -68,9 +68,7 @@ def test_a_bad_link_makes_no_false_sample_and_no_loss_that_is_not_told(plant, tm
 
 @pytest.mark.timeout(3600)
 @pytest.mark.torture
-def test_a_frozen_service_shows_nothing_old_as_new_and_raises_nothing_false(
-    plant, tmp_path, torture
-):
+def test_a_frozen_service_shows_nothing_old_as_new_and_no_false_alarm(plant, tmp_path, torture):
     lines = ["SIGSTOP and SIGCONT of the service"]
     with bench_of(plant, tmp_path, torture.seed) as bench:
         before = bench.raised()  # as where the host is busy with the start

@@ -116,9 +116,7 @@ def damaged(
     return f"{kind} in {target.name}"
 
 
-def test_no_wrong_value_is_served_from_a_damaged_store_and_loss_is_told(
-    whole, truth, tmp_path, torture
-):
+def test_a_damaged_store_serves_no_wrong_value_and_tells_loss(whole, truth, tmp_path, torture):
     rng = np.random.default_rng(torture.seed)
     counted: Counter[str] = Counter()
     for number in range(torture.times(N_STORES)):

@@ -96,9 +96,7 @@ def require_same(found: Trend, before: Trend) -> None:
 
 @pytest.mark.planted("mark of what is deleted in a transaction of its own")
 @pytest.mark.long
-def test_planted_bug_of_a_mark_in_a_transaction_of_its_own_is_found(
-    old_file, tmp_path, monkeypatch
-):
+def test_planted_bug_of_a_mark_in_its_own_transaction_is_found(old_file, tmp_path, monkeypatch):
     """A kill between two transactions leaves readings deleted and nobody who knows of it."""
     path = tmp_path / "old.sqlite3"
     path.write_bytes(old_file)

@@ -75,9 +75,7 @@ def damage(path: Path) -> list[str]:
 
 
 @pytest.mark.timeout(3600)
-def test_nothing_that_was_acknowledged_is_lost_by_a_power_cut(
-    recorded, tmp_path, assessment, torture
-):
+def test_nothing_acknowledged_is_lost_by_a_power_cut(recorded, tmp_path, assessment, torture):
     n_cuts = N_CUTS if torture.is_whole else N_FEW
     for acknowledged, files in cuts(recorded(""), n_cuts, torture.seed):
         path = left_in(tmp_path / "data", files)

@@ -53,9 +53,7 @@ def write_plant(plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path) -> Path:
 
 
 @pytest.mark.timeout(3600)
-def test_a_kill_costs_no_sample_that_was_called_recorded_and_every_hole_is_told(
-    plant, daq, tmp_path, torture
-):
+def test_a_kill_costs_no_recorded_sample_and_every_hole_is_told(plant, daq, tmp_path, torture):
     n_cycles = N_CYCLES if torture.is_whole else N_FEW
     with ServiceRig(write_plant(plant, daq, tmp_path)) as rig:
         root = tmp_path / "data" / "recordings"

@@ -73,9 +73,7 @@ def _settle(database: Path) -> None:
 
 @pytest.mark.timeout(3600)
 @pytest.mark.torture
-def test_results_after_kills_of_acquire_analyse_and_nats_are_those_of_a_single_process(
-    tmp_path, torture
-):
+def test_results_after_kills_of_acquire_analyse_and_nats_are_of_one_process(tmp_path, torture):
     if nats_server_command() is None:
         pytest.skip("needs nats-server")
     rng = np.random.default_rng(torture.seed)

@@ -187,9 +187,7 @@ def test_drift_is_found_within_three_of_its_stated_uncertainty(drift_ppm, n_seed
     ("offset_s", "step_s", "within_s"),
     [(7.25 - 0.002, 0.0, 0.01), (0.0, 7200.0, 0.1), (0.0, -3600.0, 0.1)],
 )
-def test_offset_is_read_at_the_least_delay_by_the_hosts_clock_as_it_stands_now(
-    offset_s, step_s, within_s
-):
+def test_offset_is_read_at_the_least_delay_by_the_present_host_clock(offset_s, step_s, within_s):
     estimate = watched(600.5, 0.0, offset_s + 0.002, 5, lambda s: step_s if s > 600.0 else 0.0)
     assert estimate.device_clock().offset_s == pytest.approx(offset_s - step_s, abs=within_s)
 

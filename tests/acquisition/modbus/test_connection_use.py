@@ -92,9 +92,7 @@ async def test_another_device_is_noticed_at_the_next_poll(plant, other):
 
 
 @pytest.mark.parametrize("done", ["a reply", "a connection"])
-async def test_what_is_done_with_the_stop_does_not_undo_it(
-    done, counting_feed, link_to, monkeypatch
-):
+async def test_work_done_with_the_stop_does_not_undo_it(done, counting_feed, link_to, monkeypatch):
     method = {"a reply": "data_received", "a connection": "connection_made"}[done]
     does = getattr(ReplyProtocol, method)
 
@@ -286,9 +284,7 @@ async def test_a_device_that_answers_all_in_order_is_asked_for_all_at_once():
         (nothing, LinkError),
     ],
 )
-async def test_a_device_that_cannot_is_asked_one_at_a_time_from_then_on_and_told_once(
-    behave, error
-):
+async def test_a_device_that_cannot_is_asked_one_at_a_time_and_told_once(behave, error):
     async with device(behave) as port:
         link = client(port)
         await link.open()

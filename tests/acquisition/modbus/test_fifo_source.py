@@ -97,9 +97,7 @@ BOTH_LAYOUTS = pytest.mark.parametrize("layout", [INTERLEAVED, PER_CHANNEL])
 
 
 @pytest.mark.parametrize(("layout", "n_steps"), [(INTERLEAVED, 4000), (UNCOUNTED, 20)])
-async def test_what_waited_for_a_reader_is_exact_by_the_clock_or_thrown_away(
-    queues, layout, n_steps
-):
+async def test_waiting_samples_are_exact_by_the_clock_or_thrown_away(queues, layout, n_steps):
     """The loss is longer than the counter; without one it ends the epoch."""
     async with queues(layout) as p:
         async with p.source.connect() as stream:

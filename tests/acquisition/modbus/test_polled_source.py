@@ -149,9 +149,7 @@ async def test_a_machine_that_was_suspended_while_waiting_says_the_true_tick(ste
         ("sentinel", Reason.NOT_FINITE, Reason.NOT_MEASURED),
     ],
 )
-async def test_what_the_device_flags_or_cannot_give_is_never_good(
-    plant, fault, reason, slow_reason
-):
+async def test_what_a_device_flags_or_cannot_give_is_never_good(plant, fault, reason, slow_reason):
     async with plant() as (source, device, *_), source.connect() as stream:
         await anext(stream)
         device.spoil(fault, 1)

@@ -223,9 +223,7 @@ of_their_own_length = pytest.mark.parametrize(
 @on_both_wires
 @of_their_own_length
 @given(data=st.data())
-def test_a_reply_that_tells_its_own_length_is_taken_whole_and_only_then(
-    framing, frame, request_, pdu, data
-):
+def test_a_reply_that_tells_its_length_is_taken_only_whole(framing, frame, request_, pdu, data):
     right = frame(pdu)
     cut = data.draw(st.integers(1, len(right) - 1))
     assert reply(framing, right[:cut], request_) is None

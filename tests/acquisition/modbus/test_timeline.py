@@ -161,9 +161,7 @@ def test_a_counter_that_time_does_not_explain_begins_an_epoch(first, passed_s, t
 
 
 @pytest.mark.parametrize(("has_asked", "epoch"), [(True, 8), (False, 7)])
-def test_a_counter_that_stops_with_its_device_begins_an_epoch_if_nothing_had_waited(
-    has_asked, epoch
-):
+def test_a_counter_that_stops_with_its_device_begins_an_epoch_if_none_waited(has_asked, epoch):
     samples = counted()
     samples.place(100, 0.0)
     samples.note_drained(5.0 if has_asked else 0.0)

@@ -92,9 +92,7 @@ os.kill(os.getpid(), signal.SIGSEGV)
 """
 
 
-def test_a_crash_that_leaves_the_request_unread_is_a_refusal_too(
-    record, numbered, tmp_path, monkeypatch
-):
+def test_a_crash_with_the_request_unread_is_a_refusal_too(record, numbered, tmp_path, monkeypatch):
     """The parent's next read is then a reset of the connection, no end of the stream."""
     recording = open_recording(record([numbered(0, 50)]))
     (tmp_path / "crashes.py").write_text(CRASHES)

@@ -245,9 +245,7 @@ def test_blocks_that_no_device_can_have_delivered_are_refused(folder, changes, w
 
 @pytest.mark.parametrize("n_damaged", fast_and_long(60, 300))
 @pytest.mark.parametrize("name", ["samples.parquet", "blocks.parquet"])
-def test_any_damage_to_a_resealed_file_is_read_or_refused_but_never_crashes(
-    folder, name, n_damaged
-):
+def test_any_damage_to_a_resealed_file_is_read_or_refused_without_a_crash(folder, name, n_damaged):
     """Bytes changed at random, with checksums made right."""
     content = (folder / name).read_bytes()
     chance = random.Random(4)  # noqa: S311  not a secret

@@ -115,9 +115,7 @@ def test_any_stream_of_blocks_comes_back_bit_for_bit(recording):
 
 @pytest.mark.parametrize("n_each", [1, 7, 64, 200])
 @pytest.mark.usefixtures("reads_here")
-def test_blocks_of_any_length_come_back_across_the_borders_of_row_groups(
-    record, numbered, monkeypatch, n_each
-):
+def test_blocks_of_any_length_come_back_across_row_groups(record, numbered, monkeypatch, n_each):
     for module in (writer, child):
         monkeypatch.setattr(module, "ROWS_PER_GROUP", 200)
         monkeypatch.setattr(module, "BLOCKS_PER_GROUP", 10)

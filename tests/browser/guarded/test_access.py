@@ -184,9 +184,7 @@ async def test_an_admin_adds_changes_and_removes_accounts_and_reads_what_is_refu
     await expect(page.locator(NEW)).to_have_count(0)
 
 
-async def test_a_key_is_shown_once_opens_until_it_is_revoked_and_then_no_more(
-    plant, remote_page, browser
-):
+async def test_a_key_is_shown_once_and_opens_until_it_is_revoked(plant, remote_page, browser):
     page = remote_page
     await open_as(page, "admin", plant.url + "#/access", "[data-account=admin]")
     await page.get_by_role("button", name="Create a key…").press("Enter")

@@ -31,9 +31,7 @@ def is_nothing_new(response: Response) -> bool:
     return response.url.endswith("/api/v1/alarms") and response.status == 304
 
 
-async def test_an_alarm_is_acknowledged_shelved_and_brought_back_by_keys_alone(
-    plant, page, complaints
-):
+async def test_an_alarm_is_acknowledged_shelved_and_unshelved_by_keys(plant, page, complaints):
     await page.goto(plant.url + LIST)
     row = page.locator(LINK)
     await expect(row).to_be_visible()
@@ -163,9 +161,7 @@ async def test_alarms_are_acknowledged_together_and_what_is_refused_is_said(plan
     await expect(page.get_by_role("button", name="Acknowledge all")).to_be_hidden()
 
 
-async def test_a_receiver_that_is_away_is_named_until_it_has_taken_what_waits(
-    plant, page, receiver_port
-):
+async def test_a_receiver_that_is_away_is_named_until_none_waits(plant, page, receiver_port):
     await page.goto(plant.url + LIST)
     line = page.locator(".delivery li")
     await expect(line).to_contain_text("desk: not delivered since")

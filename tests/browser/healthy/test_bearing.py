@@ -26,9 +26,7 @@ def gn_per_m(value: float) -> str:
     return f"{value / 1e9:.5f} GN/m"
 
 
-async def test_every_chart_is_drawn_from_the_plant_alone_and_says_what_it_shows(
-    plant, page, complaints
-):
+async def test_every_chart_comes_from_the_plant_and_says_what_it_shows(plant, page, complaints):
     asked = []
     page.on("request", lambda request: asked.append(request.url))
     await page.goto(plant.url + BEARING)

@@ -71,9 +71,7 @@ async def unfold(page: Page, address: str) -> None:
         await await_orbit(page)
 
 
-async def test_every_page_opens_without_a_complaint_and_under_a_title_of_its_own(
-    plant, page, complaints
-):
+async def test_every_page_opens_without_a_complaint_under_its_own_title(plant, page, complaints):
     titles = set()
     pages = await addresses(page, plant.url)
     for address in pages:

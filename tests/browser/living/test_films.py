@@ -163,9 +163,7 @@ async ([files, addresses]) => {
 """
 
 
-async def test_the_trail_tells_what_the_service_has_written_and_the_keyboard_finds_it(
-    plant, page, complaints
-):
+async def test_the_trail_tells_what_the_service_wrote_and_keys_find_it(plant, page, complaints):
     told = await (await page.request.get(f"{plant.url}api/v1/audit?limit=100")).json()
     await page.goto(plant.url + "#/audit")
     rows = page.locator("[data-entry]")

@@ -153,9 +153,7 @@ def test_the_rotor_bends_within_the_band():
 
 @pytest.mark.parametrize("eccentricity", [0.1, 0.3, 0.6])
 @pytest.mark.parametrize("bearing", [*BEARINGS])
-def test_films_under_a_flexible_rotor_are_found_as_they_are_at_the_running_speed(
-    bearing, eccentricity
-):
+def test_films_under_a_flexible_rotor_are_found_as_at_the_running_speed(bearing, eccentricity):
     truth = motion(eccentricity)[0][bearing].at(SPEED_RAD_S)
     found = [fitted(bearing, eccentricity, seed) for seed in range(4)]
 

@@ -69,9 +69,7 @@ def at(server: ModbusTcpServer) -> str:
     return f"127.0.0.1:{server.port}"
 
 
-async def test_registers_are_read_in_every_type_and_byte_order_and_the_likely_one_is_marked(
-    probe, server
-):
+async def test_registers_are_read_in_every_type_and_order_and_the_likely_one_marked(probe, server):
     look = ("modbus", at(server), "--address", "100", "--count", "2")
     result, table = await probe(*look, "--json"), await probe(*look)
 

@@ -272,9 +272,7 @@ def test_every_sample_flag_and_stamp_comes_back(
     assert on_grid(raws, counts_calibration()) == on_grid(feed.sent, counts_calibration())
 
 
-def test_a_log_of_two_devices_under_the_same_ids_is_refused(
-    counting_feed, counts_calibration, tmp_path
-):
+def test_a_log_of_two_devices_of_one_id_is_refused(counting_feed, counts_calibration, tmp_path):
     shape = CanShape(
         channels=(DaqSignal("c0", "V", 1.0), DaqSignal("c1", "V", 1.0)),
         slow=(DaqSignal("slow0", "degC"), DaqSignal("slow1", "degC")),

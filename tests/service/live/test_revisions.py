@@ -76,9 +76,7 @@ def test_a_unit_changes_with_results_links_and_staleness_but_neither_samples_nor
     assert changes()
 
 
-def test_a_result_keeps_its_arrival_time_whatever_the_clock_is_set_to(
-    live, stepped_clock, assessment
-):
+def test_a_result_keeps_its_arrival_time_however_the_clock_is_set(live, stepped_clock, assessment):
     reports = Reports(live, stepped_clock)
     live.set_results("U1", {"UJB": bearing_snapshot(assessment())})
     reports.send(2.0)

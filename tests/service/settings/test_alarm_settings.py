@@ -60,9 +60,7 @@ def rules(plant_of: PlantOf) -> Callable[[str], BearingRules]:
     return build
 
 
-def test_without_limits_nothing_of_a_bearing_is_watched_and_in_a_replay_neither_link_nor_clock(
-    plant_of,
-):
+def test_without_limits_no_bearing_is_watched_and_in_a_replay_neither_link_nor_clock(plant_of):
     plant = plant_of()
 
     rules = rules_of(plant.unit[0], plant.alarms, Origin.LIVE)

@@ -175,9 +175,7 @@ def test_several_mistakes_are_all_named_at_once(plant_text, mistakes):
     )
 
 
-def test_lines_are_counted_as_editors_count_them_also_where_a_file_is_not_utf_8(
-    plant_text, mistakes
-):
+def test_lines_are_counted_as_editors_do_also_where_a_file_is_not_utf_8(plant_text, mistakes):
     text = f"# a comment with \u2028 and \x85\r\n{plant_text.replace('= 1.18e9', '= 1.18', 1)}"
 
     [found] = mistakes(text)
@@ -256,9 +254,7 @@ address = 1
 """
 
 
-def test_a_line_that_two_units_or_two_devices_of_a_unit_are_read_on_is_refused(
-    plant_text, mistakes, changed
-):
+def test_a_line_that_two_units_or_devices_are_read_on_is_refused(plant_text, mistakes, changed):
     text = plant_text.replace(HOST, 'device = "/dev/ttyUSB0"')
     line = text.rpartition("device =")[0].count("\n") + 1
 
@@ -276,9 +272,7 @@ def test_a_line_that_two_units_or_two_devices_of_a_unit_are_read_on_is_refused(
 
 
 @pytest.mark.parametrize("devices", [("/dev/ttyUSB0", "/dev/ttyUSB1"), ("pty", "pty")])
-def test_lines_of_their_own_and_those_that_the_simulated_daq_makes_are_fine(
-    plant_text, tmp_path, devices
-):
+def test_own_lines_and_those_that_the_simulated_daq_makes_are_fine(plant_text, tmp_path, devices):
     for device in devices:
         plant_text = plant_text.replace(HOST, f'device = "{device}"', 1)
     path = tmp_path / "plant.toml"

@@ -171,9 +171,7 @@ def test_a_unit_or_a_column_that_is_not_the_mapped_one_is_refused(run, imported,
             imported(kind, run.units_um, with_channels(unit="mm/s"))
 
 
-def test_a_csv_file_may_have_semicolons_decimal_commas_and_lines_before_its_header(
-    tmp_path, run, read, job
-):
+def test_a_csv_file_may_have_semicolons_decimal_commas_and_a_preamble(tmp_path, run, read, job):
     write_csv(tmp_path / "run.mf4", run, run.units_um)
     text = (tmp_path / "run.mf4").read_text().replace(",", ";").replace(".", ",")
     (tmp_path / "run.mf4").write_text("Rohdaten;;;\n\n" + text, encoding="utf-8-sig")

@@ -98,9 +98,7 @@ def assert_recorded(blocks: list[SampleBlock], found: dict[tuple[int, int], int]
 
 
 @pytest.mark.parametrize("kind", [ModbusTcpServer, ModbusRtuServer, "patient"])
-async def test_a_replay_loses_nothing_however_small_the_ring_and_fast_the_clock(
-    kind, counts_calibration
-):
+async def test_a_replay_loses_nothing_with_a_small_ring_and_a_fast_clock(kind, counts_calibration):
     """Gaps are as long behind the wire, and epochs are those of the recording."""
     device = RingDevice(PiecewiseFeed(*PIECES), settings=SETTINGS)
     device.patient = kind == "patient"

@@ -47,9 +47,7 @@ class Device:
     st.sampled_from([1.0, 0.01, -0.5]),
     st.sampled_from([0.0, -40.0]),
 )
-def test_a_value_comes_back_within_the_resolution_of_its_registers(
-    type_, order, number, scale, offset
-):
+def test_a_value_comes_back_within_its_registers_resolution(type_, order, number, scale, offset):
     value = MapValue(
         id="v",
         cell=Cell(address=3, type=type_, byte_order=order),

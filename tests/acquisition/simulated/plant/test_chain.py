@@ -55,9 +55,7 @@ def four_probes(machine: Unit) -> Unit:
     )
 
 
-def test_an_accelerometer_s_corner_takes_what_it_should_and_a_probe_s_resonance_no_gap(
-    machine, quiet
-):
+def test_an_accelerometer_s_corner_takes_its_share_and_a_probe_s_resonance_no_gap(machine, quiet):
     corner, soft = HighPass(0.5, order=2), Resonance(60.0, 0.05)
     channels = {
         "UJB_vx": ChannelScenario(response=corner),
@@ -150,9 +148,7 @@ def test_a_softer_bracket_than_the_monitor_is_told_moves_more(machine, quiet, bu
     assert machine.bearings[UJB].bracket_stiffness_n_per_m == 1.18e9
 
 
-def test_growth_widens_all_gaps_alike_and_displacement_opposite_ones_against_each_other(
-    four_probes, quiet
-):
+def test_growth_widens_all_gaps_alike_and_displacement_opposite_ones_inversely(four_probes, quiet):
     grown = with_bearing(quiet, gap_growth_um=70.0)
 
     mean = readings(four_probes, grown)[:, : 5 * TURN].mean(axis=1)

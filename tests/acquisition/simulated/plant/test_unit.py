@@ -133,9 +133,7 @@ async def take(
     return blocks
 
 
-async def test_an_unpaced_source_goes_on_where_it_was_left(
-    build_unit, calibration, stepped_clock, full_load
-):
+async def test_an_unpaced_source_is_continued(build_unit, calibration, stepped_clock, full_load):
     feed = build_unit(full_load)
     in_500s = replace(calibration, block_samples=500)
     source = SimulatedSource(feed, in_500s, stepped_clock, paced=False)
