@@ -245,11 +245,7 @@ HOSTILE: list[tuple[str, Callable[[Path], bytes], str]] = [
     ),
     ("blocks.parquet", text_repeated_from_a_dictionary, "a reason of 1 to 64 characters"),
     *(
-        (
-            "samples.parquet",
-            lambda _, n=n_elements: footer_of_a_list(n),
-            "Couldn't deserialize thrift",
-        )
+        ("samples.parquet", lambda _, n=n_elements: footer_of_a_list(n), "Couldn't deserialize")
         for n_elements in (900_000, 2**31 - 1)
     ),
 ]

@@ -174,11 +174,7 @@ HOLES = "c1", [pa.array([None] * 1000, pa.int16())]
     [
         (lambda t: t.set_column(1, *DOUBLES), {}, "column 'c1' (double) does not match"),
         (lambda t: t.set_column(1, *HOLES), {}, "column 'c1' (int16) does not match"),
-        (
-            lambda t: t.append_column("c9", t["c0"]),
-            {},
-            "number of columns does not match the manifest",
-        ),
+        (lambda t: t.append_column("c9", t["c0"]), {}, "number of columns does not match the"),
         (lambda t: t, {"row_group_size": 500}, "samples.parquet: row groups must have"),
     ],
 )
@@ -219,22 +215,13 @@ def change_block(folder: Path, number: int, **changes: Any) -> None:
         ({"first_index": 2**62}, "9007199254740992, got 4611686018427387904"),
         ({"epoch": -7}, "block 3: epoch must be 0 to"),
         ({"ok": 7}, "block 3: ok must be 0 to 3, got 7"),
-        (
-            {"rejected": [{"reason": "torn", "n_samples": 10}]},
-            "block 3: 10 rejected, but 0 missing",
-        ),
-        (
-            {"rejected": [{"reason": "x", "n_samples": 0}]},
-            "block 3: a rejection must have at least 1 sample",
-        ),
+        ({"rejected": [{"reason": "torn", "n_samples": 10}]}, "block 3: 10 rejected, but 0"),
+        ({"rejected": [{"reason": "x", "n_samples": 0}]}, "a rejection must have at least 1"),
         (
             {"rejected": [{"reason": "x" * 10_000, "n_samples": 1}]},
             "a reason of 1 to 64 characters, got 1 and",
         ),
-        (
-            {"rejected": [{"reason": "x", "n_samples": 1}] * 100},
-            "block 3: 100 rejections, more than 32",
-        ),
+        ({"rejected": [{"reason": "x", "n_samples": 1}] * 100}, "block 3: 100 rejections, more"),
     ],
     ids=lambda value: str(value)[:40],
 )

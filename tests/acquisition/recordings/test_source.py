@@ -98,11 +98,7 @@ async def test_a_unit_finds_its_channels_by_name_wherever_they_are(record, numbe
             {},
             "channel c0 is recorded as gap_um, but configured as velocity_mm_s in unit U1",
         ),
-        (
-            machine("c0"),
-            {"power": "MW"},
-            "requires slow channel power, but the recording has slow0, slow1",
-        ),
+        (machine("c0"), {"power": "MW"}, "slow channel power, but the recording has slow0, slow1"),
         (
             machine("c0"),
             {"slow0": "mm"},

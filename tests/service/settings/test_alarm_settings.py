@@ -213,12 +213,7 @@ BETWEEN = "alert_below = 600.0, alert = 700.0"
         (ORDER1, f"{{ {OTHER} danger = 140.0 }}] }}", ".table[1].danger", "above alert = 150"),
         (ORDER1, f"{{ {OTHER} alert = -1.0 }}] }}", ".table[1].alert", "greater than 0"),
         (ORDER1, f"{{ {OTHER} alert_below = 9.0 }}] }}", ".table[1].alert_below", "not permitted"),
-        (
-            ORDER1,
-            f"{{ {OTHER} attitude_deg = [-5.0, 9.0] }}] }}",
-            ".table[1].attitude_deg",
-            "0 to 360",
-        ),
+        (ORDER1, f"{{ {OTHER} attitude_deg = [-5, 9] }}] }}", ".table[1].attitude_deg", "0 to 360"),
         (
             ORDER1,
             f"{{ {OTHER} eccentricity_ratio = [0.4, 0.3] }}] }}",

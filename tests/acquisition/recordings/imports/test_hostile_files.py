@@ -41,14 +41,8 @@ def csv_job(job: ImportJob) -> ImportJob:
         (b"time,shaft x,shaft y\n0,=1+1,2\n", "'=1+1' is not a valid number"),
         (b"time,shaft x,shaft y\nnan,1,2\n", "value nan of the time column is not a valid time"),
         (b"time,shaft x,shaft y\n1e300,1,2\n", "of the time column is not a valid time"),
-        (
-            b"time,shaft x,shaft y\n9007199254,1,2\n",
-            "time 1.07744e+10 s since 1970 is out of range",
-        ),
-        (
-            b"time,shaft x,shaft y\n0,1_000,2\n",
-            "line 2: number '1_000'",
-        ),
+        (b"time,shaft x,shaft y\n9007199254,1,2\n", "time 1.07744e+10 s since 1970 is out of"),
+        (b"time,shaft x,shaft y\n0,1_000,2\n", "line 2: number '1_000'"),
         (b"time,shaft x,shaft x\n0,1,2\n", "column 'shaft x' occurs 2 times"),
         (b"time,shaft x,shaft y\n\xff\xfe,1,2\n", "line 2: the line is not valid UTF-8"),
         (b'time,shaft x,shaft y\n"0,1,2\n' * 2, "line 4: "),
