@@ -5,7 +5,7 @@ import os
 import signal
 import socket
 import ssl
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,6 @@ import pytest
 from rigs.command_line import padwatch
 
 from .conftest import PATIENCE_S, Program, Start
-
-FindProcess = Callable[[int], int]
-Gone = Callable[[int], Awaitable[None]]
 
 
 def all_are(state: str) -> Callable[[Any], bool]:
@@ -124,8 +121,6 @@ async def test_the_service_manager_is_told_from_start_to_end(start, write_plant,
 
     assert {said for name, said in checks.items() if name.startswith("loop ")} == {"alive"}
 
-
-Write = Callable[..., Path]
 
 PASSWORD = "the river is high in may"  # noqa: S105
 

@@ -6,7 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -25,8 +25,6 @@ from service.settings.storage import Origin
 
 from .conftest import SERVING, Program, Start
 
-FindProcess = Callable[[int], int]
-Gone = Callable[[int], Awaitable[None]]
 STORMS = Path(__file__).parents[2] / "benchmarks" / "storms.py"
 PATIENCE_S = 280.0
 

@@ -27,7 +27,6 @@ from acquisition.recordings.reader import open_recording
 from acquisition.recordings.writer import RecordingWriter
 from core.samples.blocks import Rejection, SampleBlock
 
-Record = Callable[..., Path]
 Numbered = Callable[..., SampleBlock]
 
 CONFINED = """

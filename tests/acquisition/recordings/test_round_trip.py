@@ -2,7 +2,6 @@
 
 import resource
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +18,6 @@ from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.writer import RecordingWriter
 from core.machine.channel import Measurand
 from core.samples.blocks import Rejection, SampleBlock, joined
-
-Numbered = Callable[..., SampleBlock]
 
 WORDS = st.text(st.characters(codec="utf-8"), min_size=1, max_size=64)
 REJECTIONS = st.builds(Rejection, WORDS, st.integers(1, 999))

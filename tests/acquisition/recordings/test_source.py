@@ -2,9 +2,8 @@
 
 import inspect
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -22,8 +21,6 @@ from core.machine.unit import Unit
 from core.samples.blocks import Rejection, SampleBlock, joined
 from core.samples.calibration import UnitCalibration
 
-Record = Callable[[Iterable[SampleBlock]], Path]
-Numbered = Callable[..., SampleBlock]
 FOREIGN = [
     kind
     for _, kind in inspect.getmembers(pa.lib, inspect.isclass)

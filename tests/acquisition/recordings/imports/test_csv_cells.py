@@ -1,9 +1,7 @@
 """Cells of a CSV file are read as meant or refused; time stamps become indices, gaps exact."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +10,6 @@ from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ColumnName, CsvLayout, TimeAxis
 from acquisition.recordings.imports.rows import Indexer, Stretch
 
-ReadText = Callable[..., Any]
 START_NS = 1_767_225_600_000_000_000
 
 

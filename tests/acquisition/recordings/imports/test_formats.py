@@ -21,9 +21,7 @@ START_NS = 1_767_225_600_000_000_000
 START = datetime(2026, 1, 1, tzinfo=UTC)
 PER_COUNT = 12.0 / 32768 * 250.0
 
-Read = Callable[[Path, ImportJob], Any]
 Placed = Callable[..., ImportJob]
-Imported = Callable[..., Any]
 Change = Callable[[ImportJob], ImportJob]
 
 

@@ -142,7 +142,6 @@ def test_a_life_of_no_day_and_damage_to_no_bearing_are_refused():
         live(1, 0, 0.1, [Damage(DamageKind.STIFFNESS_LOSS, "GGB", 0, 0.1)])
 
 
-Day = Callable[[float], int]
 SEED = 1
 
 

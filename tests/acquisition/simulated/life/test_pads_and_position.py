@@ -102,7 +102,6 @@ def test_a_lag_comes_63_percent_of_the_way_in_its_time_and_slower_when_it_is_slo
     assert followed[19] == pytest.approx(followed[9] * np.exp(-0.1))
 
 
-Day = Callable[[float], int]
 MACHINE = machine(Measurand.ACCELERATION_M_S2)
 
 

@@ -1,6 +1,5 @@
 """What the transducers of a simulated unit, and their faults, make of the motion of the machine."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +9,11 @@ from acquisition.errors import ConfigError
 from acquisition.simulated.plant.faults import Fault, FaultInjector, FaultKind
 from acquisition.simulated.plant.plant import SimulatedPlant
 from acquisition.simulated.plant.scenario import ChannelScenario, Scenario, TransducerNoise
-from acquisition.simulated.plant.unit import SimulatedUnit
 from core.arrays import CountArray, FloatArray
 from core.machine.channel import Channel, Measurand
 from core.machine.response import HighPass, Resonance
 from core.machine.unit import Unit
 
-BuildUnit = Callable[..., SimulatedUnit]
 UJB = 0
 TURN = 400
 """Samples of one turn at 90 r/min."""

@@ -1,5 +1,4 @@
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,8 +16,6 @@ from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
 from core.spectra.lines import part_phasors, turning_factors
 from core.spectra.speed import KeyPhase, read_key_phase
-
-MachineWith = Callable[[Measurand], Unit]
 
 
 def readings(machine: Unit, scenario: Scenario, n_chunks: int = 1) -> FloatArray:

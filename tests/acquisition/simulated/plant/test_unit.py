@@ -18,8 +18,6 @@ from core.arrays import FloatArray
 from core.quality import Level
 from core.samples.blocks import SampleBlock
 
-BuildUnit = Callable[..., SimulatedUnit]
-
 
 def test_an_ordinary_day_is_the_same_in_every_version(build_unit, full_load, part_load):
     sums = [
