@@ -13,9 +13,7 @@ OIL = 'oil_temperature = "ujb_oil_temperature"\n'
 
 
 @pytest.mark.long
-async def test_a_report_is_one_printed_page_and_leads_to_a_recording(
-    new_plant, page, complaints, tmp_path
-) -> None:
+async def test_a_report_is_one_page_and_leads_to_a_recording(new_plant, page, complaints, tmp_path):
     example = tmp_path / "example.toml"
     text = DEMO.read_text(encoding="utf-8").replace(OIL, OIL + LIMIT, 1)
     example.write_text(text, encoding="utf-8")

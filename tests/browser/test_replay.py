@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Page, expect
+from playwright.async_api import expect
 from real_plant import PADWATCH, read_line, stop
 
 RECORDINGS = Path(__file__).parents[1] / "recordings"
@@ -32,8 +32,8 @@ def replayed(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterato
 
 
 async def test_the_result_of_a_replay_stays_and_its_trends_are_those_of_the_recording(
-    replayed: str, page: Page, complaints: list[str]
-) -> None:
+    replayed, page, complaints
+):
     await page.goto(replayed + "#/units/U1/bearings/UJB")
     stiffness = page.locator("[data-reading=stiffness_xx_n_per_m] .number").first
     await expect(stiffness).to_have_text("0.689")

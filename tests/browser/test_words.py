@@ -29,7 +29,7 @@ def entries(table: str, source: Path = SOURCE) -> dict[str, str]:
     return dict(ENTRY.findall(body[1]))
 
 
-def test_every_reason_has_words_and_a_sentence_and_nothing_else_has() -> None:
+def test_every_reason_has_words_and_a_sentence_and_nothing_else_has():
     reasons = entries("REASONS")
     assert reasons.keys() == {reason.value for reason in Reason} | {"service_not_reachable"}
     assert [name for name, said in reasons.items() if not WORDS_AND_SENTENCE.fullmatch(said)] == []
@@ -39,13 +39,13 @@ def test_every_reason_has_words_and_a_sentence_and_nothing_else_has() -> None:
     ("table", "codes"),
     [("STATES", AlarmState), ("CHANGES", AlarmChange)],
 )
-def test_every_code_of_an_alarm_has_words(table, codes) -> None:
+def test_every_code_of_an_alarm_has_words(table, codes):
     words = entries(table, ALARM_WORDS)
     assert words.keys() == {code.value for code in codes}
     assert all(4 < len(said) < 43 for said in words.values())
 
 
-def test_every_kind_of_alarm_has_a_label_of_its_own_that_fits_a_table() -> None:
+def test_every_kind_of_alarm_has_a_label_of_its_own_that_fits_a_table():
     labels = [kind.label for kind in ALARM_KINDS.values()]
     assert len(set(labels)) == len(labels)
     assert all(2 < len(label) < 41 and label[0].isupper() for label in labels)
@@ -62,11 +62,11 @@ def test_every_kind_of_alarm_has_a_label_of_its_own_that_fits_a_table() -> None:
         (FILM_WORDS, "STATES", {state.name.lower() for state in OperatingState}),
     ],
 )
-def test_every_other_code_has_words_and_no_word_is_left_over(source, table, codes) -> None:
+def test_every_other_code_has_words_and_no_word_is_left_over(source, table, codes):
     assert entries(table, source).keys() == codes
 
 
-def test_only_a_film_that_is_normal_looks_and_is_called_so() -> None:
+def test_only_a_film_that_is_normal_looks_and_is_called_so():
     good = {name for name, look in entries("VERDICTS", FILM_WORDS).items() if '"normal"' in look}
     normal = {name for name, look in entries("VERDICTS", FILM_WORDS).items() if "Normal" in look}
     assert good == normal == {"normal"}

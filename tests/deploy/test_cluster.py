@@ -30,7 +30,7 @@ PADWATCH = {name: one for name, one in SERVICES.items() if one["image"] == "padw
 
 
 @pytest.mark.parametrize("one", [*SERVICES.values(), ALONE], ids=[*SERVICES, "alone"])
-def test_a_container_may_do_little(one: dict[str, Any]) -> None:
+def test_a_container_may_do_little(one):
     assert re.fullmatch(r"[1-9]\d{2,}:[1-9]\d{2,}", one["user"])
     assert one["read_only"] is True
     assert one["cap_drop"] == ["ALL"]
@@ -40,9 +40,7 @@ def test_a_container_may_do_little(one: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_a_container_among_others_is_limited_and_only_one_reaches_anything_outside(
-    name: str,
-) -> None:
+def test_a_container_among_others_is_limited_and_only_one_reaches_anything_outside(name):
     outside = ["devices"] if name == "acquire" else []  # which reads devices
 
     assert SERVICES[name]["mem_limit"]
@@ -52,11 +50,11 @@ def test_a_container_among_others_is_limited_and_only_one_reaches_anything_outsi
     assert composition()["networks"]["inside"] == {"internal": True}
 
 
-def test_a_container_alone_writes_temporary_files_only_to_memory() -> None:
+def test_a_container_alone_writes_temporary_files_only_to_memory():
     assert [mount.split(":")[0] for mount in ALONE["tmpfs"]] == ["/tmp"]  # noqa: S108  in the container
 
 
-def test_secrets_are_files() -> None:
+def test_secrets_are_files():
     whole = composition()
     named = {secret for one in SERVICES.values() for secret in one.get("secrets", [])}
 
@@ -68,7 +66,7 @@ def test_secrets_are_files() -> None:
 
 
 @pytest.mark.parametrize("name", PADWATCH)
-def test_a_container_runs_a_command_that_there_is(name: str) -> None:
+def test_a_container_runs_a_command_that_there_is(name):
     command, plant_file, *options = PADWATCH[name]["command"]
     helped = CliRunner().invoke(app, [command, "--help"])
 
@@ -78,14 +76,14 @@ def test_a_container_runs_a_command_that_there_is(name: str) -> None:
     compile(PADWATCH[name]["healthcheck"]["test"][-1], name, "exec")  # its health, in Python
 
 
-def test_all_units_are_analysed_by_one_share_each() -> None:
+def test_all_units_are_analysed_by_one_share_each():
     shares = [Partition.of(PADWATCH[name]["command"][-1]) for name in PADWATCH if "analyse" in name]
     units = [f"U{number}" for number in range(1, 8)]
 
     assert sorted(unit for share in shares for unit in share.units(units)) == units
 
 
-def test_the_plant_file_names_what_the_composition_has() -> None:
+def test_the_plant_file_names_what_the_composition_has():
     plant = load_plant_file(PLANT)
 
     assert plant.stream is not None
@@ -104,14 +102,14 @@ def test_the_plant_file_names_what_the_composition_has() -> None:
     assert f"'{plant.service.socket}'" in PADWATCH["serve1"]["healthcheck"]["test"][-1]
 
 
-def test_a_block_that_is_acknowledged_is_on_the_disk() -> None:
+def test_a_block_that_is_acknowledged_is_on_the_disk():
     text = (FOLDER / "nats.conf").read_text(encoding="utf-8")
 
     assert re.search(r"^  sync_interval: always$", text, re.M)
     assert all(f"nats://{name}:6222" in text for name in ("nats1", "nats2", "nats3"))
 
 
-def test_nats_understands_its_file(tmp_path: Path) -> None:
+def test_nats_understands_its_file(tmp_path):
     own = Path(sys.executable).with_name("nats-server")
     server = str(own) if own.exists() else shutil.which("nats-server")
     if server is None:

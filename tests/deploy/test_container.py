@@ -45,7 +45,7 @@ def compose() -> Any:
     return yaml.safe_load((FOLDER / "compose.yaml").read_text(encoding="utf-8"))
 
 
-def test_every_instruction_is_one_that_engines_know() -> None:
+def test_every_instruction_is_one_that_engines_know():
     known = "FROM WORKDIR RUN COPY ENV USER VOLUME STOPSIGNAL HEALTHCHECK ENTRYPOINT CMD"
 
     assert {name for name, _ in steps()} <= set(known.split())
@@ -55,7 +55,7 @@ def test_every_instruction_is_one_that_engines_know() -> None:
     ]
 
 
-def test_everything_that_is_copied_exists_and_reaches_the_build() -> None:
+def test_everything_that_is_copied_exists_and_reaches_the_build():
     ignored = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
     allowed = [line.removeprefix("!") for line in ignored if line.startswith("!")]
     copied = [rest.split()[:-1] for name, rest in steps() if name == "COPY"]
@@ -67,7 +67,7 @@ def test_everything_that_is_copied_exists_and_reaches_the_build() -> None:
         assert any(fnmatch(source.split("/")[0], name) for name in allowed), source
 
 
-def test_third_party_packages_are_pinned_by_their_hashes() -> None:
+def test_third_party_packages_are_pinned_by_their_hashes():
     installs = [rest for name, rest in steps() if name == "RUN" and "-r requirements" in rest]
 
     assert len(installs) == 2
@@ -78,7 +78,7 @@ def test_third_party_packages_are_pinned_by_their_hashes() -> None:
         assert len(pins) == len(re.findall(r"^[a-z0-9-]+==", text, flags=re.M | re.I)) > 0
 
 
-def test_the_container_runs_the_service_as_process_one_and_not_as_root() -> None:
+def test_the_container_runs_the_service_as_process_one_and_not_as_root():
     assert re.fullmatch(r"[1-9]\d{3,}:[1-9]\d{3,}", last("USER"))
     assert compose()["services"]["padwatch"]["user"] == last("USER")
     assert json.loads(last("ENTRYPOINT")) == ["padwatch"]
@@ -109,9 +109,7 @@ def health() -> Iterator[HTTPServer]:
 
 
 @pytest.mark.parametrize(("status", "is_healthy"), [(200, True), (503, False), (404, False)])
-def test_the_health_check_fails_unless_the_service_is_ready(
-    health: HTTPServer, status: int, is_healthy: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_health_check_fails_without_a_ready_service(health, status, is_healthy, monkeypatch):
     monkeypatch.setattr(Health, "status", status)
     python, option, script = health_command()
     assert (python, option) == ("python", "-c")
@@ -123,14 +121,14 @@ def test_the_health_check_fails_unless_the_service_is_ready(
     assert (done.returncode == 0) is is_healthy
 
 
-def test_the_composed_service_is_reached_from_the_host_only() -> None:
+def test_the_composed_service_is_reached_from_the_host_only():
     assert compose()["services"]["padwatch"]["network_mode"] == "host"
     plant = load_plant_file(ROOT / "deploy" / "plant.toml")
     assert plant.service.host == "127.0.0.1"
     assert plant.service.port == 8080  # where the health check looks
 
 
-def test_everything_that_the_composition_names_exists() -> None:
+def test_everything_that_the_composition_names_exists():
     found = compose()
     service = found["services"]["padwatch"]
     context = (FOLDER / service["build"]["context"]).resolve()

@@ -114,9 +114,7 @@ async def answer(port: int, sent: bytes) -> tuple[int, bytes, bytes]:
 GET = b"GET / HTTP/1.1\r\nHost: padwatch.example\r\nConnection: close\r\n"
 
 
-async def test_the_proxy_passes_on_who_asks_and_refuses_what_is_no_request(
-    tmp_path: Path, certificate: tuple[Path, Path]
-) -> None:
+async def test_the_proxy_passes_on_who_asks_and_refuses_what_is_no_request(tmp_path, certificate):
     async with proxied(tmp_path, certificate) as port:
         status, _, body = await answer(port, GET + b"X-Forwarded-For: 192.0.2.7\r\n\r\n")
         assert status == 200
@@ -141,9 +139,7 @@ async def test_the_proxy_passes_on_who_asks_and_refuses_what_is_no_request(
             assert len(body) <= 2048
 
 
-async def test_the_proxy_closes_a_connection_whose_head_never_ends(
-    tmp_path: Path, certificate: tuple[Path, Path]
-) -> None:
+async def test_the_proxy_closes_a_connection_whose_head_never_ends(tmp_path, certificate):
     async with proxied(tmp_path, certificate) as port:
         for sent in (b"", b"GET / HTTP/1.1\r\nHo"):
             assert (await answer(port, sent))[0] in (0, 408)

@@ -34,14 +34,14 @@ def settings(name: str) -> dict[str, list[str]]:
     return found
 
 
-def test_there_is_a_service_in_one_or_several_processes_and_a_backup_every_night() -> None:
+def test_there_is_a_service_in_one_or_several_processes_and_a_backup_every_night():
     roles = ["padwatch-acquire.service", "padwatch-analyse@.service", "padwatch-serve.service"]
     assert sorted(["padwatch.service", "padwatch-backup.service", *roles]) == SERVICES
     assert settings("padwatch-backup.timer")["OnCalendar"]
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_a_service_is_hardly_exposed(name: str, tmp_path: Path) -> None:
+def test_a_service_is_hardly_exposed(name, tmp_path):
     instance = tmp_path / name.replace("@", "@1-2")
     instance.write_bytes((UNITS / name).read_bytes())
 
@@ -53,7 +53,7 @@ def test_a_service_is_hardly_exposed(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", [*SERVICES, "padwatch-backup.timer"])
-def test_systemd_understands_every_line_of_a_unit(name: str, tmp_path: Path) -> None:
+def test_systemd_understands_every_line_of_a_unit(name, tmp_path):
     for path in UNITS.glob("padwatch*.*"):
         text = path.read_text(encoding="utf-8")
         text = re.sub(r"^ExecStart=\S+", "ExecStart=/bin/true", text, flags=re.MULTILINE)
@@ -68,7 +68,7 @@ def test_systemd_understands_every_line_of_a_unit(name: str, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_a_service_runs_a_command_that_there_is(name: str) -> None:
+def test_a_service_runs_a_command_that_there_is(name):
     (line,) = settings(name)["ExecStart"]
     program, command, *options = shlex.split(line)
     helped = CliRunner().invoke(app, [command, "--help"])
@@ -78,7 +78,7 @@ def test_a_service_runs_a_command_that_there_is(name: str) -> None:
     assert all(option in helped.output for option in options if option.startswith("--"))
 
 
-def test_the_end_of_the_serving_process_is_left_to_the_measuring_one() -> None:
+def test_the_end_of_the_serving_process_is_left_to_the_measuring_one():
     found = settings("padwatch.service")
 
     assert found["KillMode"] == ["mixed"]
@@ -86,7 +86,7 @@ def test_the_end_of_the_serving_process_is_left_to_the_measuring_one() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in SERVICES if name != "padwatch-backup.service"])
-def test_the_service_is_watched_and_begins_anew(name: str) -> None:
+def test_the_service_is_watched_and_begins_anew(name):
     found = settings(name)
 
     assert found["Type"] == ["notify"]
@@ -95,7 +95,7 @@ def test_the_service_is_watched_and_begins_anew(name: str) -> None:
     assert found["User"] == ["padwatch"]
 
 
-def test_the_user_of_the_services_is_made(tmp_path: Path) -> None:
+def test_the_user_of_the_services_is_made(tmp_path):
     (tmp_path / "etc").mkdir()
     said = systemd("systemd-sysusers", f"--root={tmp_path}", str(UNITS / "padwatch.sysusers.conf"))
 
@@ -116,14 +116,14 @@ GUIDE = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
     ],
     ids=["in the package", "in the checkout"],
 )
-def test_every_file_that_is_named_is_there(where: str, folder: str, known: str) -> None:
+def test_every_file_that_is_named_is_there(where, folder, known):
     named = set(re.findall(where, GUIDE))
 
     assert known in named
     assert [name for name in named if not (ROOT / folder / name).is_file()] == []
 
 
-def test_every_command_that_is_typed_is_one_of_padwatch() -> None:
+def test_every_command_that_is_typed_is_one_of_padwatch():
     typed = set(re.findall(r"/bin/padwatch ([a-z]+(?: (?:check|example))?)", GUIDE))
 
     assert {"validate", "config example", "config check", "restore"} <= typed

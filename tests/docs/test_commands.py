@@ -53,12 +53,12 @@ def parsed(arguments: list[str]) -> None:
             raise AssertionError(f"{name} {arguments}: {refusal}") from refusal
 
 
-def test_command_lines_in_examples_are_taken(page: Path) -> None:
+def test_command_lines_in_examples_are_taken(page):
     for arguments in lines(page.read_text(encoding="utf-8")):
         parsed(arguments)
 
 
-def test_commands_named_in_sentences_exist(page: Path) -> None:
+def test_commands_named_in_sentences_exist(page):
     text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
     for words in INLINE.findall(text):
         command = command_line()
@@ -88,7 +88,7 @@ def anchors_of(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-def test_links_on_pages_lead_somewhere(page: Path) -> None:
+def test_links_on_pages_lead_somewhere(page):
     for link in LINK.findall(text_of(page)):
         path, _, anchor = unquote(link).partition("#")
         target = (page.parent / path).resolve() if path else page
@@ -99,7 +99,7 @@ def test_links_on_pages_lead_somewhere(page: Path) -> None:
             assert anchor in anchors_of(target), f"{link}: no such heading; {anchors_of(target)}"
 
 
-def test_images_have_words_for_those_who_cannot_see_them(page: Path) -> None:
+def test_images_have_words_for_those_who_cannot_see_them(page):
     for words, image in re.findall(r"!\[([^\]]*)\]\(([^)]+)\)", text_of(page)):
         assert words, f"{image} has no words"
 
@@ -113,7 +113,7 @@ def filled_page(name: str) -> str:
     return filled((REFERENCE / name).read_text(encoding="utf-8"))
 
 
-def test_the_page_about_alarms_lists_every_kind() -> None:
+def test_the_page_about_alarms_lists_every_kind():
     page = filled_page("../how-to/alarms.md")
     table = page.partition("| Alarm | Subject |")[2].partition("\n\n")[0]
     cells = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
@@ -135,9 +135,7 @@ def chapter(page: str, model: str) -> str:
     ],
     ids=["plant file", "import mapping"],
 )
-def test_every_key_is_explained_with_its_limits_and_default(
-    name: str, schema: dict[str, Any]
-) -> None:
+def test_every_key_is_explained_with_its_limits_and_default(name, schema):
     page = filled_page(name)
     assert "<!-- made when built" not in page
     tables = {schema["title"]: schema, **schema["$defs"]}
@@ -158,7 +156,7 @@ def test_every_key_is_explained_with_its_limits_and_default(
                     )
 
 
-def test_every_command_is_on_the_page_of_commands() -> None:
+def test_every_command_is_on_the_page_of_commands():
     from padwatch_reference.commands import commands
 
     page = filled_page("commands.md")
@@ -171,7 +169,7 @@ def test_every_command_is_on_the_page_of_commands() -> None:
             assert record is None or f"`{record[0]}`".replace("|", "\\|") in page
 
 
-def test_every_command_has_help_in_which_no_word_is_lost() -> None:
+def test_every_command_has_help_in_which_no_word_is_lost():
     from padwatch_reference.commands import commands
 
     for name, command, _ in commands():

@@ -38,7 +38,7 @@ def run_some(name: str, n_runs: int = N_RUNS) -> dict[tuple[str, str], list[Esti
 
 
 @pytest.mark.parametrize("name", ["balanced-0.5", "balanced-3", "crossed"])
-def test_a_balanced_machine_with_runout_shows_all_eight_coefficients(name: str) -> None:
+def test_a_balanced_machine_with_runout_shows_all_eight_coefficients(name):
     row = ROWS[name]
     for (bearing, figure), given in run_some(name).items():
         limit = row.limits_of(figure).mean
@@ -51,7 +51,7 @@ def test_a_balanced_machine_with_runout_shows_all_eight_coefficients(name: str) 
 
 
 @pytest.mark.parametrize("condition", range(1, 6))
-def test_the_papers_conditions_are_found_within_a_percent_in_five_minutes(condition: int) -> None:
+def test_the_papers_conditions_are_found_within_a_percent_in_five_minutes(condition):
     row = ROWS[f"paper-{condition}"]
     found = spectra(replace(row.run, duration_s=SHORT_S), 1)
 
@@ -62,7 +62,7 @@ def test_the_papers_conditions_are_found_within_a_percent_in_five_minutes(condit
             assert limit is None or abs(estimate.error) <= limit, f"{bearing} {estimate.name}"
 
 
-def test_little_excitation_gives_wide_intervals_and_runout_misleads_equation_5_alone() -> None:
+def test_little_excitation_gives_wide_intervals_and_runout_misleads_equation_5_alone():
     quiet, loud = run_some("quiet-3", 1), run_some("balanced-3", 1)
 
     held = [e.covered for (_, name), given in quiet.items() for e in given if "dynamic" in name]
@@ -78,14 +78,14 @@ def test_little_excitation_gives_wide_intervals_and_runout_misleads_equation_5_a
 
 
 @pytest.mark.parametrize("name", ["still-standing", "still-balanced", "still-dead-probe"])
-def test_a_machine_that_is_not_shaken_never_shows_a_stiffness(name: str) -> None:
+def test_a_machine_that_is_not_shaken_never_shows_a_stiffness(name):
     row = ROWS[name]
     for (bearing, figure), given in run_some(name, 1).items():
         if row.limits_of(figure).silent:
             assert all(math.isnan(e.error) for e in given), f"{bearing} {figure}"
 
 
-def test_a_corner_of_half_a_hertz_and_a_speed_that_wanders_read_true() -> None:
+def test_a_corner_of_half_a_hertz_and_a_speed_that_wanders_read_true():
     corrected, uncorrected = (_at_vortex(ROWS[name]) for name in ("corner", "corner-uncorrected"))
 
     # 5 minutes, one run: stated 2.8 % at random.
@@ -103,7 +103,7 @@ def _at_vortex(row: Row) -> Estimate:
     return next(e for e in given if e.name == "transfer vortex k_xx")
 
 
-def test_intervals_hold_the_truth_when_gains_and_brackets_are_off() -> None:
+def test_intervals_hold_the_truth_when_gains_and_brackets_are_off():
     drawn, exact = run_some("coverage", 3), run_some("coverage-random", 3)
     names = [key for key in drawn if key[1].endswith(("k_xx", "k_yy"))]
 

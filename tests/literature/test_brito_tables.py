@@ -20,14 +20,14 @@ def row_name(row: Row) -> str:
 
 
 @pytest.mark.parametrize("row", simulated_rows(), ids=row_name)
-def test_every_amplitude_of_tables_4_to_7_is_reproduced(row: Row) -> None:
+def test_every_amplitude_of_tables_4_to_7_is_reproduced(row):
     # Printed to 0.1 µm, so a figure of 4.2 µm is known to 1.2 %; and the paper read its amplitudes
     # from noisy time signals, which shows as differences of up to 1 % between x and y of isotropic
     # conditions (Table 5, condition 3). Together 2 %.
     assert row.padwatch == pytest.approx(row.paper, rel=0.02)
 
 
-def test_the_errors_of_tables_4_to_7_scatter_like_rounding() -> None:
+def test_the_errors_of_tables_4_to_7_scatter_like_rounding():
     rows = simulated_rows()
 
     assert len({row_name(row) for row in rows}) == 80
@@ -36,16 +36,14 @@ def test_the_errors_of_tables_4_to_7_scatter_like_rounding() -> None:
 
 
 @pytest.mark.parametrize("measured", paper.MEASURED, ids=lambda m: f"{m.bearing} {m.condition}")
-def test_equation_5_gives_the_measured_stiffnesses_as_far_as_their_digits_go(
-    measured: paper.MeasuredRow,
-) -> None:
+def test_equation_5_gives_the_measured_stiffnesses_as_far_as_their_digits_go(measured):
     lowest, highest = rounding_limits_gn_per_m(measured)
 
     # No further tolerance: half a unit of the last digit of each of the three printed figures.
     assert lowest <= float(measured.k_eff_gn_per_m) <= highest
 
 
-def test_the_two_stiffnesses_of_section_3_2_follow_to_their_last_digit() -> None:
+def test_the_two_stiffnesses_of_section_3_2_follow_to_their_last_digit():
     vortex = {row.bearing: row for row in measured_rows() if row.table == "3.2"}
 
     # Printed to 0.01 GN/m.
@@ -68,8 +66,8 @@ def test_the_two_stiffnesses_of_section_3_2_follow_to_their_last_digit() -> None
     ],
 )
 def test_what_equation_5_estimates_lies_within_a_percent_of_the_papers_estimate(
-    bearing: str, condition: int, k_eff_gn_per_m: float
-) -> None:
+    bearing, condition, k_eff_gn_per_m
+):
     row = paper.SIMULATED[bearing][condition]
     film = Film.proportional(row.k_xx_gn_per_m * 1e9, row.k_yy_gn_per_m * 1e9)
 

@@ -162,9 +162,7 @@ def worker() -> str:
 
 
 @pytest.fixture(scope="session")
-def postgres_server(
-    tmp_path_factory: pytest.TempPathFactory, worker: str
-) -> Iterator[PostgresServer]:
+def postgres_server(tmp_path_factory, worker) -> Iterator[PostgresServer]:
     """A server that all tests of a run share, with a database that is up to date."""
     why = why_not()
     if why is not None:
@@ -181,9 +179,7 @@ def make_template(server: PostgresServer) -> None:
 
 
 @pytest.fixture
-def postgres_place(
-    postgres_server: PostgresServer, tmp_path: Path, worker: str
-) -> Iterator[PostgresPlace]:
+def postgres_place(postgres_server, tmp_path, worker) -> Iterator[PostgresPlace]:
     """A fresh database."""
     name = f"padwatch_{worker}_{next(NUMBERS)}"
     postgres_server.create(name, TEMPLATE)

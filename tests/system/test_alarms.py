@@ -1,7 +1,7 @@
 """A lost probe becomes an alarm of the running service and stays known."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from core.samples.blocks import SampleBlock
 from service.measuring.simulated_sources import simulated_feed
 from service.settings.loading import load_plant_file
 
-from .conftest import WIRE, Start
+from .conftest import WIRE
 
 PROBE = "U1:ujb_shaft_x:channel_not_ok"
 LINK = "U1:link:link_lost"
@@ -78,8 +78,8 @@ def by_id(answer: Any) -> dict[str, Any]:
 
 
 async def test_a_lost_probe_outlives_a_lost_link_and_its_samples_are_kept(
-    start: Start, tmp_path: Path, demo_file: Path, write_plant: Callable[..., Path]
-) -> None:
+    start, tmp_path, demo_file, write_plant
+):
     folder = tmp_path / "data"
     feed = BreakableFeed(simulated_feed(load_plant_file(demo_file).unit[0], SystemClock()))
     async with plugged_in(feed) as port:

@@ -5,7 +5,7 @@ import os
 import signal
 import socket
 import ssl
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,6 @@ import pytest
 from rigs.command_line import padwatch
 
 from .conftest import PATIENCE_S, Program, Start
-
-FindProcess = Callable[[int], int]
-Gone = Callable[[int], Awaitable[None]]
 
 
 def all_are(state: str) -> Callable[[Any], bool]:
@@ -34,8 +31,8 @@ async def demo(start: Start, tmp_path: Path) -> AsyncIterator[Program]:
 
 
 async def test_the_demo_ends_with_ctrl_c_in_order_and_takes_its_children_along(
-    demo: Program, tmp_path: Path, daq_of: FindProcess, serving_of: FindProcess, gone: Gone
-) -> None:
+    demo, tmp_path, daq_of, serving_of, gone
+):
     daq, serving = daq_of(demo.pid), serving_of(demo.pid)
     while not list((tmp_path / "data").rglob("configurations")):  # kept by a task of its own
         await asyncio.sleep(0.05)
@@ -50,9 +47,7 @@ async def test_the_demo_ends_with_ctrl_c_in_order_and_takes_its_children_along(
     assert not any(kept.values()), "somebody else may look into it"
 
 
-async def test_a_service_that_is_killed_leaves_no_process_behind(
-    demo: Program, daq_of: FindProcess, serving_of: FindProcess, gone: Gone
-) -> None:
+async def test_a_service_that_is_killed_leaves_no_process_behind(demo, daq_of, serving_of, gone):
     daq, serving = daq_of(demo.pid), serving_of(demo.pid)
 
     demo.kill()
@@ -61,9 +56,7 @@ async def test_a_service_that_is_killed_leaves_no_process_behind(
     await gone(serving)
 
 
-async def test_a_daq_that_is_killed_leaves_numbers_that_are_not_current(
-    demo: Program, daq_of: FindProcess
-) -> None:
+async def test_a_daq_that_is_killed_leaves_numbers_that_are_not_current(demo, daq_of):
     await demo.until("/api/v1/units", all_are("connected"))
     assert (await demo.get("/readyz"))["status"] == "ok"
     daq = daq_of(demo.pid)
@@ -117,9 +110,7 @@ async def manager(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncItera
         await asyncio.wait([manager.listening])
 
 
-async def test_the_service_manager_is_told_from_the_start_to_the_end(
-    start: Any, write_plant: Callable[..., Path], tmp_path: Path, manager: Manager
-) -> None:
+async def test_the_service_manager_is_told_from_start_to_end(start, write_plant, tmp_path, manager):
     program = await start("run", str(write_plant(tmp_path)), "--port", "0")
     await program.wait_for_url()
     await manager.until(lambda told: f"READY=1\n{STATUS}" in told)
@@ -131,8 +122,6 @@ async def test_the_service_manager_is_told_from_the_start_to_the_end(
     assert {said for name, said in checks.items() if name.startswith("loop ")} == {"alive"}
 
 
-Write = Callable[..., Path]
-
 PASSWORD = "the river is high in may"  # noqa: S105
 
 
@@ -143,8 +132,8 @@ def tls(certificate: tuple[Path, Path]) -> str:
 
 
 async def test_over_tls_a_trusted_service_lets_the_first_account_be_made_with_what_it_prints(
-    start: Start, write_plant: Write, tmp_path: Path, certificate: tuple[Path, Path], tls: str
-) -> None:
+    start, write_plant, tmp_path, certificate, tls
+):
     plant = write_plant(tmp_path, tables=f"{tls}[access]\nlogin = true\n")
     service = await start("run", str(plant), "--port", "0")
     url = await service.wait_for_url()
@@ -169,9 +158,7 @@ async def test_over_tls_a_trusted_service_lets_the_first_account_be_made_with_wh
     assert token not in service.errors
 
 
-async def test_on_a_socket_everybody_logs_in_and_the_proxy_says_who_it_speaks_for(
-    start: Start, write_plant: Write, tmp_path: Path
-) -> None:
+async def test_on_a_socket_all_log_in_and_the_proxy_names_its_client(start, write_plant, tmp_path):
     path = tmp_path / "http.sock"
     service = await start("run", str(write_plant(tmp_path, service=f'socket = "{path}"\n')))
     assert await service.wait_for_url() == f"unix:{path}"
@@ -192,9 +179,7 @@ async def test_on_a_socket_everybody_logs_in_and_the_proxy_says_who_it_speaks_fo
     assert not path.exists()
 
 
-def test_for_others_nothing_starts_without_an_account(
-    write_plant: Write, tmp_path: Path, tls: str
-) -> None:
+def test_for_others_nothing_starts_without_an_account(write_plant, tmp_path, tls):
     plant = write_plant(tmp_path, tables=tls)
     text = plant.read_text(encoding="utf-8").replace('"127.0.0.1"', '"0.0.0.0"', 1)
     plant.write_text(text, encoding="utf-8")

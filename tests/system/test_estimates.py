@@ -80,9 +80,7 @@ def part_load(plant: PlantFile) -> list[Assessment]:
     return watch(plant, plant.unit[0])
 
 
-def test_every_film_coefficient_lies_in_its_interval(
-    plant: PlantFile, part_load: list[Assessment]
-) -> None:
+def test_every_film_coefficient_lies_in_its_interval(plant, part_load):
     """The simulated transducers and brackets are exact, so the random part alone must cover."""
     assert plant.unit[0].simulation is not None
     films = scenario_of(plant.unit[0].simulation).bearings
@@ -101,9 +99,7 @@ def test_every_film_coefficient_lies_in_its_interval(
             assert reading.u_random < 0.01 * scale
 
 
-def test_the_estimators_agree_within_their_uncertainty_and_the_preferred_one_is_named(
-    part_load: list[Assessment],
-) -> None:
+def test_the_estimators_agree_within_their_uncertainty_and_the_preferred_one_is_named(part_load):
     for assessment in part_load:
         assert assessment.estimators == {"xx": Estimator.DYNAMIC, "yy": Estimator.DYNAMIC}
         for axes in ("xx", "yy"):
@@ -119,7 +115,7 @@ def test_the_estimators_agree_within_their_uncertainty_and_the_preferred_one_is_
             assert preferred == found[Estimator.DYNAMIC]
 
 
-def test_a_reversed_transducer_is_a_reason_and_equation_5_stays(plant: PlantFile) -> None:
+def test_a_reversed_transducer_is_a_reason_and_equation_5_stays(plant):
     """Both shaft probes of the UJB, and one bearing transducer of the LJB."""
     upper, lower, _ = plant.unit[0].bearing
     reversed_channels = {upper.shaft_x, upper.shaft_y, lower.bearing_y}
@@ -142,7 +138,7 @@ def test_a_reversed_transducer_is_a_reason_and_equation_5_stays(plant: PlantFile
         assert set(assessment.budgets) <= {n for n, r in assessment.readings.items() if r.value}
 
 
-def test_a_kaplan_unit_has_no_vortex_order(plant: PlantFile) -> None:
+def test_a_kaplan_unit_has_no_vortex_order(plant):
     kaplan = plant.unit[0].model_copy(update={"turbine": "kaplan"})
     for assessment in watch(plant, kaplan, minutes=1):
         for name, reading in assessment.readings.items():
@@ -150,7 +146,7 @@ def test_a_kaplan_unit_has_no_vortex_order(plant: PlantFile) -> None:
                 assert reading.quality == bad(Reason.SWITCHED_OFF), name
 
 
-def test_a_budget_adds_up_to_the_uncertainty_that_is_stated(part_load: list[Assessment]) -> None:
+def test_a_budget_adds_up_to_the_uncertainty_that_is_stated(part_load):
     assessment = part_load[0]
     assert set(assessment.budgets) == {
         name
@@ -174,9 +170,7 @@ def with_bearings(unit: UnitSettings, **changes: object) -> UnitSettings:
     return unit.model_copy(update={"bearing": bearings})
 
 
-def test_a_wrong_bracket_mass_shows_as_lack_of_fit_and_what_stands_in_is_doubted(
-    plant: PlantFile,
-) -> None:
+def test_a_wrong_bracket_mass_shows_as_lack_of_fit_and_what_stands_in_is_doubted(plant):
     """Without the bracket's inertia a film seems to stiffen with frequency: said, not hidden."""
     for assessment in watch(plant, with_bearings(plant.unit[0], bracket_mass_kg=1.0)):
         reading = assessment.readings["dynamic_k_xx_n_per_m"]
@@ -184,9 +178,7 @@ def test_a_wrong_bracket_mass_shows_as_lack_of_fit_and_what_stands_in_is_doubted
         assert assessment.readings["stiffness_xx_n_per_m"].quality.level is Level.UNCERTAIN
 
 
-def test_a_bracket_mass_that_is_not_given_is_found_with_the_film(
-    plant: PlantFile, base: Scenario
-) -> None:
+def test_a_bracket_mass_that_is_not_given_is_found_with_the_film(plant, base):
     masses = {bearing.id: bearing.bracket_mass_kg for bearing in plant.unit[0].bearing}
     for assessment in watch(plant, with_bearings(plant.unit[0], bracket_mass_kg=None)):
         mass = assessment.readings["dynamic_bracket_mass_kg"]
@@ -200,9 +192,7 @@ def test_a_bracket_mass_that_is_not_given_is_found_with_the_film(
         assert stiffness.u_random < 0.01 * true
 
 
-def test_a_corner_that_the_plant_file_does_not_know_leaves_no_stiffness_good(
-    plant: PlantFile, base: Scenario
-) -> None:
+def test_a_corner_that_the_plant_file_does_not_know_leaves_no_stiffness_good(plant, base):
     """Transducers with a corner of 0.5 Hz: dynamic and transfer differ in damping threefold."""
     machine = machine_of(plant.unit[0])
     corner = ChannelScenario(response=HighPass(0.5))
@@ -217,9 +207,7 @@ def test_a_corner_that_the_plant_file_does_not_know_leaves_no_stiffness_good(
         assert transfer.quality.reason is Reason.ESTIMATORS_DISAGREE
 
 
-def test_bearing_channels_one_sample_late_are_noticed_and_put_right_in_the_plant_file(
-    plant: PlantFile, base: Scenario
-) -> None:
+def test_bearing_channels_one_sample_late_are_noticed_and_put_right_in_the_plant_file(plant, base):
     """A sample of 600 Hz makes damping read 13 % low."""
     unit = plant.unit[0]
     late = watch(plant, unit, 4, late=1)

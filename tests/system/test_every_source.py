@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,6 @@ from rigs.tiers import fast_and_long
 from acquisition.clock import SystemClock
 from service.measuring.sources import source_of
 from service.settings.loading import load_plant_file
-
-from .conftest import Start
 
 RECORDED_PLANT = Path(__file__).parents[1] / "recordings" / "plant.toml"
 CHANNELS = ("ujb_shaft_x", "ujb_shaft_y", "ujb_bearing_x", "ujb_bearing_y")
@@ -101,9 +99,7 @@ def plant_file(
 
 
 @pytest.mark.parametrize("ids", fast_and_long(ONE_OF_EACH, EVERY_ONE), ids=len)
-async def test_the_service_reads_every_kind_of_source_over_every_wire(
-    start: Start, tmp_path: Path, ids: Sequence[str]
-) -> None:
+async def test_the_service_reads_every_kind_of_source_over_every_wire(start, tmp_path, ids):
     daq = await start("daq", str(plant_file(tmp_path, ids)))
     found = json.loads(await daq.process.stdout.readline())
     program = await start("run", str(plant_file(tmp_path, ids, found)), "--port", "0")
@@ -141,9 +137,7 @@ async def speed_is_right(program: Any, unit: str) -> None:
     assert latest["readings"]["speed_rpm"]["value"] == pytest.approx(92.3, rel=0.02)
 
 
-async def test_all_machines_of_a_daq_begin_when_it_begins_to_serve(
-    start: Callable, tmp_path: Path, demo_file: Path
-) -> None:
+async def test_all_machines_of_a_daq_begin_when_it_begins_to_serve(start, tmp_path, demo_file):
     """Making each takes a while; the first must not look as if its clock were behind for that."""
     daq = await start("daq", str(demo_file))
     endpoints = json.loads(await daq.process.stdout.readline())

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from .conftest import Program, Start
+from .conftest import Program
 
 ROOT = Path(__file__).parents[2]
 LOSS = 0.3
@@ -53,8 +53,8 @@ async def acknowledge_as_in_the_tutorial(program: Program) -> None:
 @pytest.mark.long
 @pytest.mark.timeout(3000)
 async def test_a_film_that_loses_stiffness_in_the_machine_is_an_alarm_at_the_api_and_no_other_is(
-    start: Start, tmp_path: Path
-) -> None:
+    start, tmp_path
+):
     program = await start("demo", "--port", "0", "--data-folder", str(tmp_path / "data"))
     await program.wait_for_url(PATIENCE_S)
     before = await program.get("/api/v1/alarms")

@@ -11,7 +11,7 @@ PATIENCE_S = 280.0
 
 
 @pytest.mark.long
-def test_nothing_made_up_is_taken_for_a_valid_request_or_breaks_the_service() -> None:
+def test_nothing_made_up_is_taken_for_a_valid_request_or_breaks_the_service():
     short = ["--examples", "1", "--phases", "examples,fuzzing", "--past-years", "0", "--no-daq"]
     command = [sys.executable, str(FUZZ), *short, "--seed", "7", "--roles", "admin"]
 

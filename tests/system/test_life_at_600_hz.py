@@ -60,7 +60,7 @@ def verdicts(day: Day) -> tuple[Verdicts, Verdicts]:
     return given, mixed
 
 
-def test_stiffness_off_samples_is_that_of_readings_within_its_uncertainty(day: Day) -> None:
+def test_stiffness_off_samples_is_that_of_readings_within_its_uncertainty(day):
     numbers = (*AROUND_CHANGE, *AFTER_DAMAGE)
     sampled = [[v for reading in day.mixed[n] for v in reading.values] for n in numbers]
     exact = without_scatter(day.life, [day.rows[n] for n in numbers]).T
@@ -73,9 +73,7 @@ def test_stiffness_off_samples_is_that_of_readings_within_its_uncertainty(day: D
     assert np.max(np.abs(ratio)) < 5.0
 
 
-def test_the_condition_change_raises_nothing_and_the_loss_is_announced_at_the_same_place(
-    verdicts: tuple[Verdicts, Verdicts],
-) -> None:
+def test_the_condition_change_raises_nothing_and_the_loss_is_announced_at_the_same_place(verdicts):
     given, mixed = verdicts
     for place in given.said:
         first, again = given.first_alarm(place), mixed.first_alarm(place)

@@ -6,7 +6,7 @@ import math
 import os
 import re
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -98,7 +98,7 @@ async def alarm_events(program: Any) -> list[dict[str, Any]]:
     return sorted(events, key=lambda event: (event["alarm"], event["number"]))
 
 
-def test_a_replayed_run_gives_the_known_trends_over_http(straight: dict[str, Any]) -> None:
+def test_a_replayed_run_gives_the_known_trends_over_http(straight):
     for unit, answer in straight["trends"].items():
         expected = known(unit)
         # between results that are far apart the API says that there is a hole
@@ -117,7 +117,7 @@ def test_a_replayed_run_gives_the_known_trends_over_http(straight: dict[str, Any
             assert all(series["mean"][row] is None for row in holes)
 
 
-def test_the_known_stiffness_is_the_films(straight: dict[str, Any]) -> None:
+def test_the_known_stiffness_is_the_films(straight):
     """The known results are judged by what was simulated, not only by themselves."""
     for name in ("dynamic_k_xx_n_per_m", "dynamic_k_yy_n_per_m"):
         mean = straight["trends"]["U1"]["series"][name]["mean"]
@@ -126,9 +126,7 @@ def test_the_known_stiffness_is_the_films(straight: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("wire", WIRES)
-async def test_every_wire_gives_the_same_results_to_the_last_bit(
-    start: Start, straight: dict[str, Any], wire: str
-) -> None:
+async def test_every_wire_gives_the_same_results_to_the_last_bit(start, straight, wire):
     assert await told(await played(start, "--speed", "0", "--through", wire)) == straight
     assert straight["origin"] == "replay"
     assert [(event["alarm"], event["change"]) for event in straight["alarms"]] == [
@@ -139,14 +137,12 @@ async def test_every_wire_gives_the_same_results_to_the_last_bit(
 
 
 @pytest.mark.parametrize("speed", fast_and_long("50", "1"))
-async def test_a_run_gives_the_same_results_at_any_speed(
-    start: Start, straight: dict[str, Any], speed: str
-) -> None:
+async def test_a_run_gives_the_same_results_at_any_speed(start, straight, speed):
     paced = await played(start, "--speed", speed, runs=("U2",))
     assert await trends(paced, "U2") == straight["trends"]["U2"]
 
 
-def test_a_replay_prints_the_stiffness_of_each_film_with_its_uncertainty(tmp_path: Path) -> None:
+def test_a_replay_prints_the_stiffness_of_each_film_with_its_uncertainty(tmp_path):
     command = ("replay", RECORDINGS / "part_load", "--plant", RECORDINGS / "plant.toml")
     done = padwatch_program(*command, "--speed", "0", "--out", tmp_path / "results")
 
@@ -159,7 +155,7 @@ def test_a_replay_prints_the_stiffness_of_each_film_with_its_uncertainty(tmp_pat
         assert abs(float(found[1]) - FILM_GN_PER_M) < float(found[2])
 
 
-async def test_the_last_result_stays_when_a_replay_has_ended(start: Start) -> None:
+async def test_the_last_result_stays_when_a_replay_has_ended(start):
     program = await played(start, "--speed", "0", runs=("U1",))
 
     latest = await program.get("/api/v1/units/U1/bearings/UJB/latest")
@@ -168,9 +164,7 @@ async def test_the_last_result_stays_when_a_replay_has_ended(start: Start) -> No
     assert reading["value"] == pytest.approx(FILM_GN_PER_M * 1e9, rel=0.1)
 
 
-def test_a_replay_that_only_shall_be_stored_ends_by_itself_and_is_mixed_with_nothing_else(
-    tmp_path: Path,
-) -> None:
+def test_a_replay_that_only_shall_be_stored_ends_by_itself_and_is_mixed_with_nothing_else(tmp_path):
     plant, results = RECORDINGS / "plant.toml", tmp_path / "results"
     command = ("replay", RECORDINGS / "full_load", "--plant", plant, "--speed", "0")
     done = padwatch_program(*command, "--out", results, "--json")
@@ -192,9 +186,7 @@ def test_a_replay_that_only_shall_be_stored_ends_by_itself_and_is_mixed_with_not
     assert "holds replay results and cannot be used for live ones" in refused.stderr
 
 
-async def test_a_replay_whose_daq_is_killed_ends_and_says_that_results_are_incomplete(
-    start: Start, daq_of: Callable[[int], int]
-) -> None:
+async def test_a_replay_whose_daq_is_killed_ends_and_says_results_are_incomplete(start, daq_of):
     program = await start(
         *("replay", str(RECORDINGS / "full_load"), "--plant", str(RECORDINGS / "plant.toml")),
         *("--speed", "0.1", "--through", "modbus_tcp", "--out", "results"),

@@ -134,9 +134,7 @@ def with_channels(unit: Unit, **changes: object) -> Unit:
     return replace(unit, channels=channels)
 
 
-def test_equation_5_reads_the_film_only_when_runout_of_this_probe_is_taken_off(
-    unit: Unit, blocks: list[SampleBlock]
-) -> None:
+def test_equation_5_reads_the_film_only_when_runout_of_this_probe_is_taken_off(unit, blocks):
     unit = with_runout_limit(unit, 0.0)
     found = upper(unit, blocks)
     bare = upper(with_channels(unit, slow_roll=None), blocks)
@@ -160,9 +158,7 @@ def test_equation_5_reads_the_film_only_when_runout_of_this_probe_is_taken_off(
     assert speed_rpm == pytest.approx(blocks[-7].slow["speed"].value, rel=2e-4)
 
 
-def test_runout_that_is_taken_off_no_longer_silences_the_line(
-    unit: Unit, blocks: list[SampleBlock]
-) -> None:
+def test_runout_that_is_taken_off_no_longer_silences_the_line(unit, blocks):
     told = with_runout_limit(unit, 10.0)
     silent = upper(with_channels(told, slow_roll=None), blocks)
     speaking = upper(told, blocks)

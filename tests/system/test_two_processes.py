@@ -6,7 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -25,8 +25,6 @@ from service.settings.storage import Origin
 
 from .conftest import SERVING, Program, Start
 
-FindProcess = Callable[[int], int]
-Gone = Callable[[int], Awaitable[None]]
 STORMS = Path(__file__).parents[2] / "benchmarks" / "storms.py"
 PATIENCE_S = 280.0
 
@@ -53,8 +51,8 @@ async def answers(program: Program) -> bool:
 
 
 async def test_a_killed_serving_process_is_replaced_on_the_same_port_and_measuring_goes_on(
-    start: Start, tmp_path: Path, serving_of: FindProcess
-) -> None:
+    start, tmp_path, serving_of
+):
     program = await demo(start, tmp_path)
     first = serving_of(program.pid)
 
@@ -70,9 +68,7 @@ async def test_a_killed_serving_process_is_replaced_on_the_same_port_and_measuri
     assert "Traceback" not in program.errors
 
 
-async def test_a_measuring_process_that_hangs_leaves_nothing_shown_as_current(
-    start: Start, tmp_path: Path
-) -> None:
+async def test_a_measuring_process_that_hangs_leaves_nothing_shown_as_current(start, tmp_path):
     program = await demo(start, tmp_path)
 
     os.kill(program.pid, signal.SIGSTOP)
@@ -89,8 +85,8 @@ async def test_a_measuring_process_that_hangs_leaves_nothing_shown_as_current(
 
 
 async def test_a_killed_measuring_process_ends_the_program_which_can_start_again_at_once(
-    start: Start, tmp_path: Path, serving_of: FindProcess, gone: Gone
-) -> None:
+    start, tmp_path, serving_of, gone
+):
     program = await demo(start, tmp_path)
     serving, port = serving_of(program.pid), int(program.url.rpartition(":")[2])
 
@@ -104,9 +100,7 @@ async def test_a_killed_measuring_process_ends_the_program_which_can_start_again
     assert again.url == program.url
 
 
-async def test_a_serving_process_that_hangs_is_killed_and_started_again(
-    tmp_path: Path, demo_file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_a_hanging_serving_process_is_killed_and_restarted(tmp_path, demo_file, monkeypatch):
     (tmp_path / "deaf.py").write_text("import signal\nsignal.pause()\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setattr(child, "PROGRAM", "deaf")
@@ -134,7 +128,7 @@ async def test_a_serving_process_that_hangs_is_killed_and_started_again(
         serving.process.wait()
 
 
-def test_a_serving_process_of_another_version_is_refused_with_both_named(tmp_path: Path) -> None:
+def test_a_serving_process_of_another_version_is_refused_with_both_named(tmp_path):
     ours, theirs = socket.socketpair()
     with ours, theirs, socket.create_server(("127.0.0.1", 0)) as listener:
         socket.send_fds(ours, [b"."], [listener.fileno()])
@@ -167,7 +161,7 @@ def test_a_serving_process_of_another_version_is_refused_with_both_named(tmp_pat
         ),
     ],
 )
-def test_a_storm_on_the_port_costs_no_sample(storms: list[str]) -> None:
+def test_a_storm_on_the_port_costs_no_sample(storms):
     chosen = [word for storm in storms for word in ("--storm", storm)]
     times = ("--settle", "4", "--rest", "2", "--seconds", "3")
     command = [sys.executable, str(STORMS), "--units", "1", *times, *chosen]

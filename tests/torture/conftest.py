@@ -1,6 +1,6 @@
 """How long the torture takes, by which seed, and what is said at its end."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -82,8 +82,6 @@ def daq(plant: LedgerPlant, tmp_path: Path) -> Iterator[LedgerDaq]:
 
 
 @pytest.fixture
-def torture(
-    torture_seed: int, is_whole: bool, record_property: Callable[[str, object], None]
-) -> Torture:
+def torture(torture_seed, is_whole, record_property) -> Torture:
     """How much is done, and where figures go."""
     return Torture(torture_seed, is_whole, lambda row: record_property(summary.FIGURE, row))

@@ -5,7 +5,6 @@ is missing is recorded, alarms come and go as they should.
 """
 
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from harness.bad_link import Link
 from harness.bench import LINK_ALARM, Seen, bench_of
 from harness.ledger_plant import LedgerPlant
 from harness.service_rig import until
-from harness.summary import Torture
 
 N_ROUNDS = 10
 LONGEST_S = 12.0
@@ -41,9 +39,7 @@ def plant(torture_seed: int, is_whole: bool) -> LedgerPlant:
 
 
 @pytest.mark.timeout(3600)
-def test_a_bad_link_makes_no_false_sample_and_no_loss_that_is_not_told(
-    plant: LedgerPlant, tmp_path: Path, torture: Torture
-) -> None:
+def test_a_bad_link_makes_no_false_sample_and_no_loss_that_is_not_told(plant, tmp_path, torture):
     rng = np.random.default_rng(torture.seed)
     states = STATES if torture.is_whole else FEW
     seen = {state: Seen() for state in states}
@@ -72,9 +68,7 @@ def test_a_bad_link_makes_no_false_sample_and_no_loss_that_is_not_told(
 
 @pytest.mark.timeout(3600)
 @pytest.mark.torture
-def test_a_frozen_service_shows_nothing_old_as_new_and_raises_nothing_false(
-    plant: LedgerPlant, tmp_path: Path, torture: Torture
-) -> None:
+def test_a_frozen_service_shows_nothing_old_as_new_and_no_false_alarm(plant, tmp_path, torture):
     lines = ["SIGSTOP and SIGCONT of the service"]
     with bench_of(plant, tmp_path, torture.seed) as bench:
         before = bench.raised()  # as where the host is busy with the start
@@ -102,13 +96,8 @@ def test_a_frozen_service_shows_nothing_old_as_new_and_raises_nothing_false(
 )
 @pytest.mark.torture
 def test_a_host_whose_clock_is_wrong_loses_and_doubles_nothing_and_says_so(
-    plant: LedgerPlant,
-    tmp_path: Path,
-    at_start_s: float,
-    steps_s: tuple[float, ...],
-    time_zone: str,
-    torture: Torture,
-) -> None:
+    plant, tmp_path, at_start_s, steps_s, time_zone, torture
+):
     with bench_of(plant, tmp_path, torture.seed, at_start_s, time_zone) as bench:
         before = bench.raised()
         if at_start_s:

@@ -13,7 +13,6 @@ import pytest
 from harness.corruption import CHANGES, corrupted
 from harness.deeds import Build
 from harness.everything import Rows, fill, fill_access, served
-from harness.summary import Torture
 from rigs.recording import recorded
 
 from acquisition.errors import ConfigError
@@ -117,9 +116,7 @@ def damaged(
     return f"{kind} in {target.name}"
 
 
-def test_no_wrong_value_is_served_from_a_damaged_store_and_loss_is_told(
-    whole: Path, truth: Rows, tmp_path: Path, torture: Torture
-) -> None:
+def test_a_damaged_store_serves_no_wrong_value_and_tells_loss(whole, truth, tmp_path, torture):
     rng = np.random.default_rng(torture.seed)
     counted: Counter[str] = Counter()
     for number in range(torture.times(N_STORES)):
@@ -135,9 +132,7 @@ def test_no_wrong_value_is_served_from_a_damaged_store_and_loss_is_told(
 
 @pytest.mark.planted("seals that are not compared")
 @pytest.mark.long
-def test_a_store_without_seals_is_found_out(
-    whole: Path, truth: Rows, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, torture: Torture
-) -> None:
+def test_a_store_without_seals_is_found_out(whole, truth, tmp_path, monkeypatch, torture):
     monkeypatch.setattr(SealedTable, "is_whole", lambda *_: "1")
     rng = np.random.default_rng(torture.seed)
     for _ in range(300):
@@ -168,9 +163,7 @@ def read(folder: Path) -> bytes:
     return told.encode() + b"".join(blocks)
 
 
-def test_no_wrong_sample_is_read_from_a_damaged_recording(
-    recording: tuple[Path, bytes], tmp_path: Path, torture: Torture
-) -> None:
+def test_no_wrong_sample_is_read_from_a_damaged_recording(recording, tmp_path, torture):
     whole, content = recording
     rng = np.random.default_rng(torture.seed)
     n_refused = 0

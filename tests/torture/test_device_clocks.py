@@ -2,13 +2,10 @@
 
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from harness.bench import bench_of
-from harness.ledger_plant import LedgerPlant
 from harness.service_rig import until
-from harness.summary import Torture
 
 DRIFT_PPM = 1000.0
 DRIFTS_WITHIN_S = 600.0
@@ -20,9 +17,7 @@ pytestmark = pytest.mark.torture
 
 
 @pytest.mark.timeout(3600)
-def test_a_device_that_samples_too_fast_is_told_and_loses_nothing(
-    plant: LedgerPlant, tmp_path: Path, torture: Torture
-) -> None:
+def test_a_device_that_samples_too_fast_is_told_and_loses_nothing(plant, tmp_path, torture):
     with bench_of(replace(plant, drift_ppm=DRIFT_PPM), tmp_path, torture.seed) as bench:
         until(lambda: bench.active("clock_drift"), DRIFTS_WITHIN_S)
         clock = bench.clock()
@@ -35,9 +30,7 @@ def test_a_device_that_samples_too_fast_is_told_and_loses_nothing(
 
 
 @pytest.mark.timeout(3600)
-def test_stamps_of_2106_are_told_and_no_result_has_their_time(
-    plant: LedgerPlant, tmp_path: Path, torture: Torture
-) -> None:
+def test_stamps_of_2106_are_told_and_no_result_has_their_time(plant, tmp_path, torture):
     n_expected = 0
     with bench_of(plant, tmp_path, torture.seed) as bench:
         for n_slots in SLOTS:

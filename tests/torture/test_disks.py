@@ -11,10 +11,7 @@ from pathlib import Path
 
 import pytest
 from harness.bench import STORE_ALARM, Bench
-from harness.ledger_daq import LedgerDaq
-from harness.ledger_plant import LedgerPlant
 from harness.service_rig import RefusedError, until
-from harness.summary import Torture
 
 N_CYCLES, N_FEW = 20, 1
 DISK_MIB = 32.0
@@ -59,9 +56,7 @@ def small_disk(folder: Path, mib: float) -> Iterator[Path]:
 
 
 @pytest.mark.timeout(3600)
-def test_a_full_disk_costs_nothing_that_was_promised(
-    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, torture: Torture
-) -> None:
+def test_a_full_disk_costs_nothing_that_was_promised(plant, daq, tmp_path, torture):
     with (
         small_disk(tmp_path / "small", DISK_MIB) as disk,
         Bench(*(plant, daq, tmp_path, STORE_ALARM, torture.period_s), data=disk / "data") as bench,
@@ -101,9 +96,7 @@ def _filled_and_freed(bench: Bench, disk: Path) -> float:
 @pytest.mark.timeout(900)
 @pytest.mark.torture
 @pytest.mark.skipif(shutil.which("strace") is None, reason="needs strace")
-def test_a_slow_disk_holds_up_nothing_but_itself(
-    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, torture: Torture
-) -> None:
+def test_a_slow_disk_holds_up_nothing_but_itself(plant, daq, tmp_path, torture):
     with Bench(plant, daq, tmp_path, STORE_ALARM, before=STRACE) as bench:
         bench.begin()
         [alarm] = until(lambda: bench.active(NOT_STORED))

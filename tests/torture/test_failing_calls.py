@@ -10,7 +10,7 @@ import pytest
 from harness.deeds import Build, Loss, deed, letters, loss
 from harness.enduring import DATABASE, GAVE_UP
 from harness.failing_calls import Case, FailingCalls, Outcome, failing_calls, n_calls
-from harness.summary import Torture, planted
+from harness.summary import planted
 
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
@@ -120,13 +120,8 @@ def require_all_or_nothing(
     [pytest.param(False, N_CASES, id="up to date"), pytest.param(True, N_CASES // 2, id="new")],
 )
 def test_whatever_call_fails_a_transaction_is_whole_or_absent_and_the_store_goes_on(
-    calls: FailingCalls,
-    empty: Path,
-    assessment: Build,
-    torture: Torture,
-    is_new: bool,
-    n_cases: int,
-) -> None:
+    calls, empty, assessment, torture, is_new, n_cases
+):
     if is_new:
         shutil.rmtree(empty / "data")
     n = None if torture.times(n_cases) == N_CASES else torture.times(n_cases)
@@ -140,9 +135,7 @@ def failing_for_ever(calls: FailingCalls, base: Path, call: str = "pwrite64") ->
     return run_on_copy(calls, base, str(Case(call, "EIO", n // 2, True)))
 
 
-def test_a_sync_that_fails_for_ever_acknowledges_nothing_more(
-    calls: FailingCalls, empty: Path, assessment: Build, torture: Torture
-) -> None:
+def test_a_sync_that_fails_for_ever_acknowledges_nothing_more(calls, empty, assessment, torture):
     outcome = failing_for_ever(calls, empty, "fdatasync")
 
     assert outcome.exit_code == GAVE_UP
@@ -158,9 +151,7 @@ def test_a_sync_that_fails_for_ever_acknowledges_nothing_more(
         for bug, what in (("promises_anyway", "lost"), ("in_two_parts", "torn"))
     ],
 )
-def test_planted_bugs_are_found(
-    begun: Begun, empty: Path, assessment: Build, bug: str, what: str, torture: Torture
-) -> None:
+def test_planted_bugs_are_found(begun, empty, assessment, bug, what, torture):
     """A program that promises what was refused, and one that writes in two transactions."""
     with begun(bug) as calls:
         provoke = {"lost": failing_for_ever, "torn": stopped_between}[what]

@@ -2,7 +2,6 @@
 
 import time
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from harness.bench import Bench
 from harness.kill_cycles import kill_cycles
 from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
-from harness.summary import Torture
 
 N_CYCLES, N_FEW = 200, 1
 LOAD = 2.0
@@ -26,9 +24,7 @@ def plant(torture_seed: int, is_whole: bool) -> LedgerPlant:
 
 
 @pytest.mark.timeout(ACCOUNTED_S)
-def test_a_killed_service_has_kept_what_it_has_shown(
-    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, torture: Torture
-) -> None:
+def test_a_killed_service_has_kept_what_it_has_shown(plant, daq, tmp_path, torture):
     rng = np.random.default_rng(torture.seed)
     with Bench(plant, daq, tmp_path, period_s=torture.period_s) as bench:
         if torture.is_whole:

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from harness.deeds import HOP_NS, T0_NS, Build, value
-from harness.summary import Torture
+from harness.deeds import HOP_NS, T0_NS, value
 from harness.tape import environment, python
 from rigs.rolled_trends import gather_all
 
@@ -36,9 +35,7 @@ print("done", flush=True)
 
 
 @pytest.fixture(scope="module")
-def old_file(
-    tmp_path_factory: pytest.TempPathFactory, torture_seed: int, assessment: Build
-) -> bytes:
+def old_file(tmp_path_factory, torture_seed, assessment) -> bytes:
     """A database with five hours of results, gathered."""
     path = tmp_path_factory.mktemp("old") / "old.sqlite3"
     with closing(SqliteStore(path)) as store:
@@ -57,9 +54,7 @@ def by_the_hour(store: SqliteStore) -> Trend:
     return store.trend(TrendQuery("U1", "UJB", ("speed_rpm",), T0_NS, T0_NS + 6 * HOUR_NS, 7, 1))
 
 
-def test_killed_while_deleting_every_hour_says_what_it_said(
-    old_file: bytes, tmp_path: Path, torture: Torture
-) -> None:
+def test_killed_while_deleting_every_hour_says_what_it_said(old_file, tmp_path, torture):
     rng = np.random.default_rng(torture.seed)
     path = tmp_path / "old.sqlite3"
     path.write_bytes(old_file)
@@ -101,9 +96,7 @@ def require_same(found: Trend, before: Trend) -> None:
 
 @pytest.mark.planted("mark of what is deleted in a transaction of its own")
 @pytest.mark.long
-def test_planted_bug_of_a_mark_in_a_transaction_of_its_own_is_found(
-    old_file: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_planted_bug_of_a_mark_in_its_own_transaction_is_found(old_file, tmp_path, monkeypatch):
     """A kill between two transactions leaves readings deleted and nobody who knows of it."""
     path = tmp_path / "old.sqlite3"
     path.write_bytes(old_file)

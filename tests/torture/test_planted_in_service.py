@@ -1,15 +1,13 @@
 """Bugs that are planted in the running service: each must be found out by what is left of it."""
 
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 from harness.bench import Bench
 from harness.kill_cycles import kill_cycles
-from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
-from harness.summary import Torture, planted
+from harness.summary import planted
 
 N_CYCLES = 4
 LIFE_S = 8.0
@@ -46,9 +44,7 @@ def plant(torture_seed: int) -> LedgerPlant:
         )
     ],
 )
-def test_a_bug_in_the_service_is_found_out(
-    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, bug: str, kind: str, torture: Torture
-) -> None:
+def test_a_bug_in_the_service_is_found_out(plant, daq, tmp_path, bug, kind, torture):
     def trouble(number: int) -> None:
         time.sleep(SHOWN_S)
         if number % 4 == 2:

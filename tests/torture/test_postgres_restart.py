@@ -1,15 +1,11 @@
 """`padwatch run` over PostgreSQL: the server stops for a while, and nothing is missing after it."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from harness.bench import Bench
-from harness.ledger_daq import LedgerDaq
-from harness.ledger_plant import LedgerPlant
 from harness.postgres_server import PostgresServer, why_not
 from harness.service_rig import until
-from harness.summary import Torture
 
 STORE = """
 [store]
@@ -34,8 +30,8 @@ def server() -> Iterator[PostgresServer]:
 
 @pytest.mark.timeout(3600)
 def test_a_database_that_was_away_has_everything_when_it_is_back(
-    plant: LedgerPlant, daq: LedgerDaq, server: PostgresServer, tmp_path: Path, torture: Torture
-) -> None:
+    plant, daq, server, tmp_path, torture
+):
     extra = STORE.format(conninfo=server.conninfo("padwatch"))
     n_stops = torture.times(N_STOPS)
     with Bench(plant, daq, tmp_path, extra) as bench:

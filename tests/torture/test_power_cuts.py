@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from harness.deeds import Build, Loss, deed, loss
 from harness.disk import Disk
-from harness.summary import Torture, planted
+from harness.summary import planted
 from harness.tape import Acknowledged, Step, environment, python, record
 
 from service.store.sqlite import SqliteStore
@@ -28,9 +28,7 @@ Record = Callable[[str], list[Step]]
 
 
 @pytest.fixture(scope="session")
-def recorded(
-    tmp_path_factory: pytest.TempPathFactory, torture_seed: int, assessment: Build
-) -> Record:
+def recorded(tmp_path_factory, torture_seed, assessment) -> Record:
     """Records what a store asks of its disk while transactions are appended to it."""
 
     def run(bug: str = "") -> list[Step]:
@@ -77,9 +75,7 @@ def damage(path: Path) -> list[str]:
 
 
 @pytest.mark.timeout(3600)
-def test_nothing_that_was_acknowledged_is_lost_by_a_power_cut(
-    recorded: Record, tmp_path: Path, assessment: Build, torture: Torture
-) -> None:
+def test_nothing_acknowledged_is_lost_by_a_power_cut(recorded, tmp_path, assessment, torture):
     n_cuts = N_CUTS if torture.is_whole else N_FEW
     for acknowledged, files in cuts(recorded(""), n_cuts, torture.seed):
         path = left_in(tmp_path / "data", files)
@@ -101,8 +97,8 @@ def test_nothing_that_was_acknowledged_is_lost_by_a_power_cut(
     ],
 )
 def test_a_store_that_promises_too_much_is_found_out(
-    recorded: Record, tmp_path: Path, assessment: Build, bug: str, what: str, torture: Torture
-) -> None:
+    recorded, tmp_path, assessment, bug, what, torture
+):
     for acknowledged, files in cuts(recorded(bug), N_CUTS, torture.seed):
         path = left_in(tmp_path / "data", files)
         if getattr(found_after(path, torture.seed, acknowledged, assessment)[0], what):

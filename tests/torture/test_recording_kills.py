@@ -9,7 +9,7 @@ from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.recordings_ledger import Recorded, promised, recorded
 from harness.service_rig import ServiceRig, until
-from harness.summary import Torture, planted
+from harness.summary import planted
 
 from service.recordings.folders import remove_incomplete
 from service.recordings.segment import join, unjoined
@@ -53,9 +53,7 @@ def write_plant(plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path) -> Path:
 
 
 @pytest.mark.timeout(3600)
-def test_a_kill_costs_no_sample_that_was_called_recorded_and_every_hole_is_told(
-    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, torture: Torture
-) -> None:
+def test_a_kill_costs_no_recorded_sample_and_every_hole_is_told(plant, daq, tmp_path, torture):
     n_cycles = N_CYCLES if torture.is_whole else N_FEW
     with ServiceRig(write_plant(plant, daq, tmp_path)) as rig:
         root = tmp_path / "data" / "recordings"
@@ -81,9 +79,7 @@ def test_a_kill_costs_no_sample_that_was_called_recorded_and_every_hole_is_told(
         )
     ],
 )
-def test_a_bug_in_recording_is_found_out(
-    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, bug: str, kind: str, torture: Torture
-) -> None:
+def test_a_bug_in_recording_is_found_out(plant, daq, tmp_path, bug, kind, torture):
     plant_file = write_plant(plant, daq, tmp_path)
     with ServiceRig(plant_file, "harness.planted", environment={"PLANTED": bug}) as rig:
         root = tmp_path / "data" / "recordings"

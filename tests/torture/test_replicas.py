@@ -4,18 +4,15 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 from harness.checker import check
-from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer, nats_cluster, nats_server_command
 from harness.postgres_server import PostgresServer, why_not
 from harness.replicas import Replicas, replicas
 from harness.service_rig import until
-from harness.summary import Torture
 from harness.watch import silent_healthy_s
 
 N_ROUNDS, N_KILLS = 5, 10
@@ -42,9 +39,7 @@ def plant(seed: int) -> LedgerPlant:
 
 
 @pytest.fixture(params=["a single process", "the whole chain"])
-def running(
-    request: pytest.FixtureRequest, plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path
-) -> Iterator[Replicas]:
+def running(request, plant, daq, tmp_path) -> Iterator[Replicas]:
     """Processes of a plant; the whole chain takes five and three servers of a stream."""
     with ExitStack() as stack:
         nodes: Sequence[NatsServer] = ()
@@ -57,7 +52,7 @@ def running(
 
 
 @pytest.mark.timeout(3600)
-def test_whatever_is_killed_nothing_is_lost(running: Replicas, seed: int, torture: Torture) -> None:
+def test_whatever_is_killed_nothing_is_lost(running, seed, torture):
     """Kill each kind so often, at random moments; then look at all that is left."""
     does = {role: partial(running.kill, role) for role in running.rigs}
     does["postgres"] = running.restart_postgres

@@ -3,17 +3,14 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from threading import Event, Thread
 
 import numpy as np
 import pytest
 from harness.bench import Bench
 from harness.kill_cycles import act
-from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.service_rig import ServiceRig, until
-from harness.summary import Torture
 from harness.watch import Watch
 
 N_KILLS, N_FEW = 50, 2
@@ -69,8 +66,8 @@ def back_after_kill_s(rig: ServiceRig) -> float:
 
 @pytest.mark.timeout(3600)
 def test_a_killed_serving_process_costs_no_sample_and_no_command_that_was_answered(
-    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, torture: Torture
-) -> None:
+    plant, daq, tmp_path, torture
+):
     rng, back_s = np.random.default_rng(torture.seed), []
     with Bench(plant, daq, tmp_path, period_s=torture.period_s) as bench:
         bench.begin()

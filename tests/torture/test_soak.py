@@ -2,14 +2,11 @@
 
 import os
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from harness.bench import Bench
-from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.soak import Soaked, soak
-from harness.summary import Torture
 
 LOAD = 5.0
 WHOLE = LedgerPlant(n_units=20, load=LOAD, segment_samples=8192, n_segments=24)
@@ -48,9 +45,7 @@ def plant(torture_seed: int, is_whole: bool) -> LedgerPlant:
 
 
 @pytest.mark.timeout(9000)
-def test_a_long_time_under_load_leaves_everything_as_it_was(
-    plant: LedgerPlant, daq: LedgerDaq, tmp_path: Path, soak_s: float, torture: Torture
-) -> None:
+def test_a_long_time_under_load_leaves_everything_as_it_was(plant, daq, tmp_path, soak_s, torture):
     with Bench(plant, daq, tmp_path, FEW_BUNDLES, period_s=1.0) as bench:
         done = soak(bench, soak_s, plant.units[:2])
     torture.figure(f"soak\n{done.table(plant)}")

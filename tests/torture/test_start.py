@@ -9,7 +9,6 @@ import pytest
 from harness.ledger_daq import ledger_daq
 from harness.ledger_plant import LedgerPlant
 from harness.service_rig import ServiceRig
-from harness.summary import Torture
 
 N_STARTS = 20
 GB = 2**30
@@ -38,7 +37,7 @@ def fill(database: Path, n_bytes: int) -> int:
 
 @pytest.mark.timeout(3600)
 @pytest.mark.torture
-def test_a_killed_service_with_a_gigabyte_is_ready_again(tmp_path: Path, torture: Torture) -> None:
+def test_a_killed_service_with_a_gigabyte_is_ready_again(tmp_path, torture):
     plant = LedgerPlant(seed=torture.seed, load=1.0)
     ready_s, costs_s = [], []
     with ledger_daq(plant, tmp_path) as daq:

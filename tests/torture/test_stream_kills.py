@@ -12,7 +12,6 @@ from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer, nats_server, nats_server_command
 from harness.service_rig import ServiceRig, until
 from harness.stream_rig import found_in, on_the_stream, positions, single_process
-from harness.summary import Torture
 
 from service.settings.loading import load_plant_file
 
@@ -74,9 +73,7 @@ def _settle(database: Path) -> None:
 
 @pytest.mark.timeout(3600)
 @pytest.mark.torture
-def test_results_after_kills_of_acquire_analyse_and_nats_are_those_of_a_single_process(
-    tmp_path: Path, torture: Torture
-) -> None:
+def test_results_after_kills_of_acquire_analyse_and_nats_are_of_one_process(tmp_path, torture):
     if nats_server_command() is None:
         pytest.skip("needs nats-server")
     rng = np.random.default_rng(torture.seed)

@@ -144,9 +144,7 @@ def test_frames_that_come_again_or_late_are_refused_and_counted(plant):
         (32, 10**6, 0.02, [(0, 0, 10, ()), (0, 10**6, 10**6 + 2990, ())]),
     ],
 )
-def test_neither_a_stall_of_the_host_nor_a_far_jump_loses_a_sample(
-    n_bits, first, at_s, expected, plant
-):
+def test_neither_a_stalled_host_nor_a_far_jump_loses_samples(n_bits, first, at_s, expected, plant):
     plant = plant(n_bits)
     blocks = plant.take(range(10), 0.0) + plant.take(range(first, first + 2990), at_s)
     assert summary(blocks) == expected
@@ -251,9 +249,7 @@ async def test_a_busy_host_neither_hides_nor_makes_losses_where_the_interface_st
     assert blocks[-1].clock.n_faults == 0
 
 
-async def test_the_interface_clock_finds_a_single_lost_sample_though_the_host_is_busy(
-    source_on, adapter_on
-):
+async def test_the_interface_clock_finds_a_single_lost_sample_on_a_busy_host(source_on, adapter_on):
     random = np.random.default_rng(20261122)
     channel, blocks = "lost sample", []
 

@@ -116,9 +116,7 @@ async def test_a_device_that_repeats_itself_for_ever_is_stale(shape, device, sou
                 await anext(stream)
 
 
-async def test_an_unplugged_serial_adapter_comes_back_without_a_thread_left(
-    tmp_path, shape, device, source_of
-):
+async def test_an_unplugged_serial_adapter_leaves_no_thread(tmp_path, shape, device, source_of):
     async with SlcanPtyServer(device, link=tmp_path / "adapter") as server:
         source = source_of(shape, server.endpoint, options={"sleep_after_open": 0.0})
         for n in range(1, 6):
@@ -143,9 +141,7 @@ async def test_padwatch_sends_nothing_but_open_and_close(shape, device, source_o
     assert set(server.commands) == {"L", "C"}
 
 
-async def test_a_stalled_reader_drops_frames_counts_them_and_finds_the_gap(
-    shape, device, source_of
-):
+async def test_a_stalled_reader_drops_and_counts_frames_and_finds_the_gap(shape, device, source_of):
     """C7: the event loop is busy while frames keep coming; a bounded queue takes what it can."""
     async with SlcanTcpServer(device) as server:
         source = source_of(shape, server.endpoint, queue_frames=500)
@@ -294,9 +290,7 @@ def both_ways(eventful_feed, shape_of, source_of, counts_calibration, read_up_to
 @pytest.mark.parametrize("seed", fast_and_long(1, 2))
 @pytest.mark.parametrize("floats", [False, True], ids=["counts", "floats"])
 @pytest.mark.parametrize("fd", [False, True], ids=["classic", "fd"])
-async def test_a_recording_with_gaps_and_restarts_comes_through_unchanged(
-    fd, floats, seed, both_ways
-):
+async def test_a_recording_with_gaps_and_restarts_passes_unchanged(fd, floats, seed, both_ways):
     feed, shape = {"floats": floats, "seed": seed}, {"fd": fd, "floats": floats}
     direct, wired, refused = await both_ways(feed, shape)
     assert fingerprint(wired) == fingerprint(direct)

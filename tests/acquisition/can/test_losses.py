@@ -134,9 +134,7 @@ def test_thousands_of_losses_are_counted_exactly(
     assert len({block.epoch for block in blocks}) == 1
 
 
-async def test_a_lost_header_never_lets_old_slow_values_pass_for_new(
-    shape_of, assembler_of, counting_feed
-):
+async def test_a_lost_header_never_makes_old_slow_values_new(shape_of, assembler_of, counting_feed):
     """Every message of every header is lost once; what it said is then unknown, not old."""
     shape = shape_of()
     n_heads = len(shape.messages) - len(shape.waves)
@@ -168,9 +166,7 @@ async def test_a_lost_header_never_lets_old_slow_values_pass_for_new(
             assert middle[0].start_ns - first.start_ns == 83_333_333
 
 
-def test_frames_that_disagree_about_their_samples_are_dropped_whole(
-    shape_of, assembler_of, counting_feed
-):
+def test_frames_that_disagree_in_samples_are_dropped_whole(shape_of, assembler_of, counting_feed):
     shape = shape_of(n_channels=12, fd=True)
     feed = counting_feed(n_channels=12)
     encoder, assembler = FrameEncoder(shape), assembler_of(shape)
@@ -183,9 +179,7 @@ def test_frames_that_disagree_about_their_samples_are_dropped_whole(
     assert blocks[1].rejected == (Rejection("incomplete_frames", 5),)
 
 
-async def test_memory_stays_bounded_when_one_node_falls_silent(
-    shape_of, assembler_of, counting_feed
-):
+async def test_memory_stays_bounded_when_a_node_is_silent(shape_of, assembler_of, counting_feed):
     shape = shape_of()
     feed = counting_feed(n_channels=4)
     encoder, assembler = FrameEncoder(shape), assembler_of(shape)

@@ -27,9 +27,7 @@ class HeldClock(SystemClock):
         return super().monotonic_s() + self.held_s
 
 
-async def test_now_and_then_a_message_that_cannot_be_read_is_counted(
-    fake_bus_source, fake_bus, device
-):
+async def test_an_occasional_unreadable_message_is_counted(fake_bus_source, fake_bus, device):
     async with fake_bus_source.connect() as stream:
         send_block(device, fake_bus)
         await anext(stream)
@@ -123,9 +121,7 @@ async def test_a_host_that_stood_still_takes_its_own_silence_for_no_silence_of_t
         await following
 
 
-async def test_a_source_that_is_cancelled_while_opening_leaves_no_thread(
-    shape, fake_bus, source_of
-):
+async def test_a_source_cancelled_while_opening_leaves_no_thread(shape, fake_bus, source_of):
     opening, go_on = threading.Event(), threading.Event()
 
     def slow(*_):
@@ -172,9 +168,7 @@ async def test_frames_before_a_failure_are_delivered(fake_bus_source, fake_bus, 
             await anext(stream)
 
 
-async def test_a_device_whose_stamps_go_back_is_flagged(
-    shape, fake_bus, fake_bus_source, counting_feed
-):
+async def test_a_device_with_falling_stamps_is_bad(shape, fake_bus, fake_bus_source, counting_feed):
     """C8: the index goes on, the stamp that does not fit is not used, and says so."""
     feed = counting_feed(n_channels=4)
     device = CanDevice(feed, shape)
@@ -237,9 +231,7 @@ async def test_what_a_library_raises_on_reading_is_renamed(kind, fake_bus_source
 
 
 @pytest.mark.parametrize("kind", [can.CanOperationError, serial.SerialException, OSError])
-async def test_what_a_library_raises_on_closing_is_harmless(
-    kind, fake_bus_source, fake_bus, device
-):
+async def test_errors_of_a_library_on_closing_are_harmless(kind, fake_bus_source, fake_bus, device):
     fake_bus.on_shutdown = kind("as seen in the field")
     async with fake_bus_source.connect() as stream:
         send_block(device, fake_bus)

@@ -118,9 +118,7 @@ def two_sets_that_lose_one(number: int):
         [100.0, 500.0, 600.0, 625.0, 1250.0, 1000.0], [nothing_at_all, two_sets_that_lose_one]
     ),
 )
-def test_the_loss_of_a_single_instant_is_found_at_every_rate(
-    rate_hz, what_is_left, settings, assembler_by
-):
+def test_one_lost_instant_is_found_at_every_rate(rate_hz, what_is_left, settings, assembler_by):
     """Also where what is left of two instants looks like one: they are never mixed."""
     assembler = assembler_by(settings, rate_hz)
     n_seen = 2 if what_is_left is two_sets_that_lose_one else 1
@@ -145,9 +143,7 @@ def test_a_rate_at_which_the_clock_cannot_tell_losses_is_refused(settings, assem
 
 
 @pytest.mark.parametrize("share", [1.3, 2.0])
-def test_more_samples_than_the_rate_are_not_believed_as_from_two_modules_with_the_same_ids(
-    share, assembler
-):
+def test_more_samples_than_the_rate_as_from_two_modules_are_not_believed(share, assembler):
     blocks = []
     for start in range(0, 3000, 6):
         frames = itertools.chain.from_iterable(instant(n) for n in range(start, start + 6))

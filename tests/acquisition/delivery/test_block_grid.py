@@ -56,7 +56,7 @@ def facts(block: SampleBlock) -> tuple[object, ...]:
 
 
 @given(st.sets(st.integers(1, N_SAMPLES - 1), max_size=40), st.integers(0, 120))
-def test_blocks_do_not_depend_on_the_cuts_of_the_wire(cuts: set[int], start: int) -> None:
+def test_blocks_do_not_depend_on_the_cuts_of_the_wire(cuts, start):
     edges = [start, *sorted(c for c in cuts if c > start), N_SAMPLES]
     made, whole = joined(blocks_of(edges)), joined(blocks_of([start, N_SAMPLES]))
     assert facts(made) == facts(whole)
@@ -70,14 +70,14 @@ def cells_within(block: SampleBlock) -> list[int]:
     return [n for n in range(block.first_index + 1, block.stop_index) if n % LENGTH == 0]
 
 
-def test_cells_begin_at_multiples_of_their_length() -> None:
+def test_cells_begin_at_multiples_of_their_length():
     made = [cell for block in blocks_of([30, 333]) for cell in block.cells()]
     assert [b.first_index for b in made] == [30, 50, 100, 150, 200, 250, 300]
     assert [b.counts.shape[1] for b in made] == [20, 50, 50, 50, 50, 50, 33]
     assert all(cell.start_ns % 1000 == 0 for cell in made)  # as a wire in microseconds carries
 
 
-def test_a_gap_or_a_restart_ends_the_block_before_it_and_keeps_what_was_rejected() -> None:
+def test_a_gap_or_a_restart_ends_the_block_before_it_and_keeps_what_was_rejected():
     grid = BlockJoiner(LENGTH)
     assert grid.put([piece(0, 30)]) == []
     refused = (Rejection("torn_slot", 10),)
@@ -94,7 +94,7 @@ def test_a_gap_or_a_restart_ends_the_block_before_it_and_keeps_what_was_rejected
     ]
 
 
-def test_one_part_that_is_not_ok_makes_the_block_not_ok() -> None:
+def test_one_part_that_is_not_ok_makes_the_block_not_ok():
     grid = BlockJoiner(LENGTH)
     grid.put([piece(250, 299)])
     grid.put([piece(299, 300)])
@@ -206,13 +206,11 @@ def judged(samples: np.ndarray, ok: bool = True) -> Quality:
         (np.float32, [0.0, math.nan], bad(Reason.NOT_FINITE)),
     ],
 )
-def test_a_channel_is_judged_by_its_samples(
-    dtype: type, samples: list[float], expected: Quality
-) -> None:
+def test_a_channel_is_judged_by_its_samples(dtype, samples, expected):
     """A block is shorter than a turn: that its mean is outside the OK limits is only a doubt."""
     assert judged(np.array(samples, dtype)) == expected
 
 
 @pytest.mark.parametrize("dtype", [np.int16, np.float32])
-def test_a_channel_that_its_device_calls_bad_has_failed(dtype: type) -> None:
+def test_a_channel_that_its_device_calls_bad_has_failed(dtype):
     assert judged(np.zeros(5, dtype), ok=False) == bad(Reason.SENSOR_FAILURE)

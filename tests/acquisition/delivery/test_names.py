@@ -39,7 +39,7 @@ def names(monkeypatch: pytest.MonkeyPatch) -> Iterator[NameServer]:
     server.answers.set()
 
 
-async def test_what_was_known_last_is_used_while_no_name_server_answers(names: NameServer) -> None:
+async def test_what_was_known_last_is_used_while_no_name_server_answers(names):
     known = KnownAddresses("daq.plant", 502)
     assert await known.within(5.0) == ["127.0.0.1"]
 
@@ -53,9 +53,7 @@ async def test_what_was_known_last_is_used_while_no_name_server_answers(names: N
     assert names.asked == ["daq.plant"] * 3
 
 
-async def test_a_name_that_was_never_known_is_a_lost_link_in_time_and_costs_one_thread(
-    names: NameServer,
-) -> None:
+async def test_a_name_that_was_never_known_is_a_lost_link_in_time_and_costs_one_thread(names):
     names.answers.clear()
     link = ModbusClient(LinkSettings(transport=TcpTransport(host="daq.plant"), timeout_s=0.02))
     for _ in range(5):
@@ -70,7 +68,7 @@ async def test_a_name_that_was_never_known_is_a_lost_link_in_time_and_costs_one_
     assert len(await asyncio.gather(*(asyncio.to_thread(int) for _ in range(n_threads)))) == 64
 
 
-async def test_a_device_that_has_moved_is_found_at_its_other_address(names: NameServer) -> None:
+async def test_a_device_that_has_moved_is_found_at_its_other_address(names):
     server = await asyncio.start_server(lambda _, writer: writer.close(), "127.0.0.1", 0)
     port = server.sockets[0].getsockname()[1]
     names.answer = ["127.0.0.77", "127.0.0.1"]

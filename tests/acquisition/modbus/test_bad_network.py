@@ -75,9 +75,7 @@ def build(counting_feed, counts_calibration, stepped_clock):
 @pytest.mark.parametrize(
     ("kind", "mischief"), covering(list(N_BLOCKS), mischief(*ONE_AT_A_TIME, ALL_TOGETHER))
 )
-async def test_no_mischief_of_the_network_makes_a_false_sample_or_hides_a_loss(
-    kind, mischief, build
-):
+async def test_no_network_fault_makes_a_false_sample_or_hides_a_loss(kind, mischief, build):
     rig, blocks = await read_through_a_proxy(build, kind, mischief, N_BLOCKS[kind])
     assert_all_true(blocks)
     assert sum(rig.proxy.n_done.values()) >= len(mischief)

@@ -78,7 +78,7 @@ async def test_between_replies_no_connection_is_held(plant):
 
 
 @pytest.mark.parametrize("other", ["vendor", "signature"])
-async def test_another_device_is_noticed_at_the_next_poll(plant, other: str):
+async def test_another_device_is_noticed_at_the_next_poll(plant, other):
     device, _, source = plant
 
     async with source(keeps_connection=False).connect() as stream:
@@ -92,9 +92,7 @@ async def test_another_device_is_noticed_at_the_next_poll(plant, other: str):
 
 
 @pytest.mark.parametrize("done", ["a reply", "a connection"])
-async def test_what_is_done_with_the_stop_does_not_undo_it(
-    done, counting_feed, link_to, monkeypatch
-):
+async def test_work_done_with_the_stop_does_not_undo_it(done, counting_feed, link_to, monkeypatch):
     method = {"a reply": "data_received", "a connection": "connection_made"}[done]
     does = getattr(ReplyProtocol, method)
 
@@ -134,7 +132,7 @@ def port() -> Iterator[int]:
         thread.join()
 
 
-async def test_it_is_a_lost_link_each_time_and_nothing_else(port: int) -> None:
+async def test_it_is_a_lost_link_each_time_and_nothing_else(port):
     settings = LinkSettings(
         transport=TcpTransport(host="127.0.0.1", port=port),
         identity=ExpectedIdentification(vendor="any"),
@@ -286,9 +284,7 @@ async def test_a_device_that_answers_all_in_order_is_asked_for_all_at_once():
         (nothing, LinkError),
     ],
 )
-async def test_a_device_that_cannot_is_asked_one_at_a_time_from_then_on_and_told_once(
-    behave, error
-):
+async def test_a_device_that_cannot_is_asked_one_at_a_time_and_told_once(behave, error):
     async with device(behave) as port:
         link = client(port)
         await link.open()

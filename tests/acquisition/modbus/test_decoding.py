@@ -43,7 +43,7 @@ def one(value: MapValue, content: bytes, **settings) -> tuple[float, ValueState]
 
 @pytest.mark.parametrize("order", [order.value for order in ByteOrder])
 @pytest.mark.parametrize("type_", list(STRUCT))
-def test_every_type_comes_back_from_every_byte_order(type_: str, order: str) -> None:
+def test_every_type_comes_back_from_every_byte_order(type_, order):
     number = {"int16": -12345, "uint16": 54321, "int32": -1234567890, "uint32": 4012345678}.get(
         type_, -0.15625
     )
@@ -59,7 +59,7 @@ SKF = MapValue(
 )
 
 
-def test_an_skf_value_is_its_mantissa_times_its_scale_register() -> None:
+def test_an_skf_value_is_its_mantissa_times_its_scale_register():
     settings = {"base": 1, "together": (Together(address=609, count=2),)}
 
     found, state = one(SKF, words(-16384, 200), **settings)
@@ -87,13 +87,13 @@ VM600 = MapValue(
         (0xFFFF, 50.0, ValueState.CLIPPED),
     ],
 )
-def test_a_vm600_reading_at_the_end_of_its_scale_is_clipped(raw, expected, state) -> None:
+def test_a_vm600_reading_at_the_end_of_its_scale_is_clipped(raw, expected, state):
     found = one(VM600, words(raw) + struct.pack(">ff", -10.0, 50.0))
 
     assert found == (pytest.approx(expected), state)
 
 
-def test_without_a_scale_or_a_range_there_is_no_value_instead_of_zero() -> None:
+def test_without_a_scale_or_a_range_there_is_no_value_instead_of_zero():
     assert one(SKF, words(12345, 0))[1] is ValueState.INVALID
     assert one(VM600, words(7, 0, 0, 0, 0))[1] is ValueState.INVALID
 
@@ -118,7 +118,7 @@ def test_without_a_scale_or_a_range_there_is_no_value_instead_of_zero() -> None:
         ("int16", {"scale": 100.0, "invalid_values": (100,)}, 1, True),
     ],
 )
-def test_a_number_that_stands_for_an_error_is_no_value(type_, settings, raw, is_valid) -> None:
+def test_a_number_that_stands_for_an_error_is_no_value(type_, settings, raw, is_valid):
     value = MapValue(id="v", cell=Cell(address=0, type=NumberType(type_)), **settings)
 
     state = one(value, registers_of(raw, type_, "ABCD"))[1]
@@ -126,7 +126,7 @@ def test_a_number_that_stands_for_an_error_is_no_value(type_, settings, raw, is_
     assert state is (ValueState.OK if is_valid else ValueState.INVALID)
 
 
-def test_bits_are_found_in_registers_coils_and_discrete_inputs() -> None:
+def test_bits_are_found_in_registers_coils_and_discrete_inputs():
     bits = {
         "low": Cell(address=3, type=NumberType.BIT, bit=0),
         "high": Cell(address=3, type=NumberType.BIT, bit=15),
@@ -145,13 +145,13 @@ def test_bits_are_found_in_registers_coils_and_discrete_inputs() -> None:
     assert decoder.read(replies).values.tolist() == [1.0, 0.0, 1.0, 0.0, 1.0]
 
 
-def test_scale_and_offset_are_taken_after_all_else() -> None:
+def test_scale_and_offset_are_taken_after_all_else():
     value = MapValue(id="v", cell=Cell(address=0), scale=0.001, offset=-2.0)
 
     assert one(value, words(3500))[0] == pytest.approx(1.5)
 
 
-def test_the_device_says_when_it_measured() -> None:
+def test_the_device_says_when_it_measured():
     """AMC VIBRO: day first; GC-IMS: seconds with the low word first."""
     value = MapValue(id="v", cell=Cell(address=0))
     fields = ("day", "month", "year", "hour", "minute", "second")
@@ -176,7 +176,7 @@ FLOAT = Cell(address=1, type=NumberType.FLOAT64)
 PARTS = Cell(address=5, type=NumberType.FLOAT32)
 
 
-def test_a_device_whose_clock_makes_no_sense_has_none() -> None:
+def test_a_device_whose_clock_makes_no_sense_has_none():
     value = MapValue(id="v", cell=Cell(address=0))
     for time, content in (
         (CalendarTime(first=Cell(address=1)), words(0, 25, 13, 1, 0, 0, 0)),
@@ -191,7 +191,7 @@ def test_a_device_whose_clock_makes_no_sense_has_none() -> None:
         assert decoder.read(content).time_ns is None
 
 
-def test_a_heartbeat_alone_says_whether_the_device_lives() -> None:
+def test_a_heartbeat_alone_says_whether_the_device_lives():
     value = MapValue(id="v", cell=Cell(address=0))
     beating = MapDecoder(RegisterMap(values=(value,), heartbeat=Cell(address=1)))
     silent = MapDecoder(RegisterMap(values=(value,)))
@@ -216,14 +216,14 @@ def test_a_heartbeat_alone_says_whether_the_device_lives() -> None:
         ({"mask": 0xFF00, "ok_values": (0, 1, 2)}, 0x0300, ValueState.FLAGGED),
     ],
 )
-def test_a_status_register_is_read_with_the_polarity_of_its_maker(flag, word, state) -> None:
+def test_a_status_register_is_read_with_the_polarity_of_its_maker(flag, word, state):
     check = FlagCheck(cell=Cell(address=1), **flag)
     value = MapValue(id="v", cell=Cell(address=0), flags=(check,))
 
     assert one(value, words(5, word)) == (5.0, state)
 
 
-def test_flags_of_mixed_polarity_in_one_register_are_each_heard() -> None:
+def test_flags_of_mixed_polarity_in_one_register_are_each_heard():
     """VM600: bit 5 set means the sensor is OK, bits 6 to 11 set mean an error."""
     status = Cell(address=1)
     checks = (
@@ -250,7 +250,7 @@ def test_flags_of_mixed_polarity_in_one_register_are_each_heard() -> None:
         ({"ok_values": (1,)}, 0, ValueState.FLAGGED),
     ],
 )
-def test_a_single_bit_is_a_status_too(cell, flag, bit: int, state: ValueState) -> None:
+def test_a_single_bit_is_a_status_too(cell, flag, bit, state):
     check = FlagCheck(cell=Cell(address=1, type=NumberType.BIT, **cell), mask=1, **flag)
     value = MapValue(id="v", cell=Cell(address=0), flags=(check,))
 

@@ -97,9 +97,7 @@ BOTH_LAYOUTS = pytest.mark.parametrize("layout", [INTERLEAVED, PER_CHANNEL])
 
 
 @pytest.mark.parametrize(("layout", "n_steps"), [(INTERLEAVED, 4000), (UNCOUNTED, 20)])
-async def test_what_waited_for_a_reader_is_exact_by_the_clock_or_thrown_away(
-    queues, layout, n_steps
-) -> None:
+async def test_waiting_samples_are_exact_by_the_clock_or_thrown_away(queues, layout, n_steps):
     """The loss is longer than the counter; without one it ends the epoch."""
     async with queues(layout) as p:
         async with p.source.connect() as stream:
@@ -118,7 +116,7 @@ async def test_what_waited_for_a_reader_is_exact_by_the_clock_or_thrown_away(
         assert after.samples[0, 0] >= (n_steps + 2) * STEP
 
 
-async def test_an_overflow_is_an_exact_gap(queues) -> None:
+async def test_an_overflow_is_an_exact_gap(queues):
     async with queues(depth_samples=200) as p, p.source.connect() as stream:
         first = await anext(stream)
         p.run(10)
@@ -129,7 +127,7 @@ async def test_an_overflow_is_an_exact_gap(queues) -> None:
     assert_right([first, *rest])
 
 
-async def test_a_queue_that_reading_does_not_empty_gives_each_sample_once(queues) -> None:
+async def test_a_queue_that_reading_does_not_empty_gives_each_sample_once(queues):
     async with queues(KEPT, step=5) as p, p.source.connect() as stream:
         blocks = []
         for n in range(40):
@@ -144,7 +142,7 @@ async def test_a_queue_that_reading_does_not_empty_gives_each_sample_once(queues
     assert_right(blocks)
 
 
-async def test_times_are_even_and_rise_with_the_index(queues) -> None:
+async def test_times_are_even_and_rise_with_the_index(queues):
     async with queues() as p, p.source.connect() as stream:
         blocks = []
         for n in range(1, 400):
@@ -158,7 +156,7 @@ async def test_times_are_even_and_rise_with_the_index(queues) -> None:
     assert blocks[-1].clock.offset_s is None
 
 
-async def test_without_a_counter_a_loss_ends_the_epoch(queues) -> None:
+async def test_without_a_counter_a_loss_ends_the_epoch(queues):
     async with queues(UNCOUNTED) as p, p.source.connect() as stream:
         p.run(1)
         first = await anext(stream)
@@ -179,7 +177,7 @@ async def test_without_a_counter_a_loss_ends_the_epoch(queues) -> None:
         assert (lost[0] == 0.0) == (block.epoch == first.epoch)
 
 
-async def test_a_device_that_gives_nothing_new_is_not_connected(queues) -> None:
+async def test_a_device_that_gives_nothing_new_is_not_connected(queues):
     async with queues(settings={"poll_period_s": 0.5}) as p:
         async with p.source.connect() as stream:
             await anext(stream)
@@ -197,7 +195,7 @@ async def test_a_device_that_gives_nothing_new_is_not_connected(queues) -> None:
         ("exception_11", LinkError, "gateway target"),
     ],
 )
-async def test_a_refused_reading_is_never_repeated(queues, fault, error, said) -> None:
+async def test_a_refused_reading_is_never_repeated(queues, fault, error, said):
     async with queues() as p, p.source.connect() as stream:
         await anext(stream)
         n_before = p.server.function_codes[0x18]
@@ -254,9 +252,7 @@ async def until_lost(stream, said: str | None = None) -> list[SampleBlock]:
 
 
 @BOTH_LAYOUTS
-async def test_a_lost_link_loses_no_more_than_the_answer_that_was_on_its_way(
-    queues, layout
-) -> None:
+async def test_a_lost_link_loses_no_more_than_the_answer_that_was_on_its_way(queues, layout):
     async with queues(layout) as p:
         async with p.source.connect() as stream:
             first = await up_to(stream, STEP)
@@ -271,14 +267,14 @@ async def test_a_lost_link_loses_no_more_than_the_answer_that_was_on_its_way(
     assert_right(blocks)
 
 
-async def test_samples_that_are_not_counted_are_not_kept_where_some_may_be_missing(queues) -> None:
+async def test_samples_that_are_not_counted_are_not_kept_where_some_may_be_missing(queues):
     async with queues(UNCOUNTED) as p, p.source.connect() as stream:
         p.run(10)
         lose_the_link_after(p, N_READ)
         assert await until_lost(stream) == []
 
 
-async def test_what_was_read_over_too_slow_a_link_is_kept_too(queues) -> None:
+async def test_what_was_read_over_too_slow_a_link_is_kept_too(queues):
     async with queues(depth_samples=100_000) as p, p.source.connect() as stream:
         first = await up_to(stream, STEP)
         answer = p.device.read_fifo

@@ -14,7 +14,7 @@ from core.quality import GOOD, Level, Reason
 FLOAT = Cell(address=30, type=NumberType.FLOAT32)
 
 
-async def test_each_poll_is_a_sample_with_its_slow_values_in_as_few_reads_as_planned(plant) -> None:
+async def test_each_poll_is_a_sample_with_its_slow_values_in_as_few_reads_as_planned(plant):
     async with plant() as (source, _, server, _):
         blocks = await take(source, 120)
 
@@ -31,7 +31,7 @@ async def test_each_poll_is_a_sample_with_its_slow_values_in_as_few_reads_as_pla
 @pytest.mark.parametrize("heartbeat", [Cell(address=60), None])
 async def test_a_device_whose_heartbeat_or_without_one_everything_stands_still_is_not_connected(
     plant, heartbeat
-) -> None:
+):
     registers = map_of(heartbeat=heartbeat)
     async with plant(registers, stale_after_s=5.0) as (source, device, _, clock):
         assert len(await take(source, 20)) == 20
@@ -45,7 +45,7 @@ async def test_a_device_whose_heartbeat_or_without_one_everything_stands_still_i
         assert len(await take(source, 2)) == 2
 
 
-async def test_the_device_stamps_its_polls_if_it_can(plant) -> None:
+async def test_the_device_stamps_its_polls_if_it_can(plant):
     time = EpochTime(
         seconds=Cell(address=70, type=NumberType.UINT32), parts=Cell(address=72), parts_per_s=1000.0
     )
@@ -57,7 +57,7 @@ async def test_the_device_stamps_its_polls_if_it_can(plant) -> None:
 
 
 @pytest.mark.parametrize("trouble", ["too coarse for the polls", "at zero"])
-async def test_a_device_clock_that_is_no_use_does_not_stamp_polls(plant, trouble: str) -> None:
+async def test_a_device_clock_that_is_no_use_does_not_stamp_polls(plant, trouble):
     cells = Cell(address=70, type=NumberType.UINT32), Cell(address=72)
     time = EpochTime(seconds=cells[0])
     if trouble == "at zero":
@@ -80,9 +80,7 @@ async def test_a_device_clock_that_is_no_use_does_not_stamp_polls(plant, trouble
         (FLOAT, 0.1, 0.2, r"register 30 is 0\.1, expected 0\.2"),
     ],
 )
-async def test_another_device_at_the_same_address_is_refused(
-    plant, cell, held, other, said
-) -> None:
+async def test_another_device_at_the_same_address_is_refused(plant, cell, held, other, said):
     device, read_as = (
         map_of(signature=(Signature(cell=cell, expected=expected),)) for expected in (held, other)
     )
@@ -105,7 +103,7 @@ async def test_another_device_at_the_same_address_is_refused(
         ("cut", LinkError, "closed"),
     ],
 )
-async def test_a_refusal_is_told_and_the_next_poll_is_its_own(plant, fault, error, said) -> None:
+async def test_a_refusal_is_told_and_the_next_poll_is_its_own(plant, fault, error, said):
     async with plant() as (source, _, server, _):
         async with source.connect() as stream:
             first = await anext(stream)
@@ -118,7 +116,7 @@ async def test_a_refusal_is_told_and_the_next_poll_is_its_own(plant, fault, erro
     assert float(after.samples[0, 0]) == 100.0 + after.first_index
 
 
-async def test_the_first_poll_does_not_wait_and_the_others_come_at_multiples(stepped_clock) -> None:
+async def test_the_first_poll_does_not_wait_and_the_others_come_at_multiples(stepped_clock):
     ticks = PollClock(stepped_clock, 60.0)
     stepped_clock.step(7.0)
     started_s = stepped_clock.now_ns() // 10**9
@@ -132,7 +130,7 @@ async def test_the_first_poll_does_not_wait_and_the_others_come_at_multiples(ste
     assert await ticks.next() == 7
 
 
-async def test_a_machine_that_was_suspended_while_waiting_says_the_true_tick(stepped_clock) -> None:
+async def test_a_machine_that_was_suspended_while_waiting_says_the_true_tick(stepped_clock):
     ticks = PollClock(stepped_clock, 1.0)
     await ticks.next()
     asleep = stepped_clock.sleep
@@ -151,9 +149,7 @@ async def test_a_machine_that_was_suspended_while_waiting_says_the_true_tick(ste
         ("sentinel", Reason.NOT_FINITE, Reason.NOT_MEASURED),
     ],
 )
-async def test_what_the_device_flags_or_cannot_give_is_never_good(
-    plant, fault, reason, slow_reason
-) -> None:
+async def test_what_a_device_flags_or_cannot_give_is_never_good(plant, fault, reason, slow_reason):
     async with plant() as (source, device, *_), source.connect() as stream:
         await anext(stream)
         device.spoil(fault, 1)
@@ -169,7 +165,7 @@ async def test_what_the_device_flags_or_cannot_give_is_never_good(
     assert again.channel_quality == (GOOD,)
 
 
-async def test_a_clipped_reading_is_called_clipped(plant) -> None:
+async def test_a_clipped_reading_is_called_clipped(plant):
     scale = FullScale(minimum=-50.0, maximum=102.0)
     wave = MapValue(id="wave", cell=Cell(address=10), full_scale=scale)
     async with plant(RegisterMap(values=(wave,))) as (source, *_):
@@ -178,7 +174,7 @@ async def test_a_clipped_reading_is_called_clipped(plant) -> None:
     assert [b.channel_quality[0].reason for b in blocks] == [Reason.OK] * 2 + [Reason.CLIPPED] * 2
 
 
-async def test_a_slow_channel_that_the_map_lacks_is_not_measured(plant) -> None:
+async def test_a_slow_channel_that_the_map_lacks_is_not_measured(plant):
     only_wave = RegisterMap(values=map_of().values[:1])
     async with plant(only_wave) as (source, *_):
         [block] = await take(source, 1)

@@ -75,9 +75,7 @@ def equal_slots(a: Slot, b: Slot) -> bool:
     slow=st.tuples(*[st.floats(width=32, allow_nan=False)] * 2),
     damage=u32,
 )
-def test_a_slot_reads_back_with_epoch_slow_values_and_damage(
-    numbers, trailer, counts, epoch, slow, damage
-):
+def test_a_slot_keeps_epoch_slow_values_and_damage(numbers, trailer, counts, epoch, slow, damage):
     slot = Slot(*numbers, counts=counts, trailer=trailer, epoch=epoch, slow=slow, damage=damage)
     data = encode_slot(slot)
     assert len(data) == 2 * LAYOUT.slot_registers

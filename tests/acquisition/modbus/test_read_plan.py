@@ -75,7 +75,7 @@ BLOCK = Together(address=609, count=14)
         ([value(400101)], {"base": 400001}, [(3, 100, 1)]),
     ],
 )
-def test_a_map_is_read_in_the_fewest_requests_that_are_allowed(values, settings, expected) -> None:
+def test_a_map_is_read_in_the_fewest_requests_that_are_allowed(values, settings, expected):
     assert requests(values, **settings) == expected
 
 
@@ -84,7 +84,7 @@ def test_a_map_is_read_in_the_fewest_requests_that_are_allowed(values, settings,
     st.integers(4, 125),
     st.integers(0, 8),
 )
-def test_every_cell_is_in_one_request_and_every_request_holds_cells(layout, most, gap) -> None:
+def test_every_cell_is_in_one_request_and_every_request_holds_cells(layout, most, gap):
     values, address = [], 0
     for skipped, type_ in layout:
         values.append(value(address + skipped, type_))
@@ -121,7 +121,7 @@ def test_every_cell_is_in_one_request_and_every_request_holds_cells(layout, most
         ),
     ],
 )
-def test_what_cannot_be_read_together_is_refused_with_the_registers(build, said: str) -> None:
+def test_what_cannot_be_read_together_is_refused_with_the_registers(build, said):
     with pytest.raises(MapError, match=said):
         build()
 
@@ -223,9 +223,7 @@ of_their_own_length = pytest.mark.parametrize(
 @on_both_wires
 @of_their_own_length
 @given(data=st.data())
-def test_a_reply_that_tells_its_own_length_is_taken_whole_and_only_then(
-    framing, frame, request_, pdu, data
-):
+def test_a_reply_that_tells_its_length_is_taken_only_whole(framing, frame, request_, pdu, data):
     right = frame(pdu)
     cut = data.draw(st.integers(1, len(right) - 1))
     assert reply(framing, right[:cut], request_) is None

@@ -53,9 +53,7 @@ async def test_another_device_than_configured_is_refused_with_found_and_expected
             pass
 
 
-async def test_a_device_without_a_ring_or_at_another_address_is_a_config_error(
-    device, server, source_at
-):
+async def test_a_device_without_a_ring_or_elsewhere_is_a_config_error(device, server, source_at):
     device.memory.clear()
     for base_address, complaint in (
         (0, "magic is 0x0000, expected 0x5057"),
@@ -77,9 +75,7 @@ async def test_input_registers_bring_the_same_samples(device, server, source_at,
     assert set(server.function_codes) == {4}
 
 
-async def test_a_source_waits_a_poll_period_and_never_piles_polls_up(
-    device, server, source_at, stepped_clock
-):
+async def test_a_source_waits_a_period_and_piles_no_polls(device, server, source_at, stepped_clock):
     source = source_at(server.port, clock=stepped_clock, poll_period_s=1.0)
     polled_at_s = []
 
@@ -150,9 +146,7 @@ def readings(drift_ppm: float, period_s: float, slot_samples: int, seed: int):
 
 @pytest.mark.parametrize(("period_s", "slot_samples"), [(0.25, 50), (0.25, 600), (1.0, 60)])
 @pytest.mark.parametrize("drift_ppm", [-50.0, 0.0, 10.0, 100.0, 150.0, 1000.0])
-def test_a_ring_that_is_polled_in_step_with_its_slots_tells_its_drift(
-    drift_ppm, period_s, slot_samples
-) -> None:
+def test_a_ring_polled_in_step_with_its_slots_tells_its_drift(drift_ppm, period_s, slot_samples):
     for seed in range(5):
         found = list(readings(drift_ppm, period_s, slot_samples, seed))
         assert found[-1].u_drift_ppm < 5.0
@@ -163,7 +157,7 @@ def test_a_ring_that_is_polled_in_step_with_its_slots_tells_its_drift(
 
 
 @pytest.mark.parametrize("slot_s", [0.01, 0.0833, 0.1, 0.24, 0.25, 0.26, 0.5, 1.0, 7.0])
-def test_polls_come_no_later_than_asked_for_and_not_much_sooner(slot_s) -> None:
+def test_polls_come_no_later_than_asked_for_and_not_much_sooner(slot_s):
     period_s = incommensurate_period_s(0.25, slot_s)
     assert 0.5 * 0.25 < period_s <= 0.25
     if slot_s > 1.0 or slot_s < 0.05:

@@ -63,9 +63,7 @@ async def test_slots_overwritten_while_they_are_read_are_a_gap_and_never_a_mixtu
     np.testing.assert_array_equal(samples_of(blocks), np.arange(blocks[0].first_index, 550))
 
 
-async def test_a_sequence_that_goes_back_for_a_moment_repeats_nothing(
-    device, server, source_at, read_until
-):
+async def test_a_sequence_that_falls_back_repeats_nothing(device, server, source_at, read_until):
     async with source_at(server.port).connect() as stream:
         await anext(stream)
         device.produce(3)
@@ -158,9 +156,7 @@ async def test_a_new_epoch_is_read_from_its_start_though_its_newest_slot_is_lost
     assert (block.first_index, block.epoch) == (200, restarted[0].epoch)
 
 
-async def test_a_slot_of_an_epoch_that_has_ended_is_never_one_of_the_new_one(
-    device, server, source_at
-):
+async def test_a_slot_of_an_ended_epoch_is_never_one_of_the_new_one(device, server, source_at):
     async with source_at(server.port).connect() as stream:
         await anext(stream)
         device.produce(1)
@@ -176,9 +172,7 @@ async def test_a_slot_of_an_epoch_that_has_ended_is_never_one_of_the_new_one(
     np.testing.assert_array_equal(blocks[1].samples[0], np.arange(200, 250))
 
 
-async def test_one_header_of_an_epoch_that_has_ended_does_not_make_old_samples_new(
-    device, server, source_at
-):
+async def test_a_header_of_an_ended_epoch_does_not_make_old_samples_new(device, server, source_at):
     source = source_at(server.port)
     old_header = device.memory.read(0, 16)
     device.restart()

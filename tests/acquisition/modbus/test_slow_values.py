@@ -92,7 +92,7 @@ async def until(stream, condition) -> SampleBlock:
     raise AssertionError
 
 
-async def test_values_of_the_other_device_join_the_blocks_from_the_first_one_on(plant) -> None:
+async def test_values_of_the_other_device_join_the_blocks_from_the_first_one_on(plant):
     async with plant() as (source, _, feed, device, _), source.connect() as stream:
         first = await anext(stream)
         found = []
@@ -106,7 +106,7 @@ async def test_values_of_the_other_device_join_the_blocks_from_the_first_one_on(
     assert found[1].slow["oil"].quality.reason is Reason.OUT_OF_RANGE
 
 
-async def test_a_device_that_was_never_there_costs_no_waveform(plant) -> None:
+async def test_a_device_that_was_never_there_costs_no_waveform(plant):
     async with plant() as (source, slow, _, _, server):
         await server.__aexit__(None, None, None)
         async with source.connect() as stream:
@@ -118,9 +118,7 @@ async def test_a_device_that_was_never_there_costs_no_waveform(plant) -> None:
     assert block.slow["oil"].quality.reason is Reason.NOT_CONNECTED
 
 
-async def test_a_device_that_does_not_answer_does_not_hold_up_waveforms_that_are_back(
-    plant,
-) -> None:
+async def test_a_device_that_does_not_answer_does_not_hold_up_waveforms_that_are_back(plant):
     async with plant(timeout_s=3600.0) as (source, _, _, _, server):
         async with source.connect() as stream:
             await anext(stream)
@@ -131,7 +129,7 @@ async def test_a_device_that_does_not_answer_does_not_hold_up_waveforms_that_are
     assert block.slow["oil"] == Reading(45.0)  # not yet too old
 
 
-async def test_while_there_are_no_waveforms_the_other_device_is_left_alone(plant) -> None:
+async def test_while_there_are_no_waveforms_the_other_device_is_left_alone(plant):
     class Away:
         @asynccontextmanager
         async def connect(self):
@@ -147,7 +145,7 @@ async def test_while_there_are_no_waveforms_the_other_device_is_left_alone(plant
         assert not server.function_codes
 
 
-async def test_a_value_that_gets_too_old_is_missing_and_comes_back(plant, stepped_clock) -> None:
+async def test_a_value_that_gets_too_old_is_missing_and_comes_back(plant, stepped_clock):
     async with (
         plant(PollingClock(stepped_clock, 0.0), stale_after_s=5.0) as (
             source,
@@ -173,7 +171,7 @@ async def test_a_value_that_gets_too_old_is_missing_and_comes_back(plant, steppe
     assert back.slow["oil"].value == 46.0
 
 
-async def test_a_device_whose_values_stand_still_has_none(plant, stepped_clock) -> None:
+async def test_a_device_whose_values_stand_still_has_none(plant, stepped_clock):
     clock = PollingClock(stepped_clock, 1.0)
     async with (
         plant(clock, poll_period_s=1.0, stale_after_s=5.0) as (source, slow, *_),
@@ -185,7 +183,7 @@ async def test_a_device_whose_values_stand_still_has_none(plant, stepped_clock) 
     assert "has not changed" in slow.trouble or "refused" in slow.trouble
 
 
-async def test_a_bug_in_the_background_is_not_swallowed(plant, monkeypatch) -> None:
+async def test_a_bug_in_the_background_is_not_swallowed(plant, monkeypatch):
     async with plant() as (source, slow, *_):
         monkeypatch.setattr(slow, "_readings", lambda _: 1 // 0)
         with pytest.raises(ZeroDivisionError):
@@ -193,7 +191,7 @@ async def test_a_bug_in_the_background_is_not_swallowed(plant, monkeypatch) -> N
                 pass
 
 
-async def test_a_bus_reports_refused_frames_also_behind_slow_values(plant) -> None:
+async def test_a_bus_reports_refused_frames_also_behind_slow_values(plant):
     async with plant() as (waves, slow, *_):
         assert refused_frames_of(Bus()) == {"duplicate": 2}
         assert refused_frames_of(JoinedSource(Bus(), slow)) == {"duplicate": 2}
@@ -201,7 +199,7 @@ async def test_a_bus_reports_refused_frames_also_behind_slow_values(plant) -> No
         assert refused_frames_of(waves) == {}
 
 
-def test_a_calibration_is_divided_between_the_two_devices(counts_calibration) -> None:
+def test_a_calibration_is_divided_between_the_two_devices(counts_calibration):
     whole = counts_calibration(n_slow=3)
     ids = frozenset({"slow1"})
 

@@ -138,7 +138,7 @@ def counted(removes: bool = True) -> CountedSamples:
     st.integers(0, WRAP - 1),
     st.lists(st.tuples(st.integers(0, 20 * WRAP), st.floats(0.0, 0.3)), min_size=1, max_size=20),
 )
-def test_gaps_are_exact_however_often_the_counter_has_wrapped(first: int, steps) -> None:
+def test_gaps_are_exact_however_often_the_counter_has_wrapped(first, steps):
     """The host sees each sample late by up to 0.3 s; old samples were thrown away before."""
     samples, index = counted(), first
     samples.place(first % WRAP, 0.0)
@@ -151,7 +151,7 @@ def test_gaps_are_exact_however_often_the_counter_has_wrapped(first: int, steps)
 @pytest.mark.parametrize(
     ("first", "passed_s", "then"), [(30_000, 0.1, 0), (1000, 10 * WRAP / RATE_HZ, 21_000)]
 )
-def test_a_counter_that_time_does_not_explain_begins_an_epoch(first, passed_s, then) -> None:
+def test_a_counter_that_time_does_not_explain_begins_an_epoch(first, passed_s, then):
     """At once, or after a long absence."""
     samples = counted()
     samples.place(first, 0.0)
@@ -161,9 +161,7 @@ def test_a_counter_that_time_does_not_explain_begins_an_epoch(first, passed_s, t
 
 
 @pytest.mark.parametrize(("has_asked", "epoch"), [(True, 8), (False, 7)])
-def test_a_counter_that_stops_with_its_device_begins_an_epoch_if_nothing_had_waited(
-    has_asked: bool, epoch: int
-) -> None:
+def test_a_counter_that_stops_with_its_device_begins_an_epoch_if_none_waited(has_asked, epoch):
     samples = counted()
     samples.place(100, 0.0)
     samples.note_drained(5.0 if has_asked else 0.0)
@@ -173,14 +171,14 @@ def test_a_counter_that_stops_with_its_device_begins_an_epoch_if_nothing_had_wai
 
 
 @pytest.mark.parametrize(("passed_s", "is_ambiguous"), [(1.0, False), (55.0, True), (1e6, True)])
-def test_what_waits_in_a_queue_is_doubted_after_half_a_wrap(passed_s, is_ambiguous) -> None:
+def test_what_waits_in_a_queue_is_doubted_after_half_a_wrap(passed_s, is_ambiguous):
     samples = counted()
     assert not samples.is_ambiguous(passed_s)
     samples.place(0, 0.0)
     assert samples.is_ambiguous(passed_s) is is_ambiguous
 
 
-def test_samples_that_a_queue_shows_again_are_not_taken_twice() -> None:
+def test_samples_that_a_queue_shows_again_are_not_taken_twice():
     samples = counted(removes=False)
     for n in range(100, 120):
         samples.place(n, 0.0)
@@ -194,12 +192,12 @@ def uncounted() -> UncountedSamples:
     return UncountedSamples(RATE_HZ, epochs(7), tolerance_s=0.1)
 
 
-def test_without_a_counter_samples_are_counted_here() -> None:
+def test_without_a_counter_samples_are_counted_here():
     samples = uncounted()
     assert [samples.place(n) for n in (3, 2)] == [SamplePlace(7, 0), SamplePlace(7, 3)]
 
 
-def test_a_loss_shows_by_the_clock_and_nothing_is_joined_across_it() -> None:
+def test_a_loss_shows_by_the_clock_and_nothing_is_joined_across_it():
     samples = uncounted()
     for second in range(1, 30):
         samples.place(600)
@@ -213,21 +211,21 @@ def test_a_loss_shows_by_the_clock_and_nothing_is_joined_across_it() -> None:
 
 
 @pytest.mark.parametrize("drift", [-500e-6, 500e-6])
-def test_a_poor_crystal_is_no_loss(drift: float) -> None:
+def test_a_poor_crystal_is_no_loss(drift):
     samples = uncounted()
     for second in range(1, 3600):
         samples.place(600)
         assert not samples.has_lost(second * (1.0 + drift))
 
 
-def test_a_counter_that_counts_nothing_is_refused() -> None:
+def test_a_counter_that_counts_nothing_is_refused():
     samples = CountedSamples(600.0, epochs(1), removes=True)
     counters = np.array([5000, 40_000, 12, 33_333])
     with pytest.raises(LinkError, match="the sample counter restarts"):
         place_records(FifoPiece(counters, np.zeros((2, 4), dtype=np.int16)), samples, 0.0)
 
 
-def test_channels_that_count_differently_are_not_put_side_by_side() -> None:
+def test_channels_that_count_differently_are_not_put_side_by_side():
     assembly = ChannelAssembly(2, CountedSamples(600.0, epochs(1), removes=True))
     pieces = [
         FifoPiece(first + np.arange(4), np.zeros((1, 4), dtype=np.int16)) for first in (5000, 0)
@@ -236,7 +234,7 @@ def test_channels_that_count_differently_are_not_put_side_by_side() -> None:
         assembly.place(pieces, 0.0)
 
 
-def test_a_channel_that_gives_nothing_holds_the_others_back_in_bounded_memory() -> None:
+def test_a_channel_that_gives_nothing_holds_the_others_back_in_bounded_memory():
     assembly = ChannelAssembly(2, CountedSamples(600.0, epochs(1), removes=True))
     nothing = FifoPiece(np.arange(0), np.zeros((1, 0), dtype=np.int16))
     for n in range(1000):

@@ -27,7 +27,6 @@ from acquisition.recordings.reader import open_recording
 from acquisition.recordings.writer import RecordingWriter
 from core.samples.blocks import Rejection, SampleBlock
 
-Record = Callable[..., Path]
 Numbered = Callable[..., SampleBlock]
 
 CONFINED = """
@@ -41,14 +40,14 @@ print(*(resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RL
 
 
 @pytest.mark.parametrize(("given", "memory"), [(2**33, 2**31), (2**30, 2**30)])
-def test_limits_are_never_raised(given: int, memory: int) -> None:
+def test_limits_are_never_raised(given, memory):
     script = CONFINED.format(given=given)
     command = [sys.executable, "-c", script]
     found = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     assert found.stdout.split() == [str(memory), "1000000"]
 
 
-def test_a_library_that_is_not_installed_is_named_with_how_to_get_it() -> None:
+def test_a_library_that_is_not_installed_is_named_with_how_to_get_it():
     with pytest.raises(
         ConfigError,
         match=r"^importing XYZ requires absent_one; run pip install 'padwatch\[imports\]'$",
@@ -61,13 +60,8 @@ def test_a_library_that_is_not_installed_is_named_with_how_to_get_it() -> None:
     [("SIGKILL", InterruptedError), ("SIGTERM", InterruptedError), ("SIGSEGV", EOFError)],
 )
 def test_a_child_that_the_system_has_ended_is_no_fault_of_the_recording(
-    record: Record,
-    numbered: Numbered,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    number: str,
-    cause: type,
-) -> None:
+    record, numbered, tmp_path, monkeypatch, number, cause
+):
     recording = open_recording(record([numbered(0, 50)]))
     (tmp_path / "ended.py").write_text(f"import os, signal; os.kill(os.getpid(), signal.{number})")
     monkeypatch.syspath_prepend(tmp_path)
@@ -97,9 +91,7 @@ os.kill(os.getpid(), signal.SIGSEGV)
 """
 
 
-def test_a_crash_that_leaves_the_request_unread_is_a_refusal_too(
-    record: Record, numbered: Numbered, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_crash_with_the_request_unread_is_a_refusal_too(record, numbered, tmp_path, monkeypatch):
     """The parent's next read is then a reset of the connection, no end of the stream."""
     recording = open_recording(record([numbered(0, 50)]))
     (tmp_path / "crashes.py").write_text(CRASHES)
@@ -113,9 +105,7 @@ def test_a_crash_that_leaves_the_request_unread_is_a_refusal_too(
     assert len(list(recording.heads())) == 1
 
 
-def test_what_is_not_read_to_its_end_is_never_taken_for_the_next(
-    record: Record, numbered: Numbered
-) -> None:
+def test_what_is_not_read_to_its_end_is_never_taken_for_the_next(record, numbered):
     recording = open_recording(record([numbered(50 * n, 50) for n in range(600)]))
     blocks = recording.blocks()
     assert next(blocks).first_index == 0
@@ -124,9 +114,7 @@ def test_what_is_not_read_to_its_end_is_never_taken_for_the_next(
     assert found == list(range(25_000, 30_000, 50))
 
 
-def test_an_error_of_the_disk_keeps_its_number(
-    record: Record, numbered: Numbered, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_error_of_the_disk_keeps_its_number(record, numbered, monkeypatch):
     fails = Mock(side_effect=OSError(errno.EIO, "Input/output error"))
     recording = open_recording(record([numbered(0, 50)]))
     monkeypatch.setattr(pq, "ParquetFile", fails)
@@ -256,11 +244,7 @@ HOSTILE: list[tuple[str, Callable[[Path], bytes], str]] = [
     ),
     ("blocks.parquet", text_repeated_from_a_dictionary, "a reason of 1 to 64 characters"),
     *(
-        (
-            "samples.parquet",
-            lambda _, n=n_elements: footer_of_a_list(n),
-            "Couldn't deserialize thrift",
-        )
+        ("samples.parquet", lambda _, n=n_elements: footer_of_a_list(n), "Couldn't deserialize")
         for n_elements in (900_000, 2**31 - 1)
     ),
 ]
@@ -276,7 +260,7 @@ def rejecting(sound: Path, unit: RecordedUnit, numbered: Numbered) -> Path:
     return sound.with_name("rejecting")
 
 
-def test_recordings_are_read_or_refused_in_little_memory(sound: Path, rejecting: Path) -> None:
+def test_recordings_are_read_or_refused_in_little_memory(sound, rejecting):
     """The hostile ones are read in one process, which refuses them one by one."""
     hostile = [with_content(sound, n, name, of(sound)) for n, (name, of, _) in enumerate(HOSTILE)]
     command = [sys.executable, "-c", READ, *map(str, (sound, *hostile, rejecting))]

@@ -11,7 +11,6 @@ import pytest
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.export import ExportFormat, csv_schema, export_recording, export_tables
-from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.reader import Recording, open_recording
 from core.samples.blocks import SampleBlock
 
@@ -47,9 +46,7 @@ def expected() -> np.ndarray:
     return samples
 
 
-def test_csv_is_plain_text_with_units_in_its_headings(
-    recording: Recording, expected: np.ndarray, tmp_path: Path
-) -> None:
+def test_csv_is_plain_text_with_units_in_its_headings(recording, expected, tmp_path):
     export_recording(recording, ExportFormat.CSV, tmp_path / "run.csv")
     with (tmp_path / "run.csv").open(newline="") as file:
         header, *rows = csv.reader(file)
@@ -74,9 +71,7 @@ def test_csv_is_plain_text_with_units_in_its_headings(
     )
 
 
-def test_parquet_has_units_in_its_metadata(
-    recording: Recording, expected: np.ndarray, tmp_path: Path
-) -> None:
+def test_parquet_has_units_in_its_metadata(recording, expected, tmp_path):
     export_recording(recording, ExportFormat.PARQUET, tmp_path / "run.parquet")
     table = pq.read_table(tmp_path / "run.parquet")
     assert str(table.schema.field("time_utc").type) == "timestamp[ns, tz=UTC]"
@@ -88,8 +83,8 @@ def test_parquet_has_units_in_its_metadata(
 
 @pytest.mark.parametrize("kind", ExportFormat)
 def test_a_recording_of_many_blocks_and_no_slow_channels_is_exported_whole(
-    tmp_path: Path, unit: RecordedUnit, record: Record, numbered: Numbered, kind: str
-) -> None:
+    tmp_path, unit, record, numbered, kind
+):
     plain = unit.model_copy(update={"slow_channels": ()})
     own = plain.calibration
     blocks = (numbered(7 * n, 7, slow=(), calibration=own) for n in range(1200))
@@ -101,9 +96,7 @@ def test_a_recording_of_many_blocks_and_no_slow_channels_is_exported_whole(
 
 
 @pytest.mark.parametrize("kind", ExportFormat)
-def test_a_slow_value_that_cannot_be_is_no_number_in_any_file(
-    record: Record, numbered: Numbered, tmp_path: Path, kind: ExportFormat
-) -> None:
+def test_a_slow_value_that_cannot_be_is_no_number_in_any_file(record, numbered, tmp_path, kind):
     recording = open_recording(record([numbered(0, 50, slow=(400.0, 45.0))]))
     export_recording(recording, kind, tmp_path / "run.out")
     (table,) = export_tables(recording, csv_schema(recording.manifest))
@@ -117,14 +110,8 @@ def test_a_slow_value_that_cannot_be_is_no_number_in_any_file(
 @pytest.mark.parametrize("kind", ExportFormat)
 @pytest.mark.parametrize("where", ["channels", "slow_channels"])
 def test_a_channel_of_any_name_is_exported_or_refused_by_name(
-    tmp_path: Path,
-    unit: RecordedUnit,
-    record: Record,
-    numbered: Numbered,
-    kind: ExportFormat,
-    id_: str,
-    where: str,
-) -> None:
+    tmp_path, unit, record, numbered, kind, id_, where
+):
     first, *rest = getattr(unit, where)
     named = unit.model_copy(update={where: (first.model_copy(update={"id": id_}), *rest)})
     recording = open_recording(record([numbered(0, 50)], named))
@@ -137,7 +124,7 @@ def test_a_channel_of_any_name_is_exported_or_refused_by_name(
     assert names in (["recording"], ["recording", "run.out"])
 
 
-def test_nothing_is_overwritten_or_left_half_done(recording: Recording, tmp_path: Path) -> None:
+def test_nothing_is_overwritten_or_left_half_done(recording, tmp_path):
     (tmp_path / "there").write_text("precious")
     with pytest.raises(ConfigError, match="there: the file exists already"):
         export_recording(recording, ExportFormat.CSV, tmp_path / "there")

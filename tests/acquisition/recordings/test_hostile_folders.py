@@ -82,15 +82,13 @@ def refusal(folder: Path) -> str:
     ],
     ids=str,
 )
-def test_a_manifest_that_says_something_else_is_refused(
-    folder: Path, changes: dict[str, Any], words: str
-) -> None:
+def test_a_manifest_that_says_something_else_is_refused(folder, changes, words):
     change_manifest(folder, **changes)
     assert words in refusal(folder)
 
 
 @pytest.mark.parametrize("place", range(50, 1000, 67))
-def test_a_manifest_in_which_one_character_is_another_is_refused(folder: Path, place: int) -> None:
+def test_a_manifest_in_which_one_character_is_another_is_refused(folder, place):
     path = folder / "manifest.json"
     text = bytearray(path.read_bytes())
     while not chr(text[place]).isalnum():  # a space more or less says nothing else
@@ -100,21 +98,21 @@ def test_a_manifest_in_which_one_character_is_another_is_refused(folder: Path, p
     assert refusal(folder)
 
 
-def test_a_manifest_that_lost_its_checksum_is_refused(folder: Path) -> None:
+def test_a_manifest_that_lost_its_checksum_is_refused(folder):
     path = folder / "manifest.json"
     for checksum in (None, "0" * 64):
         path.write_text(json.dumps(json.loads(path.read_text()) | {"checksum": checksum}))
         assert "checksum does not match" in refusal(folder)
 
 
-def test_a_manifest_cannot_lead_out_of_its_folder(folder: Path) -> None:
+def test_a_manifest_cannot_lead_out_of_its_folder(folder):
     files = json.loads((folder / "manifest.json").read_text())["files"]
     files["../../secret"] = files.pop("samples.parquet")
     change_manifest(folder, files=files)
     assert "files.../../secret.[key]: Input should be 'samples.parquet'" in refusal(folder)
 
 
-def test_a_file_that_leads_elsewhere_or_waits_for_ever_is_refused(folder: Path) -> None:
+def test_a_file_that_leads_elsewhere_or_waits_for_ever_is_refused(folder):
     samples = folder / "samples.parquet"
     samples.rename(folder / "elsewhere")
     samples.symlink_to(folder / "elsewhere")
@@ -138,12 +136,12 @@ def test_a_file_that_leads_elsewhere_or_waits_for_ever_is_refused(folder: Path) 
     ],
     ids=range(6),
 )
-def test_a_manifest_that_is_none_is_refused(folder: Path, text: bytes, words: str) -> None:
+def test_a_manifest_that_is_none_is_refused(folder, text, words):
     (folder / "manifest.json").write_bytes(text)
     assert words in refusal(folder)
 
 
-def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
+def test_a_folder_that_is_none_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="absent: folder does not exist"):
         open_recording(tmp_path / "absent")
     with pytest.raises(ConfigError, match=r"manifest\.json is missing; not a recording"):
@@ -151,7 +149,7 @@ def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["samples.parquet", "blocks.parquet"])
-def test_a_truncated_or_damaged_file_is_refused(folder: Path, name: str) -> None:
+def test_a_truncated_or_damaged_file_is_refused(folder, name):
     content = (folder / name).read_bytes()
     (folder / name).write_bytes(content[:-100])
     says = f"{name}: file has {len(content) - 100} bytes, expected {len(content)}"
@@ -176,23 +174,17 @@ HOLES = "c1", [pa.array([None] * 1000, pa.int16())]
     [
         (lambda t: t.set_column(1, *DOUBLES), {}, "column 'c1' (double) does not match"),
         (lambda t: t.set_column(1, *HOLES), {}, "column 'c1' (int16) does not match"),
-        (
-            lambda t: t.append_column("c9", t["c0"]),
-            {},
-            "number of columns does not match the manifest",
-        ),
+        (lambda t: t.append_column("c9", t["c0"]), {}, "number of columns does not match the"),
         (lambda t: t, {"row_group_size": 500}, "samples.parquet: row groups must have"),
     ],
 )
-def test_samples_that_are_not_as_the_format_has_them_are_refused(
-    folder: Path, changed: Callable[[Any], Any], options: dict[str, int], words: str
-) -> None:
+def test_samples_that_are_not_as_the_format_has_them_are_refused(folder, changed, options, words):
     table = pq.read_table(folder / "samples.parquet")
     rewrite(folder, "samples.parquet", changed(table), **options)
     assert words in refusal(folder)
 
 
-def test_a_footer_of_80_mb_is_refused_in_little_memory(folder: Path) -> None:
+def test_a_footer_of_80_mb_is_refused_in_little_memory(folder):
     """A footer of that size can take a gigabyte when parsed."""
     footer = 80_000_000
     with (folder / "samples.parquet").open("wb") as file:
@@ -223,37 +215,24 @@ def change_block(folder: Path, number: int, **changes: Any) -> None:
         ({"first_index": 2**62}, "9007199254740992, got 4611686018427387904"),
         ({"epoch": -7}, "block 3: epoch must be 0 to"),
         ({"ok": 7}, "block 3: ok must be 0 to 3, got 7"),
-        (
-            {"rejected": [{"reason": "torn", "n_samples": 10}]},
-            "block 3: 10 rejected, but 0 missing",
-        ),
-        (
-            {"rejected": [{"reason": "x", "n_samples": 0}]},
-            "block 3: a rejection must have at least 1 sample",
-        ),
+        ({"rejected": [{"reason": "torn", "n_samples": 10}]}, "block 3: 10 rejected, but 0"),
+        ({"rejected": [{"reason": "x", "n_samples": 0}]}, "a rejection must have at least 1"),
         (
             {"rejected": [{"reason": "x" * 10_000, "n_samples": 1}]},
             "a reason of 1 to 64 characters, got 1 and",
         ),
-        (
-            {"rejected": [{"reason": "x", "n_samples": 1}] * 100},
-            "block 3: 100 rejections, more than 32",
-        ),
+        ({"rejected": [{"reason": "x", "n_samples": 1}] * 100}, "block 3: 100 rejections, more"),
     ],
     ids=lambda value: str(value)[:40],
 )
-def test_blocks_that_no_device_can_have_delivered_are_refused(
-    folder: Path, changes: dict[str, Any], words: str
-) -> None:
+def test_blocks_that_no_device_can_have_delivered_are_refused(folder, changes, words):
     change_block(folder, 3, **changes)
     assert words in refusal(folder)
 
 
 @pytest.mark.parametrize("n_damaged", fast_and_long(60, 300))
 @pytest.mark.parametrize("name", ["samples.parquet", "blocks.parquet"])
-def test_any_damage_to_a_resealed_file_is_read_or_refused_but_never_crashes(
-    folder: Path, name: str, n_damaged: int
-) -> None:
+def test_any_damage_to_a_resealed_file_is_read_or_refused_without_a_crash(folder, name, n_damaged):
     """Bytes changed at random, with checksums made right."""
     content = (folder / name).read_bytes()
     chance = random.Random(4)  # noqa: S311  not a secret

@@ -2,7 +2,6 @@
 
 import resource
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +16,8 @@ from acquisition.recordings import child, tables, writer
 from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.writer import RecordingWriter
-from core.arrays import CountArray, SampleArray
 from core.machine.channel import Measurand
 from core.samples.blocks import Rejection, SampleBlock, joined
-
-Numbered = Callable[..., SampleBlock]
 
 WORDS = st.text(st.characters(codec="utf-8"), min_size=1, max_size=64)
 REJECTIONS = st.builds(Rejection, WORDS, st.integers(1, 999))
@@ -95,9 +91,7 @@ def recordings(draw: st.DrawFn) -> tuple[RecordedUnit, list[SampleBlock]]:
 
 @settings(max_examples=30, deadline=None)
 @given(recordings())
-def test_any_stream_of_blocks_comes_back_bit_for_bit(
-    recording: tuple[RecordedUnit, list[SampleBlock]],
-) -> None:
+def test_any_stream_of_blocks_comes_back_bit_for_bit(recording):
     unit, blocks = recording
     with tempfile.TemporaryDirectory() as parent:
         folder = Path(parent) / "recording"
@@ -118,9 +112,7 @@ def test_any_stream_of_blocks_comes_back_bit_for_bit(
 
 @pytest.mark.parametrize("n_each", [1, 7, 64, 200])
 @pytest.mark.usefixtures("reads_here")
-def test_blocks_of_any_length_come_back_across_the_borders_of_row_groups(
-    record: Callable[..., Path], numbered: Numbered, monkeypatch: pytest.MonkeyPatch, n_each: int
-) -> None:
+def test_blocks_of_any_length_come_back_across_row_groups(record, numbered, monkeypatch, n_each):
     for module in (writer, child):
         monkeypatch.setattr(module, "ROWS_PER_GROUP", 200)
         monkeypatch.setattr(module, "BLOCKS_PER_GROUP", 10)
@@ -138,9 +130,7 @@ def test_blocks_of_any_length_come_back_across_the_borders_of_row_groups(
         assert file.num_row_groups == -(-opened.manifest.n_samples // 200) > 4
 
 
-def test_a_recording_being_written_is_none_yet_and_is_never_overwritten(
-    tmp_path: Path, unit: RecordedUnit, numbered: Numbered
-) -> None:
+def test_a_recording_being_written_is_none_yet_and_is_never_overwritten(tmp_path, unit, numbered):
     folder = tmp_path / "run"
     with RecordingWriter(folder, unit, "a test") as recorder:
         recorder.write(numbered(0, 10))
@@ -155,9 +145,7 @@ def test_a_recording_being_written_is_none_yet_and_is_never_overwritten(
     assert open_recording(folder).manifest.n_samples == 10
 
 
-def test_a_disk_that_is_full_in_the_end_keeps_no_half_recording(
-    tmp_path: Path, unit: RecordedUnit, numbered: Numbered
-) -> None:
+def test_a_disk_that_is_full_in_the_end_keeps_no_half_recording(tmp_path, unit, numbered):
     limit, most = resource.getrlimit(resource.RLIMIT_FSIZE)
     writer = RecordingWriter(tmp_path / "run", unit, "a test")
     writer.write(numbered(0, 50))
@@ -170,9 +158,7 @@ def test_a_disk_that_is_full_in_the_end_keeps_no_half_recording(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_recording_that_was_broken_off_or_is_empty_leaves_nothing(
-    tmp_path: Path, unit: RecordedUnit, numbered: Numbered
-) -> None:
+def test_a_recording_that_was_broken_off_or_is_empty_leaves_nothing(tmp_path, unit, numbered):
     broken_off = RecordingWriter(tmp_path / "a", unit, "x")
     broken_off.write(numbered(0, 10))
     with pytest.raises(ZeroDivisionError), broken_off:
@@ -197,13 +183,7 @@ def test_a_recording_that_was_broken_off_or_is_empty_leaves_nothing(
     ],
     ids=str,
 )
-def test_what_the_reader_would_refuse_is_not_written(
-    tmp_path: Path,
-    unit: RecordedUnit,
-    numbered: Numbered,
-    changes: dict[str, object],
-    words: str,
-) -> None:
+def test_what_the_reader_would_refuse_is_not_written(tmp_path, unit, numbered, changes, words):
     recorder = RecordingWriter(tmp_path / "run", unit, "x")
     recorder.write(numbered(0, 10))
     with pytest.raises(ConfigError, match=words):
@@ -212,9 +192,7 @@ def test_what_the_reader_would_refuse_is_not_written(
     assert recorder.finish().n_blocks == 2
 
 
-def test_a_manifest_says_when_it_began_and_who_made_it(
-    record: Callable[..., Path], numbered: Numbered
-) -> None:
+def test_a_manifest_says_when_it_began_and_who_made_it(record, numbered):
     first = numbered(0, 50, start_ns=1_767_225_600_008_333_333)
     manifest = open_recording(record([first, numbered(50, 50)])).manifest
     assert manifest.start == "2026-01-01T00:00:00.008333333Z"
@@ -222,9 +200,7 @@ def test_a_manifest_says_when_it_began_and_who_made_it(
 
 
 @pytest.mark.parametrize("dtype", [np.int16, np.float32])
-def test_the_first_block_may_decide_what_is_recorded(
-    tmp_path: Path, unit: RecordedUnit, numbered: Numbered, dtype: type
-) -> None:
+def test_the_first_block_may_decide_what_is_recorded(tmp_path, unit, numbered, dtype):
     block = numbered(0, 50, counts=np.arange(100).reshape(2, 50).astype(dtype))
     with RecordingWriter(tmp_path / "run", unit, "x") as recorder:
         recorder.write(block)
@@ -239,9 +215,7 @@ def test_the_first_block_may_decide_what_is_recorded(
     st.tuples(st.booleans(), st.booleans()),
     st.tuples(st.floats(width=32), st.floats(-11.0, 121.0, width=32)),
 )
-def test_what_was_judged_is_judged_the_same_again(
-    samples: CountArray | SampleArray, ok: tuple[bool, bool], slow: tuple[float, float]
-) -> None:
+def test_what_was_judged_is_judged_the_same_again(samples, ok, slow):
     limits = {"full_scale_v": 12.0, "unit_per_v": 250.0, "ok_min_v": 1.0, "ok_max_v": 11.0}
     recorded = RecordedUnit(
         unit="U1",
@@ -265,9 +239,7 @@ def test_what_was_judged_is_judged_the_same_again(
     assert again.samples.tobytes() == block.samples.tobytes()
 
 
-def test_another_unit_or_calibration_is_refused(
-    tmp_path: Path, unit: RecordedUnit, numbered: Numbered
-) -> None:
+def test_another_unit_or_calibration_is_refused(tmp_path, unit, numbered):
     block = numbered(0, 5)
     gains = tuple(c.model_copy(update={"unit_per_v": -251.0}) for c in unit.channels)
     for change in (

@@ -2,9 +2,8 @@
 
 import inspect
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -13,7 +12,6 @@ import pytest
 
 from acquisition.delivery.blocks import BlockAssembler
 from acquisition.errors import ConfigError
-from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.reader import open_recording
 from acquisition.recordings.source import RecordingSource, select
 from acquisition.simulated.devices.recorded import RecordedFeed
@@ -23,8 +21,6 @@ from core.machine.unit import Unit
 from core.samples.blocks import Rejection, SampleBlock, joined
 from core.samples.calibration import UnitCalibration
 
-Record = Callable[[Iterable[SampleBlock]], Path]
-Numbered = Callable[..., SampleBlock]
 FOREIGN = [
     kind
     for _, kind in inspect.getmembers(pa.lib, inspect.isclass)
@@ -38,8 +34,8 @@ def machine(*channels: str, measurand: Measurand = Measurand.GAP_UM, **changes: 
 
 
 async def test_blocks_are_those_that_were_calibrated_live_also_when_left_and_taken_up_again(
-    record: Record, numbered: Numbered, stepped_clock
-) -> None:
+    record, numbered, stepped_clock
+):
     raws = [numbered(50 * n, 50) for n in range(14)]
     source = RecordingSource(open_recording(record(raws)), stepped_clock)
     async with source.connect() as blocks:
@@ -60,8 +56,8 @@ async def test_blocks_are_those_that_were_calibrated_live_also_when_left_and_tak
 
 @pytest.mark.parametrize("speed", [1.0, 50.0])
 async def test_it_takes_the_time_it_took_gaps_included_and_restarts_not(
-    record: Record, numbered: Numbered, stepped_clock, speed: float
-) -> None:
+    record, numbered, stepped_clock, speed
+):
     raws = [numbered(0, 50), numbered(6050, 50), numbered(100, 50, epoch=2)]
     source = RecordingSource(open_recording(record(raws)), stepped_clock, speed=speed)
     async with source.connect() as blocks:
@@ -69,18 +65,14 @@ async def test_it_takes_the_time_it_took_gaps_included_and_restarts_not(
     assert np.multiply(arrived_s, speed) == pytest.approx([50 / 600, 6100 / 600, 6150 / 600])
 
 
-def test_time_cannot_stand_still_or_run_back(
-    record: Record, numbered: Numbered, stepped_clock
-) -> None:
+def test_time_cannot_stand_still_or_run_back(record, numbered, stepped_clock):
     recording = open_recording(record([numbered(0, 50)]))
     for speed in (0.0, -1.0, float("nan")):
         with pytest.raises(ValueError, match="speed must be above 0"):
             RecordingSource(recording, stepped_clock, speed=speed)
 
 
-async def test_a_unit_finds_its_channels_by_name_wherever_they_are(
-    record: Record, numbered: Numbered, stepped_clock
-) -> None:
+async def test_a_unit_finds_its_channels_by_name_wherever_they_are(record, numbered, stepped_clock):
     raw = numbered(0, 50, ok=(True, False), slow=(40.0, 50.0))
     recording = open_recording(record([raw]))
     wanted = machine("c1", "c0", id="U7")
@@ -103,11 +95,7 @@ async def test_a_unit_finds_its_channels_by_name_wherever_they_are(
             {},
             "channel c0 is recorded as gap_um, but configured as velocity_mm_s in unit U1",
         ),
-        (
-            machine("c0"),
-            {"power": "MW"},
-            "requires slow channel power, but the recording has slow0, slow1",
-        ),
+        (machine("c0"), {"power": "MW"}, "slow channel power, but the recording has slow0, slow1"),
         (
             machine("c0"),
             {"slow0": "mm"},
@@ -116,16 +104,12 @@ async def test_a_unit_finds_its_channels_by_name_wherever_they_are(
     ],
     ids=["rate", "channel", "measurand", "slow channel", "slow unit"],
 )
-def test_a_recording_of_something_else_is_refused_naming_both(
-    unit: RecordedUnit, wanted: Unit, slow_units: dict[str, str], words: str
-) -> None:
+def test_a_recording_of_something_else_is_refused_naming_both(unit, wanted, slow_units, words):
     with pytest.raises(ConfigError, match=words):
         select(unit, wanted, slow_units)
 
 
-async def test_a_recording_that_vanishes_is_an_error_of_its_own(
-    record: Record, numbered: Numbered, stepped_clock
-) -> None:
+async def test_a_recording_that_vanishes_is_an_error_of_its_own(record, numbered, stepped_clock):
     recording = open_recording(record([numbered(0, 50)]))
     (recording.folder / "samples.parquet").unlink()
     async with RecordingSource(recording, stepped_clock).connect() as blocks:
@@ -137,8 +121,8 @@ async def test_a_recording_that_vanishes_is_an_error_of_its_own(
 @pytest.mark.parametrize("kind", FOREIGN, ids=lambda kind: kind.__name__)
 @pytest.mark.usefixtures("reads_here")
 async def test_no_exception_of_pyarrow_or_the_disk_leaves_under_its_own_name(
-    record: Record, numbered: Numbered, stepped_clock, monkeypatch, kind: type, call: str
-) -> None:
+    record, numbered, stepped_clock, monkeypatch, kind, call
+):
     recording = open_recording(record([numbered(50 * n, 50) for n in range(5)]))
 
     def fails(*_: object, **__: object) -> None:
@@ -163,9 +147,7 @@ def all_pieces(feed: RecordedFeed, lengths: Iterable[int]) -> list[SampleBlock]:
 
 
 @pytest.mark.parametrize("length", [1, 7, 20, 50, 60, 1000])
-def test_pieces_of_any_length_bring_every_sample_once_at_its_index(
-    record: Record, numbered: Numbered, length: int
-) -> None:
+def test_pieces_of_any_length_bring_every_sample_once_at_its_index(record, numbered, length):
     # what was rejected is as missing as a gap; then directly on it
     stretches = [(0, 200, ()), (263, 400, (Rejection("torn", 50),)), (400, 450, ())]
     blocks = [numbered(a, b - a, rejected=rejected) for a, b, rejected in stretches]
@@ -184,9 +166,7 @@ def test_pieces_of_any_length_bring_every_sample_once_at_its_index(
 
 
 @pytest.mark.parametrize("length", [1, 10, 25, 50])
-def test_what_a_daq_makes_of_it_is_the_recording_to_the_last_bit(
-    record: Record, numbered: Numbered, length: int
-) -> None:
+def test_what_a_daq_makes_of_it_is_the_recording_to_the_last_bit(record, numbered, length):
     blocks = [
         numbered(0, 50, slow=(40.0, 1.0)),
         numbered(50, 50, slow=(41.0, 2.0), ok=(True, False)),
@@ -204,7 +184,7 @@ def through_delivery(raws: list[SampleBlock], calibration: UnitCalibration) -> l
     return [f"{block!r} {block.samples.tobytes().hex()}" for block in blocks]
 
 
-def test_the_length_of_pieces_may_change_at_any_time(record: Record, numbered: Numbered) -> None:
+def test_the_length_of_pieces_may_change_at_any_time(record, numbered):
     blocks = [numbered(50 * n, 50) for n in range(20)]
     feed = RecordedFeed(open_recording(record(blocks)))
     with pytest.raises(ValueError, match="n_samples must be at least 1, got 0"):
@@ -216,7 +196,7 @@ def test_the_length_of_pieces_may_change_at_any_time(record: Record, numbered: N
         feed.advance(5)
 
 
-def test_only_the_channels_of_the_unit_are_given(record: Record, numbered: Numbered) -> None:
+def test_only_the_channels_of_the_unit_are_given(record, numbered):
     recording = open_recording(record([numbered(0, 50, ok=(True, False))]))
     unit = Unit("U1", 92.3, 600.0, (Channel("c1", Measurand.GAP_UM),), ())
     piece = RecordedFeed(recording, select(recording.manifest, unit, {})).advance(50)

@@ -30,9 +30,9 @@ def receiver_port() -> Iterator[int]:
 
 @pytest.fixture(scope="package")
 def plant(
-    chromium: str,  # noqa: ARG001 - skip before start
-    tmp_path_factory: pytest.TempPathFactory,
-    receiver_port: int,
+    chromium,  # noqa: ARG001 - skip before start
+    tmp_path_factory,
+    receiver_port,
 ) -> Iterator[Plant]:
     folder = tmp_path_factory.mktemp("guarded")
     shutil.copytree(RECORDING, folder / "var" / "demo" / "captures" / RECORDED)

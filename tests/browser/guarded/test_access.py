@@ -21,7 +21,7 @@ FIELDS = ("password", "new-password", "new-password-again")
 @pytest.mark.parametrize("n_restarts", fast_and_long(0, 1))
 async def test_the_first_account_is_made_with_the_token_and_lasts_over_a_restart(
     new_plant, page, complaints, n_restarts
-) -> None:
+):
     new_plant.is_open = False
     if n_restarts:
         new_plant.settings += "[access]\nlogin = true\n"
@@ -60,7 +60,7 @@ async def open_as(page: Page, name: str, address: str, awaited: str = ROW) -> No
 
 async def test_nothing_of_the_plant_shows_before_a_login_which_leads_on_to_the_page_asked_for(
     plant, remote_page, complaints
-) -> None:
+):
     page = remote_page
     await page.goto(plant.url + ALARMS)
     await expect(page.get_by_role("heading", name="Log in")).to_be_visible()
@@ -77,9 +77,7 @@ async def test_nothing_of_the_plant_shows_before_a_login_which_leads_on_to_the_p
     assert complaints == []
 
 
-async def test_a_wrong_password_is_said_in_a_sentence_and_many_make_one_wait(
-    plant, remote_page
-) -> None:
+async def test_a_wrong_password_is_said_in_a_sentence_and_many_make_one_wait(plant, remote_page):
     page = remote_page
     await page.goto(plant.url)
     button = page.locator(".entries button")
@@ -107,7 +105,7 @@ async def test_a_wrong_password_is_said_in_a_sentence_and_many_make_one_wait(
     await expect(page.locator(".person")).to_contain_text("operator, operator")
 
 
-async def test_a_viewer_is_told_what_he_may_not_do_and_not_offered_it(plant, remote_page) -> None:
+async def test_a_viewer_is_told_what_he_may_not_do_and_not_offered_it(plant, remote_page):
     page = remote_page
     await open_as(page, "viewer", plant.url + ALARMS)
     await expect(page.locator(f"{ROW} button:visible")).to_have_count(0)
@@ -118,9 +116,7 @@ async def test_a_viewer_is_told_what_he_may_not_do_and_not_offered_it(plant, rem
     await expect(page.get_by_text("takes the role engineer")).to_be_visible()
 
 
-async def test_an_operator_acts_in_his_own_name_and_leaves_baselines_alone(
-    plant, remote_page
-) -> None:
+async def test_an_operator_acts_in_his_own_name_and_leaves_baselines_alone(plant, remote_page):
     page = remote_page
     await open_as(page, "operator", plant.url + ALARMS)
     await page.locator(ROW).get_by_role("button", name="Comment…").click()
@@ -133,9 +129,7 @@ async def test_an_operator_acts_in_his_own_name_and_leaves_baselines_alone(
     await expect(page.locator(".limit")).to_contain_text("takes the role engineer")
 
 
-async def test_a_login_that_ends_leads_to_the_door_and_back_to_the_same_page(
-    plant, remote_page
-) -> None:
+async def test_a_login_that_ends_leads_to_the_door_and_back_to_the_same_page(plant, remote_page):
     page = remote_page
     await open_as(page, "engineer", plant.url + ALARMS)
     await page.context.clear_cookies()
@@ -151,7 +145,7 @@ async def test_a_login_that_ends_leads_to_the_door_and_back_to_the_same_page(
 
 async def test_an_admin_adds_changes_and_removes_accounts_and_reads_what_is_refused(
     plant, remote_page, complaints
-) -> None:
+):
     page = remote_page
     await open_as(page, "admin", plant.url + "#/access", "[data-account=admin]")
     shown = await page.locator(".accounts tbody th").all_inner_texts()
@@ -190,9 +184,7 @@ async def test_an_admin_adds_changes_and_removes_accounts_and_reads_what_is_refu
     await expect(page.locator(NEW)).to_have_count(0)
 
 
-async def test_a_key_is_shown_once_opens_until_it_is_revoked_and_then_no_more(
-    plant, remote_page, browser
-) -> None:
+async def test_a_key_is_shown_once_and_opens_until_it_is_revoked(plant, remote_page, browser):
     page = remote_page
     await open_as(page, "admin", plant.url + "#/access", "[data-account=admin]")
     await page.get_by_role("button", name="Create a key…").press("Enter")
@@ -234,7 +226,7 @@ async def local(plant, browser) -> AsyncIterator[APIRequestContext]:
 
 async def test_an_own_password_is_changed_and_a_change_without_an_answer_is_reported(
     plant, remote_page, local
-) -> None:
+):
     page, other, api = remote_page, f"{PASSWORD} and cold", f"{plant.url}api/v1"
     await page.goto(f"{plant.url}#/password")
     await log_in(page, PAINTER)

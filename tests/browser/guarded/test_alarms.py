@@ -31,9 +31,7 @@ def is_nothing_new(response: Response) -> bool:
     return response.url.endswith("/api/v1/alarms") and response.status == 304
 
 
-async def test_an_alarm_is_acknowledged_shelved_and_brought_back_by_keys_alone(
-    plant, page, complaints
-) -> None:
+async def test_an_alarm_is_acknowledged_shelved_and_unshelved_by_keys(plant, page, complaints):
     await page.goto(plant.url + LIST)
     row = page.locator(LINK)
     await expect(row).to_be_visible()
@@ -86,7 +84,7 @@ async def test_an_alarm_is_acknowledged_shelved_and_brought_back_by_keys_alone(
     assert complaints == []
 
 
-async def test_the_list_and_its_history_are_filtered_together(plant, page, complaints) -> None:
+async def test_the_list_and_its_history_are_filtered_together(plant, page, complaints):
     await page.goto(plant.url + LIST)
     row, history = page.locator(LINK), page.get_by_role("table", name="History")
     await expect(row).to_be_visible()
@@ -108,7 +106,7 @@ async def test_the_list_and_its_history_are_filtered_together(plant, page, compl
     assert complaints == []
 
 
-async def test_an_alarm_is_acknowledged_where_it_is_seen(plant, page, complaints) -> None:
+async def test_an_alarm_is_acknowledged_where_it_is_seen(plant, page, complaints):
     await page.goto(plant.url + LIST)
     await shelve_and_back(page)
     for place, is_last in (("#/", False), ("#/units/U1", True)):
@@ -136,7 +134,7 @@ async def shelve_and_back(page: Page) -> None:
     await expect(page.locator(LINK)).to_have_attribute("data-state", "unacknowledged")
 
 
-async def test_alarms_are_acknowledged_together_and_what_is_refused_is_said(plant, page) -> None:
+async def test_alarms_are_acknowledged_together_and_what_is_refused_is_said(plant, page):
     other = "U1:device:clock_offset"
 
     async def with_another(route: Route) -> None:
@@ -163,9 +161,7 @@ async def test_alarms_are_acknowledged_together_and_what_is_refused_is_said(plan
     await expect(page.get_by_role("button", name="Acknowledge all")).to_be_hidden()
 
 
-async def test_a_receiver_that_is_away_is_named_until_it_has_taken_what_waits(
-    plant, page, receiver_port
-) -> None:
+async def test_a_receiver_that_is_away_is_named_until_none_waits(plant, page, receiver_port):
     await page.goto(plant.url + LIST)
     line = page.locator(".delivery li")
     await expect(line).to_contain_text("desk: not delivered since")
@@ -176,7 +172,7 @@ async def test_a_receiver_that_is_away_is_named_until_it_has_taken_what_waits(
         await expect(page.locator(".delivery")).to_be_hidden()
 
 
-async def test_what_has_not_changed_is_not_sent_again_and_stays_on_the_page(plant, page) -> None:
+async def test_what_has_not_changed_is_not_sent_again_and_stays_on_the_page(plant, page):
     async with page.expect_response(is_nothing_new):
         await page.goto(plant.url + LIST)
     async with page.expect_response(is_nothing_new):
@@ -185,7 +181,7 @@ async def test_what_has_not_changed_is_not_sent_again_and_stays_on_the_page(plan
     await expect(page.locator("#service")).to_contain_text("Service answered")
 
 
-async def test_a_page_from_before_an_upgrade_says_so_and_loads_the_new_one(plant, page) -> None:
+async def test_a_page_from_before_an_upgrade_says_so_and_loads_the_new_one(plant, page):
     await page.goto(plant.url)
     await expect(page.locator("#service")).to_contain_text("Service answered")
     await expect(page.locator("#upgrade")).to_be_hidden()

@@ -9,7 +9,7 @@ from real_plant import RECORDED
 LOST = re.compile("not connected|No samples come")
 
 
-async def test_where_no_device_answers_every_page_says_so_and_what_to_do(plant, page) -> None:
+async def test_where_no_device_answers_every_page_says_so_and_what_to_do(plant, page):
     await page.goto(plant.url + "#/units/U1/bearings/LJB")
     await expect(page.locator(".state .mark")).to_have_text("Bad: not connected")
     for chart in await page.locator(".charts figure").all():
@@ -29,9 +29,7 @@ async def test_where_no_device_answers_every_page_says_so_and_what_to_do(plant, 
     await expect(page.locator(".operating-state")).to_have_text("Operating state not known")
 
 
-async def test_a_recording_is_played_although_its_unit_is_not_connected(
-    plant, page, complaints
-) -> None:
+async def test_a_recording_is_played_although_its_unit_is_not_connected(plant, page, complaints):
     await page.goto(plant.url + "#/units/U1/bearings/UJB/orbits")
     await expect(page.locator(".player .sentence")).to_contain_text("No sample of this unit")
     await expect(page.locator("#orbit-source option")).to_have_count(2)

@@ -26,9 +26,7 @@ def gn_per_m(value: float) -> str:
     return f"{value / 1e9:.5f} GN/m"
 
 
-async def test_every_chart_is_drawn_from_the_plant_alone_and_says_what_it_shows(
-    plant, page, complaints
-) -> None:
+async def test_every_chart_comes_from_the_plant_and_says_what_it_shows(plant, page, complaints):
     asked = []
     page.on("request", lambda request: asked.append(request.url))
     await page.goto(plant.url + BEARING)
@@ -54,7 +52,7 @@ async def test_every_chart_is_drawn_from_the_plant_alone_and_says_what_it_shows(
     assert complaints == []
 
 
-async def test_the_numbers_do_not_wait_for_the_chart_library(plant, page: Page) -> None:
+async def test_the_numbers_do_not_wait_for_the_chart_library(plant, page):
     is_let = asyncio.Event()
 
     async def hold(route: Route) -> None:
@@ -68,9 +66,7 @@ async def test_the_numbers_do_not_wait_for_the_chart_library(plant, page: Page) 
     await await_charts(page)
 
 
-async def test_the_keyboard_leads_from_the_plant_to_a_unit_its_bearing_and_its_charts(
-    plant, page
-) -> None:
+async def test_the_keyboard_leads_from_the_plant_to_a_unit_its_bearing_and_its_charts(plant, page):
     await page.goto(plant.url)
     await page.get_by_role("link", name="Unit 1").focus()
     await page.keyboard.press("Enter")
@@ -83,7 +79,7 @@ async def test_the_keyboard_leads_from_the_plant_to_a_unit_its_bearing_and_its_c
     await expect(page.locator(".choices").get_by_role("radio", name="1 h")).to_be_checked()
 
 
-async def test_an_unknown_unit_or_bearing_is_named_and_leads_back(plant, page) -> None:
+async def test_an_unknown_unit_or_bearing_is_named_and_leads_back(plant, page):
     for address, sentence in (
         ("#/units/U9", "This plant has no unit U9."),
         ("#/units/U1/bearings/XYZ", "This plant has no bearing XYZ on a unit U1."),
@@ -94,7 +90,7 @@ async def test_an_unknown_unit_or_bearing_is_named_and_leads_back(plant, page) -
         await expect(page.locator("[data-bearing=UJB]")).to_be_visible()
 
 
-async def test_a_budget_opens_by_keyboard_and_is_that_of_the_api(plant, page, complaints) -> None:
+async def test_a_budget_opens_by_keyboard_and_is_that_of_the_api(plant, page, complaints):
     await open_bearing(page, plant.url)
     answer = await page.request.get(f"{plant.url}api/v1/units/U1/bearings/UJB/budgets/{PREFERRED}")
     budget = await answer.json()
@@ -122,7 +118,7 @@ async def test_a_budget_opens_by_keyboard_and_is_that_of_the_api(plant, page, co
     assert complaints == []
 
 
-async def test_a_closed_budget_asks_nothing(plant, browser) -> None:
+async def test_a_closed_budget_asks_nothing(plant, browser):
     page = await browser.new_page()  # its clock is that of all pages of its context
     asked: list[str] = []
     page.on("request", lambda request: "/budgets/" in request.url and asked.append(request.url))
@@ -141,9 +137,7 @@ async def test_a_closed_budget_asks_nothing(plant, browser) -> None:
     await page.close()
 
 
-async def test_one_budget_is_open_at_a_time_and_one_that_cannot_be_had_says_why(
-    plant, page
-) -> None:
+async def test_one_budget_is_open_at_a_time_and_one_that_cannot_be_had_says_why(plant, page):
     await open_bearing(page, plant.url)
     shown = page.locator(".tiles .budget")
     other = page.locator(".tiles [data-reading=eccentricity_ratio] button.spread")

@@ -71,9 +71,7 @@ async def unfold(page: Page, address: str) -> None:
         await await_orbit(page)
 
 
-async def test_every_page_opens_without_a_complaint_and_under_a_title_of_its_own(
-    plant, page, complaints
-) -> None:
+async def test_every_page_opens_without_a_complaint_under_its_own_title(plant, page, complaints):
     titles = set()
     pages = await addresses(page, plant.url)
     for address in pages:
@@ -83,7 +81,7 @@ async def test_every_page_opens_without_a_complaint_and_under_a_title_of_its_own
     assert len(titles) == len(pages)
 
 
-async def test_no_page_scrolls_sideways_on_a_phone(plant, phone_page) -> None:
+async def test_no_page_scrolls_sideways_on_a_phone(plant, phone_page):
     for address in await addresses(phone_page, plant.url):
         await open_settled(phone_page, plant.url + address)
         await unfold(phone_page, address)
@@ -91,7 +89,7 @@ async def test_no_page_scrolls_sideways_on_a_phone(plant, phone_page) -> None:
 
 
 @pytest.mark.parametrize("schemes", fast_and_long(("light", "dark"), ("dark", "light")))
-async def test_no_page_shuts_anybody_out_in_light_or_in_dark(plant, page, schemes) -> None:
+async def test_no_page_shuts_anybody_out_in_light_or_in_dark(plant, page, schemes):
     if not AXE.is_file():
         pytest.skip("needs npm")
     pages = await addresses(page, plant.url)
@@ -105,9 +103,7 @@ async def test_no_page_shuts_anybody_out_in_light_or_in_dark(plant, page, scheme
         assert not grave, f"{address}, {scheme}: {json.dumps(grave, indent=1)}"
 
 
-async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembered(
-    plant, page
-) -> None:
+async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembered(plant, page):
     await page.emulate_media(color_scheme="dark")
     await page.goto(plant.url + BEARING)
     dark = await page.evaluate(BAND)
@@ -125,7 +121,7 @@ async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembe
     await page.wait_for_function(REDRAWN, arg=drawn)
 
 
-async def test_amplitudes_are_shown_zero_to_peak_or_twice_that_as_chosen(plant, page) -> None:
+async def test_amplitudes_are_shown_zero_to_peak_or_twice_that_as_chosen(plant, page):
     await page.goto(plant.url + BEARING)
     shaft = page.locator("[data-reading=order1_shaft_x_um_pk]")
     before = await number_with(shaft, "µm pk")

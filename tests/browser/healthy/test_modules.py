@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from on_screen import FILES
-from playwright.async_api import Browser, Page, Request, Route, expect
+from playwright.async_api import Request, Route, expect
 
 EMPTY = FILES[1:] + "padwatch.svg"
 """A page of the plant that runs nothing by itself."""
@@ -31,7 +31,7 @@ NAMELESS = SILENT | {"reason": "daq:502: no name server answered within 1.0 s"}
 UNKNOWN = SILENT | {"reason": "daq:502: [Errno -3] Temporary failure in name resolution"}
 
 
-async def test_an_alarm_leads_to_where_most_is_told_about_it(plant, page: Page) -> None:
+async def test_an_alarm_leads_to_where_most_is_told_about_it(plant, page):
     await page.goto(plant.url + EMPTY)
     bearing = ("order1_shaft_x", "zone_bearing_y", "oil_temperature", "gap_x", "opposite_gap_y")
     alarms = [("film_stiffness", "UJB"), ("channel_not_ok", "a"), ("link_lost", "link")]
@@ -46,7 +46,7 @@ async def test_an_alarm_leads_to_where_most_is_told_about_it(plant, page: Page) 
     assert words == "full load, eccentricity 0.37, oil 46.2 °C"
 
 
-async def test_an_alarm_says_its_directions_and_what_it_waits_for(plant, page: Page) -> None:
+async def test_an_alarm_says_its_directions_and_what_it_waits_for(plant, page):
     await page.goto(plant.url + EMPTY)
     film = {"kind": "film_stiffness", "directions": "xy", "waits_for": "danger"}
     gap = {"kind": "gap_x", "directions": "", "waits_for": "normal"}
@@ -62,7 +62,7 @@ async def test_an_alarm_says_its_directions_and_what_it_waits_for(plant, page: P
             assert await page.evaluate(CALL, ["alarm_words", "waitWords", alarm]) == waits
 
 
-async def test_before_and_after_are_told_in_words_and_a_broken_chain_is_seen(plant, page) -> None:
+async def test_before_and_after_are_told_in_words_and_a_broken_chain_is_seen(plant, page):
     await page.goto(plant.url + EMPTY)
     shelved = {
         "action": "alarm.shelved",
@@ -86,7 +86,7 @@ async def test_before_and_after_are_told_in_words_and_a_broken_chain_is_seen(pla
         assert found["look"] == look
 
 
-async def test_a_wrong_sign_is_never_good_and_names_the_channels(plant, page: Page) -> None:
+async def test_a_wrong_sign_is_never_good_and_names_the_channels(plant, page):
     await page.goto(plant.url + EMPTY)
     good = {"quality": {"level": "good", "reason": "ok"}, "readings": {}, "bad_reasons": []}
     for signs, level in (([], "good"), (["b_shaft_x", "b_bearing_x"], "uncertain")):
@@ -96,7 +96,7 @@ async def test_a_wrong_sign_is_never_good_and_names_the_channels(plant, page: Pa
     assert found["words"] == "check the sign of b_shaft_x or b_bearing_x"
 
 
-async def test_a_verdict_says_since_when_and_in_which_directions(plant, page: Page) -> None:
+async def test_a_verdict_says_since_when_and_in_which_directions(plant, page):
     await page.goto(plant.url + EMPTY)
     alarm = {"is_active": True, "raised": "2026-01-01T10:00:00Z", "value": -12.0}
     alarm |= {"level": "danger", "kind": "film_stiffness", "condition_reason": "film_changed"}
@@ -127,7 +127,7 @@ async def test_a_verdict_says_since_when_and_in_which_directions(plant, page: Pa
     assert found[:2] == ["quiet", "Change not confirmed yet"]  # never normal at −30 %
 
 
-async def test_the_worst_about_a_source_is_told_with_what_to_do(plant, page) -> None:
+async def test_the_worst_about_a_source_is_told_with_what_to_do(plant, page):
     await page.goto(plant.url + EMPTY)
     for changes, alarms, lost, rank, look, said in [
         (NAMELESS, [], 0, 0, "bad", "name of the device"),
@@ -149,7 +149,7 @@ async def test_the_worst_about_a_source_is_told_with_what_to_do(plant, page) -> 
         assert said in found["advice"]
 
 
-async def test_peaks_and_harmonics_are_read_between_the_lines_of_a_hann_window(plant, page) -> None:
+async def test_peaks_and_harmonics_are_read_between_the_lines_of_a_hann_window(plant, page):
     await page.goto(plant.url + EMPTY)
     n, bin_hz = 4096, 0.1
     at = np.arange(n) / n
@@ -171,12 +171,12 @@ async def test_peaks_and_harmonics_are_read_between_the_lines_of_a_hann_window(p
     assert len(orders) == 2  # no peak below where it is looked for
 
 
-async def test_an_orbit_may_be_drawn_before_its_place_on_the_page_has_a_size(plant, page) -> None:
+async def test_an_orbit_may_be_drawn_before_its_place_on_the_page_has_a_size(plant, page):
     await page.goto(plant.url)
     await page.evaluate(DRAWN_WITHOUT_A_SIZE, FILES)
 
 
-async def test_the_page_names_all_modules_that_it_loads(plant, page: Page) -> None:
+async def test_the_page_names_all_modules_that_it_loads(plant, page):
     asked: list[str] = []
 
     def note(request: Request) -> None:
@@ -194,7 +194,7 @@ async def test_the_page_names_all_modules_that_it_loads(plant, page: Page) -> No
     assert modules == set(named)
 
 
-async def test_a_page_whose_modules_did_not_load_loads_itself_again(plant, page: Page) -> None:
+async def test_a_page_whose_modules_did_not_load_loads_itself_again(plant, page):
     failed: list[Route] = []
 
     async def fail(route: Route) -> None:
@@ -208,9 +208,7 @@ async def test_a_page_whose_modules_did_not_load_loads_itself_again(plant, page:
     assert len(failed) == 1
 
 
-async def test_the_reference_of_the_api_needs_no_other_site(
-    plant, page: Page, complaints: list[str]
-) -> None:
+async def test_the_reference_of_the_api_needs_no_other_site(plant, page, complaints):
     elsewhere: list[str] = []
 
     def note(request: Request) -> None:
@@ -228,7 +226,7 @@ async def test_the_reference_of_the_api_needs_no_other_site(
     assert complaints == []
 
 
-async def test_browsers_that_open_the_page_at_once_all_show_it(plant, browser: Browser) -> None:
+async def test_browsers_that_open_the_page_at_once_all_show_it(plant, browser):
     contexts = [await browser.new_context() for _ in range(4)]
     pages = [await context.new_page() for context in contexts]
     for page in pages:

@@ -48,7 +48,7 @@ ARROW = """async ([files, sense]) => {
 
 async def test_spectra_over_time_are_a_map_or_lines_and_a_moment_is_chosen_by_key_or_click(
     plant, page, complaints
-) -> None:
+):
     await page.goto(plant.url + SPECTRA)
     await await_spectra(page)
     moment = page.locator("[data-chart=moment] figcaption")
@@ -83,9 +83,7 @@ async def test_spectra_over_time_are_a_map_or_lines_and_a_moment_is_chosen_by_ke
     assert complaints == []
 
 
-async def test_a_cursor_has_harmonics_and_the_address_holds_what_is_chosen(
-    plant, page, complaints
-) -> None:
+async def test_a_cursor_has_harmonics_and_the_address_holds_what_is_chosen(plant, page, complaints):
     await page.goto(f"{plant.url}{SPECTRA}?axis=cpm&picture=lines")
     cursor, rows = page.get_by_label("Cursor"), page.locator(".readings").first.locator("tbody tr")
     await expect(page.get_by_role("radio", name="cpm", exact=True)).to_be_checked()
@@ -110,7 +108,7 @@ async def test_a_cursor_has_harmonics_and_the_address_holds_what_is_chosen(
     assert complaints == []
 
 
-async def test_a_map_has_the_colours_of_its_legend(plant, page) -> None:
+async def test_a_map_has_the_colours_of_its_legend(plant, page):
     await page.goto(plant.url + SPECTRA)
     await await_spectra(page)
     chart = page.locator("[data-chart=waterfall] .chart")
@@ -122,7 +120,7 @@ async def test_a_map_has_the_colours_of_its_legend(plant, page) -> None:
     )
 
 
-async def test_an_orbit_plays_pauses_and_steps_by_keyboard(plant, page, complaints) -> None:
+async def test_an_orbit_plays_pauses_and_steps_by_keyboard(plant, page, complaints):
     await page.goto(plant.url + ORBITS)
     await await_orbit(page)
     play = page.locator(".player .play")
@@ -145,7 +143,7 @@ async def test_an_orbit_plays_pauses_and_steps_by_keyboard(plant, page, complain
 
 async def test_a_turn_is_held_as_reference_and_the_address_holds_what_is_drawn(
     plant, page, complaints
-) -> None:
+):
     await page.goto(f"{plant.url}{ORBITS}?motion=alone")
     await await_orbit(page)
     await expect(page.get_by_role("radio", name="To fit", exact=True)).to_be_checked()
@@ -164,14 +162,14 @@ async def test_a_turn_is_held_as_reference_and_the_address_holds_what_is_drawn(
     assert [words for words in complaints if "willReadFrequently" not in words] == []  # the test's
 
 
-async def test_an_arrow_points_the_way_the_shaft_runs(plant, page) -> None:
+async def test_an_arrow_points_the_way_the_shaft_runs(plant, page):
     await page.goto(plant.url)
     ways = [await page.evaluate(ARROW, [FILES, sense]) for sense in (1, -1)]
     assert ways[0] == pytest.approx([0.0, 1.0], abs=0.15)  # up, on the right: from x to y
     assert ways[1] == pytest.approx([0.0, -1.0], abs=0.15)
 
 
-async def test_every_transducer_of_the_bearing_has_its_waveform(plant, page) -> None:
+async def test_every_transducer_of_the_bearing_has_its_waveform(plant, page):
     await page.goto(plant.url + ORBITS)
     answer = await page.request.get(f"{plant.url}api/v1/units/U1/channels")
     found = (await answer.json())["waveform"]
@@ -182,7 +180,7 @@ async def test_every_transducer_of_the_bearing_has_its_waveform(plant, page) -> 
     await expect(chart.locator(".ytitle").first).to_have_text("µm")
 
 
-async def test_all_pages_of_a_bearing_have_the_same_ways(plant, page) -> None:
+async def test_all_pages_of_a_bearing_have_the_same_ways(plant, page):
     seen = []
     for here in ("", "/film", "/waterfall", "/orbits"):
         await page.goto(f"{plant.url}#/units/U1/bearings/UJB{here}")
@@ -194,7 +192,7 @@ async def test_all_pages_of_a_bearing_have_the_same_ways(plant, page) -> None:
     assert seen == [["Bearing", "Film", "Spectra over time", "Orbit player", "Trends"]] * 4
 
 
-async def test_nothing_moves_by_itself_for_those_who_asked_for_less_motion(plant, page) -> None:
+async def test_nothing_moves_by_itself_for_those_who_asked_for_less_motion(plant, page):
     await page.emulate_media(reduced_motion="reduce")
     await page.goto(plant.url + ORBITS)
     await await_orbit(page)

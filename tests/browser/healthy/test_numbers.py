@@ -60,7 +60,7 @@ def spread(name: str, reading: dict) -> str:
     return f"± {shown(name, half)}"
 
 
-async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(plant, page) -> None:
+async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(plant, page):
     await page.goto(plant.url + BEARING)
     overview = await freeze(page, plant.url, is_complete)
     await page.reload()
@@ -88,7 +88,7 @@ async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(plant,
         await expect(number).to_have_text(A_NUMBER)
 
 
-async def test_the_overview_shows_the_numbers_of_every_bearing(plant, page) -> None:
+async def test_the_overview_shows_the_numbers_of_every_bearing(plant, page):
     await page.goto(plant.url)
     overview = await freeze(page, plant.url, is_complete)
     await page.reload()
@@ -101,7 +101,7 @@ async def test_the_overview_shows_the_numbers_of_every_bearing(plant, page) -> N
             assert text == shown(name, latest["readings"][name]["value"]), name
 
 
-async def test_a_number_without_value_says_why_instead_of_zero(plant, page) -> None:
+async def test_a_number_without_value_says_why_instead_of_zero(plant, page):
     await page.goto(plant.url)
     overview = await freeze(page, plant.url, is_complete)
     readings = overview["units"][0]["bearings"][0]["readings"]

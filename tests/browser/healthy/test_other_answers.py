@@ -14,7 +14,7 @@ LOST = 7
 SIZE = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
 
 
-async def test_a_service_out_of_reach_comes_back_without_a_reload(plant, page) -> None:
+async def test_a_service_out_of_reach_comes_back_without_a_reload(plant, page):
     await page.goto(plant.url + BEARING)
     await expect(page.locator(STIFFNESS)).to_have_text(A_NUMBER)
     await page.evaluate("window.neverReloaded = true")
@@ -42,7 +42,7 @@ async def test_a_service_out_of_reach_comes_back_without_a_reload(plant, page) -
     assert await page.evaluate("window.neverReloaded")
 
 
-async def test_a_list_of_alarms_says_how_old_it_is(plant, page) -> None:
+async def test_a_list_of_alarms_says_how_old_it_is(plant, page):
     await page.goto(plant.url + "#/alarms")
     await expect(page.locator("#alarms")).to_contain_text("No alarms")
     await page.route("**/api/v1/**", lambda route: route.abort())
@@ -75,7 +75,7 @@ async def as_of_the_one(route: Route) -> None:
     )
 
 
-async def test_twenty_units_stand_on_the_screen_of_a_control_room_at_once(plant, page) -> None:
+async def test_twenty_units_stand_on_the_screen_of_a_control_room_at_once(plant, page):
     await page.route("**/api/v1/overview*", twenty_of_one)
     await page.goto(plant.url)
     await expect(page.locator(".unit-tile")).to_have_count(N_UNITS)
@@ -99,7 +99,7 @@ async def test_twenty_units_stand_on_the_screen_of_a_control_room_at_once(plant,
 NOT_WATCHED = "This film is not watched: operating states require power_channel and rated_power_mw."
 
 
-async def test_pages_without_contents_say_why(plant, page, complaints) -> None:
+async def test_pages_without_contents_say_why(plant, page, complaints):
     await page.goto(plant.url)
     link = page.locator("#alarms")
     await expect(link).to_contain_text("No alarms")
@@ -120,9 +120,7 @@ async def test_pages_without_contents_say_why(plant, page, complaints) -> None:
     assert complaints == []
 
 
-async def test_a_source_in_good_health_says_what_arrives_from_where(
-    plant, page, complaints
-) -> None:
+async def test_a_source_in_good_health_says_what_arrives_from_where(plant, page, complaints):
     await page.goto(plant.url + "#/sources")
     row = page.locator("[data-source=U1]")
     await expect(row.locator(".mark").first).to_have_text("Connected")
@@ -143,9 +141,7 @@ async def test_a_source_in_good_health_says_what_arrives_from_where(
     assert complaints == []
 
 
-async def test_a_film_that_is_not_watched_says_why_in_place_of_every_chart(
-    plant, page, complaints
-) -> None:
+async def test_a_film_that_is_not_watched_says_why_in_place_of_every_chart(plant, page, complaints):
     await page.goto(plant.url + "#/units/U1/bearings/UJB/film")
     await expect(page.locator(".film-verdict .sentence")).to_have_text(NOT_WATCHED)
     for name in ("baseline-map", "against-eccentricity_ratio", "against-oil_temperature_c"):

@@ -31,7 +31,7 @@ def days(request: Request) -> float:
     return (end - start) / timedelta(days=1)
 
 
-async def test_two_bearings_are_compared_and_the_address_says_so(plant, page, complaints) -> None:
+async def test_two_bearings_are_compared_and_the_address_says_so(plant, page, complaints):
     await page.goto(plant.url + "#/trends")
     await expect(page.locator("summary").first).to_have_text("Bearings: 1")
 
@@ -47,7 +47,7 @@ async def test_two_bearings_are_compared_and_the_address_says_so(plant, page, co
     assert complaints == []
 
 
-async def test_quantities_are_found_by_words_and_taken_away(plant, page) -> None:
+async def test_quantities_are_found_by_words_and_taken_away(plant, page):
     await page.goto(plant.url + COMPARED + "&last=2592000")
     await await_curve(page)
 
@@ -70,7 +70,7 @@ async def test_quantities_are_found_by_words_and_taken_away(plant, page) -> None
     assert "stiffness_xx_n_per_m_mean [N/m]" in rows[0]
 
 
-async def test_the_mouse_and_the_keyboard_zoom_and_back_leads_back(plant, page) -> None:
+async def test_the_mouse_and_the_keyboard_zoom_and_back_leads_back(plant, page):
     await page.goto(plant.url + COMPARED + "&last=2592000")
     await await_curve(page)
     before = page.url
@@ -102,7 +102,7 @@ async def test_the_mouse_and_the_keyboard_zoom_and_back_leads_back(plant, page) 
     assert datetime.now(UTC) - end > timedelta(days=12)
 
 
-async def test_a_chart_shows_what_is_expected_the_limits_and_notes(plant, page) -> None:
+async def test_a_chart_shows_what_is_expected_the_limits_and_notes(plant, page):
     await page.goto(plant.url + "#/trends")
     legend = page.locator(f"{STIFFNESS} .legendtext")
     for name in ("expected", "alert limit", "danger limit"):
@@ -123,9 +123,7 @@ async def test_a_chart_shows_what_is_expected_the_limits_and_notes(plant, page) 
     await expect(page.get_by_text("shims changed").first).to_be_visible()
 
 
-async def test_two_units_share_a_chart_and_stiffness_is_drawn_over_eccentricity(
-    plant, page
-) -> None:
+async def test_two_units_share_a_chart_and_stiffness_is_drawn_over_eccentricity(plant, page):
     await page.goto(plant.url + COMPARED + "&q=oil_temperature_c&last=2592000")
     await await_curve(page, "[data-chart=trend-operation-c]")
 
@@ -147,7 +145,7 @@ async def test_two_units_share_a_chart_and_stiffness_is_drawn_over_eccentricity(
     await expect(over.get_by_role("radio", name="Eccentricity")).to_be_checked()
 
 
-async def test_a_time_without_results_says_so(plant, page) -> None:
+async def test_a_time_without_results_says_so(plant, page):
     empty = "&from=2001-01-01T00:00:00Z&to=2001-01-02T00:00:00Z"
     await page.goto(plant.url + COMPARED + empty)
     sentence = page.locator(f"{STIFFNESS} .sentence")
@@ -162,9 +160,7 @@ async def test_a_time_without_results_says_so(plant, page) -> None:
     await expect(none).to_be_visible()
 
 
-async def test_an_address_restores_what_was_shown_and_is_complained_of_in_words(
-    plant, page
-) -> None:
+async def test_an_address_restores_what_was_shown_and_is_complained_of_in_words(plant, page):
     address = "#/trends?b=U1/TJB&q=speed_rpm&q=power_mw&last=604800&state=full_load"
     await page.goto(plant.url + address)
 
@@ -181,7 +177,7 @@ async def test_an_address_restores_what_was_shown_and_is_complained_of_in_words(
     await expect(page.get_by_text("U9 XYZ:")).to_be_visible()
 
 
-async def test_the_page_of_a_bearing_leads_to_its_trends(plant, page) -> None:
+async def test_the_page_of_a_bearing_leads_to_its_trends(plant, page):
     await page.goto(plant.url + "#/units/U1/bearings/LJB")
     await page.get_by_role("link", name="Compare in Trends").click()
     await expect(page.get_by_role("radio", name="15 min")).to_be_checked()
@@ -200,7 +196,7 @@ def bucket(value: float, level: str) -> dict[str, object]:
     return {"mean": value, "minimum": value, "maximum": value, "level": level}
 
 
-async def test_uncertain_values_far_from_the_good_ones_do_not_set_the_axis(plant, page) -> None:
+async def test_uncertain_values_far_from_the_good_ones_do_not_set_the_axis(plant, page):
     await page.goto(plant.url)
     good = [bucket(0.50, "good"), bucket(0.52, "good")]
     for others, low, high in (
@@ -219,7 +215,7 @@ async def test_uncertain_values_far_from_the_good_ones_do_not_set_the_axis(plant
     assert axis[1] > 26.4
 
 
-async def test_alarms_are_marked_when_they_were_raised_rose_and_returned(plant, page) -> None:
+async def test_alarms_are_marked_when_they_were_raised_rose_and_returned(plant, page):
     await page.goto(plant.url)
     events = [
         {
@@ -243,7 +239,7 @@ async def test_alarms_are_marked_when_they_were_raised_rose_and_returned(plant, 
     assert marks[1]["text"] == ["Oil temperature rose to danger"]
 
 
-async def test_the_bearing_whose_film_is_in_alarm_comes_first(plant, page) -> None:
+async def test_the_bearing_whose_film_is_in_alarm_comes_first(plant, page):
     overview = await freeze(page, plant.url)
     overview["units"][0]["bearings"][2]["film"]["y"]["level"] = "danger"
     overview["units"][0]["bearings"][1]["film"]["x"]["level"] = "alert"

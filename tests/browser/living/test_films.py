@@ -23,9 +23,7 @@ async def await_film_charts(page: Page) -> None:
         await expect(point).to_be_attached()
 
 
-async def test_a_film_is_told_in_words_and_its_charts_say_what_they_show(
-    plant, page, complaints
-) -> None:
+async def test_a_film_is_told_in_words_and_its_charts_say_what_they_show(plant, page, complaints):
     await page.goto(plant.url + FILM)
     await await_film_charts(page)
 
@@ -48,7 +46,7 @@ async def test_a_film_is_told_in_words_and_its_charts_say_what_they_show(
     assert complaints == []
 
 
-async def test_an_engineer_freezes_and_thaws_by_keys_and_reads_what_is_refused(plant, page) -> None:
+async def test_an_engineer_freezes_and_thaws_by_keys_and_reads_what_is_refused(plant, page):
     await page.goto(plant.url + FILM)
     version = page.locator("[data-version='1']")
     await expect(version).to_have_attribute("data-status", "in_force")
@@ -82,7 +80,7 @@ async def test_an_engineer_freezes_and_thaws_by_keys_and_reads_what_is_refused(p
     await expect(version).to_have_attribute("data-status", "in_force")
 
 
-async def test_overview_and_bearing_page_have_the_verdict_and_lead_to_the_film(plant, page) -> None:
+async def test_overview_and_bearing_page_have_the_verdict_and_lead_to_the_film(plant, page):
     await page.goto(plant.url)
     brief = page.locator("[data-bearing=UJB] .film-brief .mark").first
     await expect(brief).to_contain_text(WORDS)
@@ -109,7 +107,7 @@ LOOKS = "marks => marks.map((mark) => mark.dataset.look)"
 
 async def test_the_first_screen_says_which_bearing_is_unwell_by_how_much_since_when_and_why(
     plant, page, phone_page
-) -> None:
+):
     for shown in (page, phone_page):
         overview = await freeze(shown, plant.url)
         other = copy.deepcopy(overview["units"][0]) | {"id": "U2", "name": "Unit 2"}
@@ -135,7 +133,7 @@ async def test_the_first_screen_says_which_bearing_is_unwell_by_how_much_since_w
         assert not set(verdicts) & set(data)
 
 
-async def test_a_time_without_spectra_says_why_and_since_when_there_are_some(plant, page) -> None:
+async def test_a_time_without_spectra_says_why_and_since_when_there_are_some(plant, page):
     await page.goto(plant.url + FILM.replace("film", "waterfall"))
     await await_spectra(page)
     sentence = page.locator("[data-chart=waterfall] .sentence")
@@ -167,9 +165,7 @@ async ([files, addresses]) => {
 """
 
 
-async def test_the_trail_tells_what_the_service_has_written_and_the_keyboard_finds_it(
-    plant, page, complaints
-) -> None:
+async def test_the_trail_tells_what_the_service_wrote_and_keys_find_it(plant, page, complaints):
     told = await (await page.request.get(f"{plant.url}api/v1/audit?limit=100")).json()
     await page.goto(plant.url + "#/audit")
     rows = page.locator("[data-entry]")
@@ -191,9 +187,7 @@ async def test_the_trail_tells_what_the_service_has_written_and_the_keyboard_fin
     assert complaints == []
 
 
-async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(
-    plant, page, complaints
-) -> None:
+async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(plant, page, complaints):
     await page.goto(plant.url + "#/units/U1")
     table = page.get_by_role("table", name="side by side")
     oil = table.locator("[data-reading=oil_temperature_c] .number")
@@ -215,7 +209,7 @@ async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(
     assert complaints == []
 
 
-async def test_films_and_trends_fit_a_phone(plant, phone_page) -> None:
+async def test_films_and_trends_fit_a_phone(plant, phone_page):
     for address, widest in WIDEST.items():
         await phone_page.goto(plant.url + address)
         await expect(phone_page.locator(widest).first).to_be_attached()

@@ -8,9 +8,7 @@ STIFFNESS = "[data-reading=stiffness_xx_n_per_m] .number"
 ROW = "[data-alarm='U1:link:link_lost']"
 
 
-async def test_a_silent_daq_takes_every_number_away_and_raises_an_alarm_until_it_answers(
-    plant, page
-) -> None:
+async def test_a_silent_daq_takes_every_number_away_and_is_an_alarm_until_it_answers(plant, page):
     motion = await page.context.new_page()
     await motion.goto(f"{plant.url}{BEARING}/orbits")
     await await_orbit(motion)

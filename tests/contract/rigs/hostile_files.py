@@ -16,7 +16,6 @@ from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob
 
 Read = Callable[[Path, ImportJob], Any]
-Placed = Callable[..., ImportJob]
 
 
 READ = """

@@ -1,14 +1,12 @@
 """What is written to a store, and what is asked of it; types of the fixtures for that."""
 
 from collections.abc import Callable
-from typing import Any
 
 from core.monitor.assessment import Assessment
 from core.samples.gaps import Gap
 from service.store.port import TrendQuery, UnitGap
 
 Build = Callable[..., Assessment]
-Execute = Callable[..., list[Any]]
 
 T0 = 1_767_225_600_000_000_000
 HOP_NS = 11_946_666_667

@@ -92,9 +92,7 @@ def test_a_channel_without_a_bearing_is_watched_too(alarms, block):
     assert news[0].events[0].time_ns == SECOND  # the end of the block that shows it
 
 
-def test_a_probe_that_only_a_segment_shows_as_stuck_is_an_alarm_until_one_shows_otherwise(
-    alarms, block
-):
+def test_a_probe_that_one_segment_shows_as_stuck_is_an_alarm_until_one_does_not(alarms, block):
     stuck = assessed(shaft_x=missing(Reason.STUCK))
     alarms.take(block(0), [], 0)
     first = alarms.take(block(1), [stuck], 0)
@@ -116,9 +114,7 @@ def test_a_channel_that_clips_too_often_says_how_often(alarms, block):
     assert (news.events[0].reason, news.events[0].value, news.events[0].limit) == ("clipped", 4, 1)
 
 
-def test_a_film_of_the_wrong_sign_is_an_alarm_of_its_two_channels_until_the_sign_is_right(
-    alarms, block
-):
+def test_a_film_of_the_wrong_sign_is_an_alarm_of_both_channels_until_it_is_right(alarms, block):
     def with_k(**readings: Reading) -> Any:
         found = assessed()
         found.readings |= {f"{name}_xx_n_per_m": r for name, r in readings.items()}

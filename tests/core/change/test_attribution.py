@@ -146,9 +146,7 @@ def test_probes_and_brackets_are_named_where_no_film_moves_the_shaft_so(response
     assert found.cause is Cause.BRACKET_OR_TRANSDUCER
 
 
-def test_a_probe_that_reads_more_is_recognised_though_its_bearing_seems_to_run_further_out(
-    response,
-):
+def test_a_probe_that_reads_more_is_recognised_though_its_shaft_seems_further_out(response):
     """Where stiffness rises with eccentricity, the film seems softer in y too."""
     found = put_down(response, 2, probe={2: 1.25}, rise=1.0)
     assert (found.cause, found.reason) == (Cause.BRACKET_OR_TRANSDUCER, PROBE_REASON)
@@ -157,9 +155,7 @@ def test_a_probe_that_reads_more_is_recognised_though_its_bearing_seems_to_run_f
 @pytest.mark.parametrize("seed", range(2, 10))
 @pytest.mark.parametrize("factor", [0.9, 0.8, 1.25])
 @pytest.mark.parametrize("what", ["film", "accelerometer"])
-def test_what_changes_in_all_bearings_alike_is_oil_or_not_known_and_no_transducer(
-    response, what, factor, seed
-):
+def test_a_like_change_in_all_bearings_is_oil_or_not_known(response, what, factor, seed):
     found = put_down(response, 0, seed, **{what: dict.fromkeys(range(6), factor)})
     assert found.cause in (Cause.OIL, Cause.UNKNOWN)
     assert what == "film" or found.cause is Cause.UNKNOWN

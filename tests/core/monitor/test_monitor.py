@@ -71,9 +71,7 @@ def test_the_machine_reads_its_stiffness_its_position_and_its_orbit(results, sig
     np.testing.assert_allclose(orbit.shaft_y_um, 60 * np.sin(turn), atol=1.5)
 
 
-def test_what_a_result_was_made_of_goes_at_once_without_a_search_for_cycles(
-    monitor, blocks, signals
-):
+def test_samples_of_a_result_go_at_once_without_a_search_for_cycles(monitor, blocks, signals):
     """The arrays of one evaluation are a megabyte: twenty units fill 60 MiB between searches."""
     stream = list(blocks(signals(40.0)))
     gc.collect()
@@ -153,9 +151,7 @@ def test_one_nan_does_not_blind_the_other_channels(results, signals, spoiled):
     assert readings["order1_shaft_x_um_pk"].value == pytest.approx(60.0, rel=1e-3)
 
 
-def test_a_standing_machine_has_no_orders_and_the_line_gives_a_speed_that_nobody_measures(
-    results, signals
-):
+def test_a_standing_machine_has_no_orders_and_the_line_gives_an_unmeasured_speed(results, signals):
     newest = results(signals(14.0), speed_rpm=0.0)[-1]
     assert newest.readings["speed_rpm"].quality == bad(Reason.STANDSTILL)
     assert newest.readings["order1_k_eff_xx_n_per_m"].quality == bad(Reason.STANDSTILL)

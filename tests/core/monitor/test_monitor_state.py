@@ -132,9 +132,7 @@ def with_reference(unit: Unit, gap_reference_um: tuple[float, float]) -> Unit:
     return replace(unit, bearings=(replace(bearing, gap_reference_um=gap_reference_um),))
 
 
-def test_a_new_reference_moves_the_shaft_centre_and_nothing_else_from_the_next_result_on(
-    unit, six_segments
-):
+def test_a_new_reference_moves_only_the_shaft_centre_from_the_next_result_on(unit, six_segments):
     monitor = UnitMonitor(unit, AnalysisSettings())
     before = [a for block in six_segments[:3] for a in monitor.ingest(block)]
 

@@ -78,9 +78,7 @@ def test_a_bump_that_is_shorter_than_the_delay_is_no_alarm(unit, blocks, signals
     assert max(delays_s) < 10.0
 
 
-def test_what_is_known_of_just_now_is_what_the_average_reads_of_a_steady_shaft(
-    unit, blocks, signals
-):
+def test_the_newest_segment_reads_what_the_average_of_a_steady_shaft_reads(unit, blocks, signals):
     monitor = UnitMonitor(unit, AnalysisSettings())
     results = [a for block in blocks(signals(40.0)) for a in monitor.ingest(block)]
 

@@ -38,9 +38,7 @@ def test_a_channel_that_stopped_moving_gives_no_number(in_counts, results, signa
 
 
 @pytest.mark.parametrize(("n_clipped", "is_few"), [(1, True), (100, False)])
-def test_a_clipped_sample_costs_its_segment_and_not_the_results(
-    unit, blocks, signals, n_clipped, is_few
-):
+def test_a_clipped_sample_costs_its_segment_not_results(unit, blocks, signals, n_clipped, is_few):
     """One sample of 8192 at the end of an accelerometer's range is 500 µm at 1×."""
     converter = tuple(replace(c, unit_per_count=0.1) for c in unit.channels)
     monitor = UnitMonitor(replace(unit, channels=converter), AnalysisSettings())
@@ -87,9 +85,7 @@ def test_nothing_need_move_while_the_machine_stands(in_counts, results):
         assert readings[name].quality == bad(Reason.STANDSTILL)
 
 
-def test_exchanged_transducers_and_a_speed_that_the_line_contradicts_are_doubted(
-    unit, results, signals
-):
+def test_exchanged_transducers_and_a_speed_off_the_line_are_doubted(unit, results, signals):
     rows = signals(90.0)[[1, 0, 3, 2]]
     doubted = results(rows)[-1].readings
     assert doubted["order1_k_eff_xx_n_per_m"].quality == uncertain(Reason.SWAPPED_AXES)

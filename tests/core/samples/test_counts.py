@@ -144,9 +144,7 @@ def test_what_an_adapter_counts_itself_has_another_number_in_each_of_its_lives(r
 
 
 @given(restarts=st.lists(told, max_size=20), later=st.lists(told, max_size=20))
-def test_what_a_trusted_device_tells_is_its_number_and_what_it_hides_has_one_of_its_own(
-    restarts, later
-):
+def test_a_trusted_device_tells_its_number_and_what_it_hides_has_one_of_its_own(restarts, later):
     first = numbers(0, restarts, trusts_device=True)
     second = numbers(30, later, trusts_device=True)
     assert (first[0], second[0]) == (7, 7)

@@ -34,9 +34,7 @@ def test_the_taper_is_the_one_of_scipy_and_phasors_on_a_bin_are_the_transform_th
     phase_rad=st.floats(0.0, 2 * np.pi),
     gap_um=st.floats(-3000.0, 3000.0),
 )
-def test_a_tone_of_any_frequency_reads_its_amplitude_from_a_minute_of_samples(
-    frequency_hz, phase_rad, gap_um
-):
+def test_a_minute_of_a_tone_of_any_frequency_reads_its_amplitude(frequency_hz, phase_rad, gap_um):
     """Required: 0.3 % for 0.3 to 3 Hz from 60 s."""
     time_s = np.arange(int(60 * RATE_HZ)) / RATE_HZ
     tone = gap_um + 60.0 * np.cos(2 * np.pi * frequency_hz * time_s + phase_rad)

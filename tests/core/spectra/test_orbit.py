@@ -36,9 +36,7 @@ def on_ellipse(
     angle_deg=st.floats(-89.0, 89.0),
     sense=st.sampled_from([-1, 1]),
 )
-def test_an_ellipse_comes_back_with_its_axes_its_angle_and_its_sense(
-    major, roundness, angle_deg, sense
-):
+def test_an_ellipse_comes_back_with_axes_angle_and_sense(major, roundness, angle_deg, sense):
     x, y = on_ellipse(major, roundness * major, angle_deg, sense)
 
     phasors = [order_phasors(each, RATE_HZ, TURN_HZ)[MIDDLE] for each in (x, y)]

@@ -171,9 +171,7 @@ def test_what_is_left_is_the_vibration_wherever_the_segment_began(unit, shaft_an
         (VECTOR, "SN 4711", None, RunoutVerdict.NO_PHASE_REFERENCE),
     ],
 )
-def test_a_vector_that_is_of_no_use_is_left_out_and_said_to_be(
-    unit, vector, probe, angle_rad, verdict
-):
+def test_a_useless_vector_is_left_out_and_named(unit, vector, probe, angle_rad, verdict):
     found = of_one_channel(unit, VIBRATION, vector, probe, angle_rad)
 
     assert found == (VIBRATION, verdict)

@@ -35,7 +35,7 @@ def share_within(intervals: list[tuple[float, float]], truth: float) -> float:
 
 
 @pytest.mark.parametrize(("correlation", "least"), [(0.0, 0.93), (0.4, 0.90)])
-def test_intervals_of_amplitude_phase_and_mean_hold_the_truth(correlation, least) -> None:
+def test_intervals_of_amplitude_phase_and_mean_hold_the_truth(correlation, least):
     phasors = 20.0 * np.exp(1j * np.radians(30.0)) + wandering(correlation)
     rms = np.sqrt(np.mean(np.abs(phasors) ** 2, axis=1))
     turned = np.degrees(np.angle(phasors.mean(axis=1)))
@@ -50,7 +50,7 @@ def test_intervals_of_amplitude_phase_and_mean_hold_the_truth(correlation, least
         assert least < share < 0.97, (name, share)
 
 
-def test_what_never_differs_says_nothing_of_how_well_it_is_known() -> None:
+def test_what_never_differs_says_nothing_of_how_well_it_is_known():
     assert mean_budget(45.0, [45.0] * 24) is None
     assert mean_budget(45.0, [45.0]) is None
     assert mean_budget(45.5, [45.0, 46.0]).random == pytest.approx(0.5)
@@ -58,9 +58,7 @@ def test_what_never_differs_says_nothing_of_how_well_it_is_known() -> None:
 
 @pytest.mark.parametrize("n_segments", [4, 8, 24])
 @pytest.mark.parametrize("coherence", [0.1, 0.6, 0.9, 0.999])
-def test_intervals_of_a_coherence_hold_the_truth_and_stay_between_0_and_1(
-    n_segments: int, coherence: float
-) -> None:
+def test_intervals_of_a_coherence_hold_the_truth_and_stay_between_0_and_1(n_segments, coherence):
     shaft, noise = (wandering(0.0, seed)[:, :n_segments] for seed in (1, 2))
     bearing = np.sqrt(coherence) * shaft + np.sqrt(1.0 - coherence) * noise
     power = (np.abs(shaft) ** 2).mean(axis=1) * (np.abs(bearing) ** 2).mean(axis=1)
@@ -73,16 +71,14 @@ def test_intervals_of_a_coherence_hold_the_truth_and_stay_between_0_and_1(
         assert np.std(measured) == pytest.approx(np.mean([b.random for b in budgets]), rel=0.1)
 
 
-def test_a_coherence_of_one_segment_or_of_all_or_nothing_has_no_interval() -> None:
+def test_a_coherence_of_one_segment_or_of_all_or_nothing_has_no_interval():
     assert [coherence_budget(*of) for of in ((0.9, 1.0), (1.0, 24.0), (0.0, 24.0))] == [None] * 3
 
 
 @pytest.mark.parametrize(
     ("across", "correlation", "least"), [(20, 0, 0.9), (8, 0, 0.93), (8, 0.4, 0.9)]
 )
-def test_intervals_of_a_roundness_hold_the_truth(
-    across: float, correlation: float, least: float
-) -> None:
+def test_intervals_of_a_roundness_hold_the_truth(across, correlation, least):
     exact = BearingAccuracy(shaft_gain=0.0)
     bearing = Bearing("UJB", 1e9, "sx", "sy", "bx", "by", 200.0, (0.0, 0.0), accuracy=exact)
     x, y = 20.0 + wandering(correlation, 1), -1j * across + wandering(correlation, 2)
@@ -98,7 +94,7 @@ def test_intervals_of_a_roundness_hold_the_truth(
     assert all(-1.0 <= low < high <= 1.0 for low, high in intervals)
 
 
-def test_gain_and_runout_make_an_orbit_seem_rounder_or_flatter() -> None:
+def test_gain_and_runout_make_an_orbit_seem_rounder_or_flatter():
     """As much as the formula says, to first order, by moving them."""
     bearing = Bearing("UJB", 1e9, "sx", "sy", "bx", "by", 200.0, (0.0, 0.0))
 
@@ -120,7 +116,7 @@ def test_gain_and_runout_make_an_orbit_seem_rounder_or_flatter() -> None:
 
 
 @pytest.mark.parametrize("bearing_um", [0.03, 0.3])
-def test_intervals_of_the_multiple_coherence_of_dynamic_hold_the_truth(bearing_um: float) -> None:
+def test_intervals_of_the_multiple_coherence_of_dynamic_hold_the_truth(bearing_um):
     truth = found(shaken(999, 600, bearing_um=bearing_um)).coherence
     results = [found(shaken(seed, 12, bearing_um=bearing_um)) for seed in range(80)]
     for row in (0, 1):

@@ -35,9 +35,7 @@ PROBE_UM = float(np.sqrt(0.05 * phasor_power_per_density(BIN_HZ)))
 """Amplitude of probe noise of 0.05 µm²/Hz."""
 
 
-def test_exact_motion_gives_all_coefficients_whatever_its_axes_and_its_size(
-    recording: Recording,
-) -> None:
+def test_exact_motion_gives_all_coefficients_whatever_its_axes_and_its_size(recording):
     result = found(recording())
 
     np.testing.assert_allclose(result.k_n_per_m, STIFFNESS, rtol=1e-7)
@@ -56,7 +54,7 @@ def test_exact_motion_gives_all_coefficients_whatever_its_axes_and_its_size(
     np.testing.assert_allclose(found(1e-3 * phasors).k_n_per_m, straight.k_n_per_m, rtol=1e-9)
 
 
-def test_a_gain_error_moves_the_coefficients_it_reaches_and_no_other(recording: Recording) -> None:
+def test_a_gain_error_moves_the_coefficients_it_reaches_and_no_other(recording):
     phasors = recording()
     gain = np.array([1.0, 1.04, 0.97, 1.0])  # u_y reads high, v_x reads low
 
@@ -66,7 +64,7 @@ def test_a_gain_error_moves_the_coefficients_it_reaches_and_no_other(recording: 
     np.testing.assert_allclose(result.k_n_per_m, expected, rtol=1e-7)
 
 
-def test_the_stated_change_with_the_bracket_is_the_change(recording: Recording) -> None:
+def test_the_stated_change_with_the_bracket_is_the_change(recording):
     spectrum = averaged(recording())
     stiffer = replace(BRACKET, stiffness_n_per_m=1.01 * BRACKET.stiffness_n_per_m)
 
@@ -88,9 +86,7 @@ def rms_z(results: list[DynamicStiffness]) -> FloatArray:
     return z
 
 
-def test_a_bracket_mass_that_is_not_known_is_fitted_and_stated_with_its_uncertainty(
-    recording: Recording,
-) -> None:
+def test_a_bracket_mass_that_is_not_known_is_fitted_and_stated_with_its_uncertainty(recording):
     unknown = replace(BRACKET, mass_kg=None)
     exact = found(recording(), bracket=unknown)
     np.testing.assert_allclose(exact.k_n_per_m, STIFFNESS, rtol=1e-5)
@@ -111,9 +107,7 @@ def test_a_bracket_mass_that_is_not_known_is_fitted_and_stated_with_its_uncertai
     np.testing.assert_allclose(mean, STIFFNESS, atol=0.005 * STIFFNESS[0, 0])
 
 
-def test_probe_noise_in_the_shafts_motion_is_part_of_the_stated_uncertainty(
-    recording: Recording,
-) -> None:
+def test_probe_noise_in_the_shafts_motion_is_part_of_the_stated_uncertainty(recording):
     """A sixth of the motion is noise, taken off with a floor that is itself estimated."""
     loud = [
         found(recording(seed, probe_um=0.3, bearing_um=0.05), DynamicSettings())
@@ -124,9 +118,7 @@ def test_probe_noise_in_the_shafts_motion_is_part_of_the_stated_uncertainty(
     assert np.diag(rms_z(loud)[0]) == pytest.approx(1.0, abs=0.12)
 
 
-def test_channels_that_are_late_show_as_a_delay_and_are_put_right_by_it(
-    recording: Recording,
-) -> None:
+def test_channels_that_are_late_show_as_a_delay_and_are_put_right_by_it(recording):
     late = recording(bearing_um=0.05)
     late[:, 2:] *= np.exp(-2j * np.pi * FREQUENCY_HZ / 600.0)
 
@@ -142,9 +134,7 @@ def test_channels_that_are_late_show_as_a_delay_and_are_put_right_by_it(
 
 
 @pytest.mark.parametrize("probe_um2_per_hz", [None, 0.05])
-def test_probe_noise_that_is_taken_off_leaves_no_bias(
-    recording: Recording, probe_um2_per_hz: float | None
-) -> None:
+def test_probe_noise_that_is_taken_off_leaves_no_bias(recording, probe_um2_per_hz):
     known = None if probe_um2_per_hz is None else (probe_um2_per_hz,) * 2
     settings = DynamicSettings(probe_noise_um2_per_hz=known)
 
@@ -159,7 +149,7 @@ def test_probe_noise_that_is_taken_off_leaves_no_bias(
     np.testing.assert_allclose(corrected, STIFFNESS, atol=0.003 * STIFFNESS[0, 0])
 
 
-def test_the_floor_of_few_segments_is_not_low(recording: Recording) -> None:
+def test_the_floor_of_few_segments_is_not_low(recording):
     few = (recording(seed, probe_um=PROBE_UM, n_segments=6) for seed in range(20))
 
     floors = [found(phasors, DynamicSettings()) for phasors in few]
@@ -169,9 +159,7 @@ def test_the_floor_of_few_segments_is_not_low(recording: Recording) -> None:
     assert mean == pytest.approx(0.05, rel=0.08)
 
 
-def test_noise_share_is_the_part_of_the_shafts_motion_that_is_not_motion(
-    recording: Recording,
-) -> None:
+def test_noise_share_is_the_part_of_the_shafts_motion_that_is_not_motion(recording):
     small = replace(NOISE_FREE, band_hz=(0.6, 3.0))  # where the motion is flat
     probe_um = 0.5
     density = probe_um**2 / phasor_power_per_density(BIN_HZ)
@@ -190,9 +178,7 @@ def scatter_over_stated(results: list[DynamicStiffness]) -> FloatArray:
     return ratio
 
 
-def test_the_stated_uncertainty_is_the_scatter_also_where_integration_alone_limits(
-    recording: Recording,
-) -> None:
+def test_the_stated_uncertainty_is_the_scatter_also_where_integration_alone_limits(recording):
     results = [found(recording(seed, bearing_um=0.3)) for seed in range(150)]
 
     # The scatter of 150 runs is known to 6 %; four figures, three times that.
@@ -226,9 +212,7 @@ def integrated_at_the_bins(seed: int) -> ComplexArray:
     return np.concatenate([shaft, bearing], axis=1)
 
 
-def test_constant_coefficients_fit_and_a_film_that_changes_with_frequency_does_not(
-    recording: Recording,
-) -> None:
+def test_constant_coefficients_fit_and_a_film_that_changes_with_frequency_does_not(recording):
     phasors = recording(bearing_um=0.01)
     stiffening = phasors.copy()
     stiffening[:, 2:] *= 1.0 + 0.02 * FREQUENCY_HZ
@@ -237,9 +221,7 @@ def test_constant_coefficients_fit_and_a_film_that_changes_with_frequency_does_n
     assert np.all(found(stiffening).lack_of_fit > 2.0)
 
 
-def test_loud_lines_and_runout_on_the_harmonics_do_not_spoil_what_quiet_lines_know(
-    recording: Recording,
-) -> None:
+def test_loud_lines_and_runout_on_the_harmonics_do_not_spoil_what_quiet_lines_know(recording):
     phasors = recording(bearing_um=0.3)
     clean = found(phasors)
     for harmonic in range(1, 9):
@@ -263,9 +245,7 @@ def test_loud_lines_and_runout_on_the_harmonics_do_not_spoil_what_quiet_lines_kn
     np.testing.assert_allclose(spoilt.k_n_per_m, STIFFNESS, atol=0.005 * STIFFNESS[0, 0])
 
 
-def test_noise_alone_or_motion_along_one_line_is_insufficient_and_never_a_stiffness(
-    recording: Recording,
-) -> None:
+def test_noise_alone_or_motion_along_one_line_is_insufficient_and_never_a_stiffness(recording):
     for seed in range(30):
         noise = averaged(recording(seed, motion_um=0.0, probe_um=0.1, bearing_um=0.3))
         result = dynamic_stiffness(noise, BRACKET, TURN_HZ, DynamicSettings())
@@ -277,7 +257,7 @@ def test_noise_alone_or_motion_along_one_line_is_insufficient_and_never_a_stiffn
 
 
 @pytest.mark.parametrize("channel", range(4))
-def test_a_dead_channel_is_never_a_stiffness(recording: Recording, channel: int) -> None:
+def test_a_dead_channel_is_never_a_stiffness(recording, channel):
     phasors = recording(probe_um=0.01, bearing_um=0.1)
     phasors[:, channel] = 0.0
     result = dynamic_stiffness(averaged(phasors), BRACKET, TURN_HZ, DynamicSettings())
@@ -288,9 +268,7 @@ def test_a_dead_channel_is_never_a_stiffness(recording: Recording, channel: int)
     "stricter",
     [{"min_signal_share": 0.999}, {"max_relative_uncertainty": 1e-4}, {"min_coherence": 0.9999}],
 )
-def test_each_demand_on_the_evidence_can_refuse_alone(
-    recording: Recording, stricter: dict[str, float]
-) -> None:
+def test_each_demand_on_the_evidence_can_refuse_alone(recording, stricter):
     spectrum = averaged(recording(probe_um=0.1, bearing_um=0.1))
     base = DynamicSettings()
 
@@ -300,7 +278,7 @@ def test_each_demand_on_the_evidence_can_refuse_alone(
     assert result is Reason.INSUFFICIENT_EXCITATION
 
 
-def test_bearings_fitted_together_have_the_films_that_each_has_alone(recording: Recording) -> None:
+def test_bearings_fitted_together_have_the_films_that_each_has_alone(recording):
     """With other lines, another or an unknown mass, another speed, and one without a film."""
     rng = np.random.default_rng(5)
     line = recording(seed=2, bearing_um=0.3)
@@ -329,9 +307,7 @@ def test_bearings_fitted_together_have_the_films_that_each_has_alone(recording: 
     assert len({found.frequency_hz.size for found in together[:2]}) == 2
 
 
-def test_a_constant_film_is_rarely_taken_for_one_that_depends_on_frequency(
-    recording: Recording, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_constant_film_is_rarely_taken_for_one_that_depends_on_frequency(recording, monkeypatch):
     recordings = [recording(seed, probe_um=0.1, bearing_um=0.3) for seed in range(60)]
     kept = [found(phasors, DynamicSettings()) for phasors in recordings]
     monkeypatch.setattr(dynamic, "kept_share", lambda fits: np.zeros((2, len(fits.weight))))

@@ -139,7 +139,7 @@ def film_of(bearing: str, phasors: ComplexArray, mass_share: float = 1.0) -> Dyn
     return found
 
 
-def test_the_rotor_bends_within_the_band() -> None:
+def test_the_rotor_bends_within_the_band():
     stiffness, mass, _ = beam()
     held = np.zeros_like(stiffness)
     for node in BEARINGS.values():
@@ -153,9 +153,7 @@ def test_the_rotor_bends_within_the_band() -> None:
 
 @pytest.mark.parametrize("eccentricity", [0.1, 0.3, 0.6])
 @pytest.mark.parametrize("bearing", [*BEARINGS])
-def test_films_under_a_flexible_rotor_are_found_as_they_are_at_the_running_speed(
-    bearing: str, eccentricity: float
-) -> None:
+def test_films_under_a_flexible_rotor_are_found_as_at_the_running_speed(bearing, eccentricity):
     truth = motion(eccentricity)[0][bearing].at(SPEED_RAD_S)
     found = [fitted(bearing, eccentricity, seed) for seed in range(4)]
 
@@ -167,7 +165,7 @@ def test_films_under_a_flexible_rotor_are_found_as_they_are_at_the_running_speed
         assert _fit_quality(each, 2e-4, 0.0).level is Level.GOOD
 
 
-def test_statistics_and_the_model_of_the_film_explain_the_errors() -> None:
+def test_statistics_and_the_model_of_the_film_explain_the_errors():
     """In averages of five minutes and of half an hour."""
     exact = BearingAccuracy(*(0.0 for _ in range(8)))
     held = []
@@ -186,7 +184,7 @@ def test_statistics_and_the_model_of_the_film_explain_the_errors() -> None:
 
 
 @pytest.mark.parametrize("bearing", [*BEARINGS])
-def test_late_channels_on_tilting_pads_never_give_a_good_result(bearing: str) -> None:
+def test_late_channels_on_tilting_pads_never_give_a_good_result(bearing):
     for seed in range(5, 9):
         late = recording(bearing, 0.3, seed, 140)
         late[:, 2:] *= np.exp(-2j * np.pi * FREQUENCY_HZ / 600.0)
@@ -194,7 +192,7 @@ def test_late_channels_on_tilting_pads_never_give_a_good_result(bearing: str) ->
         assert _fit_quality(film_of(bearing, late), 2e-4, 0.0).level is Level.UNCERTAIN
 
 
-def test_the_stated_change_with_the_brackets_mass_is_the_change_on_tilting_pads() -> None:
+def test_the_stated_change_with_the_brackets_mass_is_the_change_on_tilting_pads():
     phasors = recording("TJB", 0.3, 7, 140)
     right, heavier = film_of("TJB", phasors), film_of("TJB", phasors, 1.05)
 

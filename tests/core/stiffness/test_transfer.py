@@ -48,7 +48,7 @@ def found(phasors: ComplexArray, bracket: BracketDynamics = BRACKET) -> tuple[Bu
     return result
 
 
-def test_stiffness_is_the_real_part_and_damping_the_imaginary_part_if_there_is_motion() -> None:
+def test_stiffness_is_the_real_part_and_damping_the_imaginary_part_if_there_is_motion():
     k, c = found(motion())
 
     assert k.value == pytest.approx(K_N_PER_M, rel=1e-12)
@@ -61,7 +61,7 @@ def test_stiffness_is_the_real_part_and_damping_the_imaginary_part_if_there_is_m
     assert transfer(motion(n_segments=1)) is None
 
 
-def test_leaving_the_brackets_inertia_out_reads_what_equation_5_reads_and_is_stated() -> None:
+def test_leaving_the_brackets_inertia_out_reads_what_equation_5_reads_and_is_stated():
     massless, _ = found(motion(), BracketDynamics(BRACKET.stiffness_n_per_m))
 
     # m_b ω² / k_b = 0.36 % at rated speed (UJB)
@@ -74,7 +74,7 @@ def test_leaving_the_brackets_inertia_out_reads_what_equation_5_reads_and_is_sta
     assert after.value - before.value == pytest.approx(0.01 * of_bracket.sensitivity, rel=1e-9)
 
 
-def test_bearing_noise_does_not_raise_the_stiffness_as_it_raises_an_amplitude() -> None:
+def test_bearing_noise_does_not_raise_the_stiffness_as_it_raises_an_amplitude():
     many = motion(n_segments=20_000, noise_um=2.0)
 
     assert found(many)[0].value == pytest.approx(K_N_PER_M, rel=0.01)
@@ -83,7 +83,7 @@ def test_bearing_noise_does_not_raise_the_stiffness_as_it_raises_an_amplitude() 
 
 
 @pytest.mark.parametrize("n_segments", [3, 24])
-def test_the_stated_uncertainty_is_the_scatter(n_segments: int) -> None:
+def test_the_stated_uncertainty_is_the_scatter(n_segments):
     results = [found(motion(seed, n_segments, noise_um=0.5)) for seed in range(400)]
 
     for budgets in zip(*results, strict=True):
@@ -93,7 +93,7 @@ def test_the_stated_uncertainty_is_the_scatter(n_segments: int) -> None:
         assert scatter == pytest.approx(mean_stated, rel=0.1)
 
 
-def test_a_line_is_believed_if_it_is_coherent_and_larger_than_runout() -> None:
+def test_a_line_is_believed_if_it_is_coherent_and_larger_than_runout():
     clear, noisy = spectrum(motion()), spectrum(motion(noise_um=20.0))
 
     def excitation(of: CrossSpectrum, **limits: float) -> Reason:
@@ -106,7 +106,7 @@ def test_a_line_is_believed_if_it_is_coherent_and_larger_than_runout() -> None:
     assert excitation(spectrum(motion(n_segments=1))) is Reason.FEW_SEGMENTS
 
 
-def test_equal_amplitudes_of_any_unit_mean_a_film_as_stiff_as_its_bracket() -> None:
+def test_equal_amplitudes_of_any_unit_mean_a_film_as_stiff_as_its_bracket():
     assert effective_stiffness_n_per_m(12.0, 12.0, 1.18e9) == 1.18e9
     assert effective_stiffness_n_per_m(0.02, 0.055, 1.18e9) == pytest.approx(
         effective_stiffness_n_per_m(20.0, 55.0, 1.18e9)

@@ -25,7 +25,7 @@ BIN_HZ = float(FREQUENCY_HZ[0])
 
 
 @pytest.mark.parametrize("speed_rpm", [60.0, 92.3, 150.0])
-def test_no_used_line_is_within_the_guard_of_any_harmonic(speed_rpm: float) -> None:
+def test_no_used_line_is_within_the_guard_of_any_harmonic(speed_rpm):
     turn_hz = speed_rpm / 60.0
     used = between_harmonics(FREQUENCY_HZ, (turn_hz, turn_hz), 3.0)
 
@@ -34,7 +34,7 @@ def test_no_used_line_is_within_the_guard_of_any_harmonic(speed_rpm: float) -> N
     np.testing.assert_array_equal(used, nearest > 3.0 * BIN_HZ)
 
 
-def test_the_guard_of_a_harmonic_follows_the_speed_and_a_senseless_one_is_refused() -> None:
+def test_the_guard_of_a_harmonic_follows_the_speed_and_a_senseless_one_is_refused():
     wandering = between_harmonics(FREQUENCY_HZ, (1.53, 1.55), 3.0)
 
     for speed_hz in np.linspace(1.53, 1.55, 41):
@@ -47,7 +47,7 @@ def test_the_guard_of_a_harmonic_follows_the_speed_and_a_senseless_one_is_refuse
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.3, 0.5])
-def test_side_lobes_stay_below_the_kernel_wherever_the_tone_falls(offset: float) -> None:
+def test_side_lobes_stay_below_the_kernel_wherever_the_tone_falls(offset):
     time_s = np.arange(8192) / 600.0
     tone = np.cos(2.0 * np.pi * (100.0 + offset) * BIN_HZ * time_s + 0.7)
     power = np.abs(bin_phasors(tapered(tone[np.newaxis]), 341)[0]) ** 2
@@ -59,7 +59,7 @@ def test_side_lobes_stay_below_the_kernel_wherever_the_tone_falls(offset: float)
     assert np.all(power[far] <= leaked[far])
 
 
-def test_lines_beside_a_strong_tone_are_dropped_and_quiet_distant_ones_kept() -> None:
+def test_lines_beside_a_strong_tone_are_dropped_and_quiet_distant_ones_kept():
     power = np.ones((341, 1))
     power[100] = 1e4
     own = little_leakage(power).all(axis=1)
@@ -71,7 +71,7 @@ def test_lines_beside_a_strong_tone_are_dropped_and_quiet_distant_ones_kept() ->
     assert little_leakage(np.ones((341, 2))).all()
 
 
-def test_noise_of_known_density_has_the_power_and_the_correlation_stated() -> None:
+def test_noise_of_known_density_has_the_power_and_the_correlation_stated():
     noise = np.random.default_rng(2).normal(size=(400, 8192))
     power = np.abs(bin_phasors(tapered(noise), 300)) ** 2
 
@@ -87,7 +87,7 @@ def test_noise_of_known_density_has_the_power_and_the_correlation_stated() -> No
         assert found == pytest.approx(stated, abs=0.01)
 
 
-def test_correlated_lines_and_overlapping_segments_count_for_less() -> None:
+def test_correlated_lines_and_overlapping_segments_count_for_less():
     def variance(lines: list[int], products: tuple[float, ...] = WHITE_PRODUCTS) -> float:
         terms, parts = np.ones((1, 1, 1, len(lines))), np.array(products)[:, np.newaxis]
         return float(correlated_sum(terms, np.array([lines]), parts)[0, 0, 0])
@@ -108,7 +108,7 @@ def test_correlated_lines_and_overlapping_segments_count_for_less() -> None:
     assert independent_segments(2, 0.75) == pytest.approx(2.0 / (1.0 + three_quarters**2), rel=1e-3)
 
 
-def test_what_integration_leaves_behind_hangs_together_as_stated() -> None:
+def test_what_integration_leaves_behind_hangs_together_as_stated():
     """White acceleration, integrated twice at the bins and in time, differs by the smear."""
     rng = np.random.default_rng(6)
     n_segments, bins = 400, np.arange(60, 160)

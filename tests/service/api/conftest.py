@@ -262,17 +262,13 @@ def serve(tmp_path_factory: pytest.TempPathFactory, access_file: Path) -> Iterat
 
 
 @pytest.fixture(scope="session")
-def read_only(
-    serve: Serve, plant: PlantFile, database_file: Path, assessments: list[Assessment]
-) -> Service:
+def read_only(serve, plant, database_file, assessments) -> Service:
     """The service of `running`, for all tests that change nothing of it."""
     return show(serve(plant, database_file), assessments)
 
 
 @pytest.fixture
-async def service(
-    plant: PlantFile, store: SqliteStore, access_store: AccessStore, tmp_path: Path
-) -> AsyncIterator[Service]:
+async def service(plant, store, access_store, tmp_path) -> AsyncIterator[Service]:
     """A service of the test's own that has just started."""
     built = await build(plant, store, access_store, tmp_path)
     async with at_work(built.recorder.run()):

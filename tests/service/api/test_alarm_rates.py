@@ -70,11 +70,7 @@ async def test_a_quiet_plant_has_rates_of_zero_of_spans_that_can_be_counted(read
     for parameters, status, words in (
         ({"unit": "U9"}, 404, "no unit 'U9'"),
         ({"start": "2026-01-02T00:00:00Z", "end": "2026-01-01T00:00:00Z"}, 422, "must be before"),
-        (
-            {"start": "2020-01-01T00:00:00Z", "end": "2026-01-01T00:00:00Z"},
-            422,
-            "400 days",
-        ),
+        ({"start": "2020-01-01T00:00:00Z", "end": "2026-01-01T00:00:00Z"}, 422, "400 days"),
     ):
         assert words in (await read_only.problem(RATES, status, **parameters))["detail"]
 

@@ -83,9 +83,7 @@ async def test_the_alarm_list_is_filtered(service, probes, wanted, other):
     await service.problem(ALARMS, 422, level="serious")
 
 
-async def test_an_acknowledgement_of_the_newest_occurrence_is_durable_when_it_is_answered(
-    service, probes
-):
+async def test_an_acknowledgement_of_the_newest_occurrence_is_durable_if_answered(service, probes):
     probes.send(3, Reason.SENSOR_FAILURE)
 
     problem = await service.refused(ACKNOWLEDGE, 409, {**ANNA, "occurrence": 2})
@@ -169,9 +167,7 @@ async def test_the_history_comes_page_by_page_and_by_what_is_asked(service, prob
     assert [e["change"] for e in at_first["events"]] == ["raised"]
 
 
-async def test_the_history_says_and_is_asked_by_the_condition_at_which_an_alarm_was_raised(
-    service, probes
-):
+async def test_the_history_says_and_is_asked_by_the_condition_at_raising(service, probes):
     point = {"eccentricity_ratio": 0.37, "attitude_deg": 47.0, "oil_temperature_c": 46.2}
     found = assessment(attitude_angle_deg=point.pop("attitude_deg"), **point)
     settled = BearingCondition(OperatingState.FULL_LOAD, True, None)
@@ -349,9 +345,7 @@ async def test_what_waits_for_somebody_who_has_left_the_plant_file_is_not_forgot
         ({"attitude_min": 47.0}, {"attitude_max": 46.9}),
     ],
 )
-async def test_the_alarm_list_is_filtered_by_the_condition_at_raising(
-    service, probes, within, outside
-):
+async def test_alarms_are_filtered_by_the_condition_at_raising(service, probes, within, outside):
     place = {"eccentricity_ratio": 0.37, "attitude_angle_deg": 47.0, "oil_temperature_c": 46.2}
     settled = BearingCondition(OperatingState.FULL_LOAD, True, None)
     probes.send(3, Reason.SENSOR_FAILURE, [replace(assessment(**place), condition=settled)])

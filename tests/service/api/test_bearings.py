@@ -155,9 +155,7 @@ async def test_a_hole_in_the_trend_is_a_point_without_a_value(running, found):
     assert body["series"][K]["count"][-2:] == [0, 1]
 
 
-async def test_the_spectrum_shows_the_lines_of_the_readings_and_the_orbit_is_the_newest(
-    read_only, found
-):
+async def test_the_spectrum_shows_lines_of_the_readings_and_the_newest_orbit(read_only, found):
     body = await read_only.json(f"{UJB}/spectrum")
 
     newest = found[-1]

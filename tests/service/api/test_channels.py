@@ -101,9 +101,7 @@ async def test_channels_of_a_lost_link_show_no_number(running, make_block, recei
         assert {each["value"] for each in body["slow"]} == {None}
 
 
-async def test_the_waveform_is_the_newest_samples_across_blocks(
-    running, make_block, receive, plant
-):
+async def test_the_waveform_is_newest_samples_across_blocks(running, make_block, receive, plant):
     for first in range(0, 200 * N, N):
         receive(make_block(first))
     assert sum(block.n_samples for block in running.live.blocks("U1")) <= (HELD_S + 2) * 600

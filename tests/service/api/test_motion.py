@@ -96,9 +96,7 @@ def require_ellipse(body: dict[str, Any]) -> None:
     assert body["order1"]["frequency_hz"] == pytest.approx(TURN_HZ)
 
 
-async def test_the_newest_motion_is_the_ellipse_and_the_vortex_since_the_restart(
-    running, receive, blocks_of
-):
+async def test_the_newest_motion_is_ellipse_and_vortex_since_restart(running, receive, blocks_of):
     receive(blocks_of(12.0))
 
     body = await running.json(MOTION, seconds=10.0)
@@ -173,9 +171,7 @@ async def test_a_recording_plays_the_same_motion_at_any_moment(running, keep, bl
     assert spans == [(12_000, 2220), (14_220, 2220), (16_440, 1560)]  # none lost or repeated
 
 
-async def test_a_hole_in_a_recording_is_null_and_behind_its_end_is_nothing(
-    running, keep, blocks_of
-):
+async def test_a_hole_in_a_recording_is_null_and_after_its_end_is_nothing(running, keep, blocks_of):
     path = f"/api/v1/recordings/{keep([*blocks_of(2.0), *blocks_of(2.0, 5.0)])}/motion"
 
     body = await running.json(path, bearing="UJB", start_s=1.0, seconds=5.0)

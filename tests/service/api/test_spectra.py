@@ -57,9 +57,7 @@ def toned(plant: PlantFile) -> list[Assessment]:
     )
 
 
-async def test_a_line_appears_where_it_is_with_its_amplitude_up_to_the_frequency_asked_for(
-    service, toned
-):
+async def test_a_line_appears_in_place_with_its_amplitude_up_to_the_frequency_asked(service, toned):
     service.store.append(toned, [])
 
     body = await service.json(SPECTRA, **DAY, channel=["shaft_x", "shaft_y"])

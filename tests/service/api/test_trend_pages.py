@@ -5,7 +5,6 @@ import io
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ from core.monitor.assessment import Assessment
 from core.quality import Reading
 from service.api.tables import Column, csv_pieces, parquet_file
 from service.runtime.times import rfc3339
-from service.settings.plant import PlantFile
 from service.store.film_readings import FilmHistory
 
 UJB = "/api/v1/units/U1/bearings/UJB"
@@ -35,9 +33,7 @@ N = 25
     [({"last": "24h"}, 1), ({"last": "3d"}, 3), ({"last": "1440min"}, 1)],
     ids=str,
 )
-async def test_the_last_hours_end_at_the_next_whole_minute(
-    stored: Any, parameters: dict[str, str], n_days: int
-) -> None:
+async def test_the_last_hours_end_at_the_next_whole_minute(stored, parameters, n_days):
     now_ns = stored.clock.now_ns()
 
     body = await stored.json(f"{UJB}/trends", **parameters, quantity=K)
@@ -53,16 +49,12 @@ async def test_the_last_hours_end_at_the_next_whole_minute(
     [{}, {"last": "1h", "start": WHOLE["start"]}, {"last": "0h"}, {"last": "1 y"}, {"last": "٣h"}],
     ids=str,
 )
-async def test_a_period_without_one_clear_start_is_refused(
-    stored: Any, parameters: dict[str, str]
-) -> None:
+async def test_a_period_without_one_clear_start_is_refused(stored, parameters):
     await stored.problem(f"{UJB}/trends", 422, **parameters, quantity=K)
 
 
 @pytest.fixture(scope="module")
-def stored(
-    serve: Any, plant: PlantFile, database_file: Path, assessment: Callable[..., Assessment]
-) -> Any:
+def stored(serve, plant, database_file, assessment) -> Any:
     """A service that has stored one result a second, for tests that only read."""
     service = serve(plant, database_file)
     results = [
@@ -310,9 +302,7 @@ def store_seen(service: Any, assessment: Callable[..., Assessment]) -> Any:
 
 
 @pytest.fixture(scope="module")
-def seen(
-    serve: Any, plant: PlantFile, database_file: Path, assessment: Callable[..., Assessment]
-) -> Any:
+def seen(serve, plant, database_file, assessment) -> Any:
     """A service with these results, for tests that only read."""
     return store_seen(serve(plant, database_file), assessment)
 

@@ -19,7 +19,7 @@ ANALYSIS = ["service.measuring", "core.monitor.monitor", "core.stiffness.dynamic
     ("process", "others"),
     [*((name, HTTP) for name in MEASURING), *((name, ANALYSIS) for name in SERVING)],
 )
-def test_a_process_loads_nothing_of_the_other(process: str, others: list[str]) -> None:
+def test_a_process_loads_nothing_of_the_other(process, others):
     program = f"import {process}, sys; print(*sys.modules)"
     ended = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True

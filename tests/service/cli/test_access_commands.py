@@ -148,10 +148,7 @@ def test_a_key_is_shown_once_and_opens_until_it_is_revoked(padwatch, access, pla
         (("create", "historian", "--unit", "U9"), "unknown unit U9; known units: U1, U2"),
         (("create", "historian", "--days", "0"), "Invalid value"),
         (("create", "a b"), "a name must have 1 to 64"),
-        (
-            ("create", "historian", "--role", "admin", "--unit", "U1"),
-            "cannot have the role admin",
-        ),
+        (("create", "historian", "--role", "admin", "--unit", "U1"), "cannot have the role admin"),
         (("revoke", "000000000000"), "key 000000000000 does not exist"),
     ],
 )

@@ -21,9 +21,7 @@ from service.cli.processes import NEEDS_POSTGRESQL
 
 
 @pytest.mark.parametrize("command", [("run",), ("config", "check"), ("daq",)], ids=" ".join)
-def test_a_wrong_plant_file_ends_every_command_with_2_and_a_line_for_each_mistake(
-    changed, tmp_path, command
-):
+def test_a_wrong_plant_file_ends_commands_with_2_and_a_line_a_mistake(changed, tmp_path, command):
     text, line = changed("bracket_stiffness_n_per_m = 1.18e9", "bracket_stiffness_n_per_m = 1.18")
     path = tmp_path / "plant.toml"
     path.write_text(text, encoding="utf-8")
@@ -222,7 +220,7 @@ def command_paths() -> Iterator[tuple[str, ...]]:
     return below(typer.main.get_command(commands.app), ())
 
 
-def test_every_command_has_a_help_text() -> None:
+def test_every_command_has_a_help_text():
     paths = list(command_paths())
     for path in paths:
         shown = padwatch(*path, "--help")
@@ -231,7 +229,7 @@ def test_every_command_has_a_help_text() -> None:
     assert len(paths) > 40
 
 
-def test_the_version_is_that_of_the_package() -> None:
+def test_the_version_is_that_of_the_package():
     shown = padwatch("--version")
     assert (shown.exit_code, shown.stdout) == (0, f"padwatch {version('padwatch')}\n")
 
@@ -298,9 +296,7 @@ SECRET = STREAM.replace("nats://", "nats://user:secret@")
         ("serve", "", ("--port", "0"), NEEDS_POSTGRESQL),
     ],
 )
-def test_what_is_missing_or_wrong_is_refused_with_what_to_do(
-    plant_path, command, stream, options, words
-):
+def test_missing_or_wrong_input_is_refused_with_advice(plant_path, command, stream, options, words):
     plant_path.write_text(f"{plant_path.read_text()}\n{stream}")
     done = padwatch(command, plant_path, *options)
     assert done.exit_code == 2

@@ -105,11 +105,7 @@ def pasts(plant: PlantFile) -> Mapping[str, Mapping[str, StiffnessHistory]]:
 
 
 @pytest.fixture(scope="module")
-def store(
-    tmp_path_factory: pytest.TempPathFactory,
-    plant: PlantFile,
-    pasts: Mapping[str, Mapping[str, StiffnessHistory]],
-) -> Iterator[SqliteStore]:
+def store(tmp_path_factory, plant, pasts) -> Iterator[SqliteStore]:
     opened = SqliteStore(tmp_path_factory.mktemp("demo") / "padwatch.sqlite3")
     assert [unit.id for unit in without_past(opened.films, plant)] == ["U1", "U2"]
     fill(opened.films, plant, pasts, NOW_NS)

@@ -69,9 +69,7 @@ def at(server: ModbusTcpServer) -> str:
     return f"127.0.0.1:{server.port}"
 
 
-async def test_registers_are_read_in_every_type_and_byte_order_and_the_likely_one_is_marked(
-    probe, server
-):
+async def test_registers_are_read_in_every_type_and_order_and_the_likely_one_marked(probe, server):
     look = ("modbus", at(server), "--address", "100", "--count", "2")
     result, table = await probe(*look, "--json"), await probe(*look)
 
@@ -171,20 +169,12 @@ async def test_a_device_tells_who_it_is(probe, server, gateway):
     ("arguments", "code", "said"),
     [
         (("modbus", "127.0.0.1:{port}", "--address", "5000"), 1, "illegal data address"),
-        (
-            ("modbus", "127.0.0.1:{port}", "--address", "0", "--function", "1"),
-            1,
-            "illegal data address",
-        ),
+        (("modbus", "127.0.0.1:{port}", "--address", "0", "--function", "1"), 1, "data address"),
         (("modbus", "127.0.0.1:1", "--address", "0"), 1, "refused"),
         (("modbus", "/dev/there-is-none", "--address", "0"), 1, "No such file"),
         (("modbus", "127.0.0.1:port", "--address", "0"), 2, "integer"),
         (("modbus", "127.0.0.1:{port}", "--address", "70000"), 2, "65535"),
-        (
-            ("modbus", "127.0.0.1:{port}", "--address", "0", "--function", "6"),
-            2,
-            "less than or equal to 4",
-        ),
+        (("modbus", "127.0.0.1:{port}", "--address", "0", "--function", "6"), 2, "or equal to 4"),
         (("map", "absent.toml", "--at", "127.0.0.1:{port}"), 2, "No such file"),
         (("map", "absent.toml"), 2, "No such file"),
     ],

@@ -69,9 +69,7 @@ def bits(value: object) -> object:
     return value.hex() if isinstance(value, float) else value
 
 
-async def test_a_recording_analysed_equals_what_was_seen_live_to_the_last_bit(
-    unit, stepped_clock, tmp_path
-):
+async def test_an_analysed_recording_equals_live_to_the_last_bit(unit, stepped_clock, tmp_path):
     machine, calibration = machine_of(unit), calibration_of(unit)
     live_monitor, live = UnitMonitor(machine, ANALYSIS), []
     with recording_writer(unit, tmp_path / "run", "a test") as writer:
@@ -123,9 +121,7 @@ def averaged(one: Refresh, bearing: str, first_index: int, n_usable: int) -> Ref
 @pytest.mark.parametrize(
     ("n_segments", "kept"), [((1, 2, 3), 2), ((1, 4, 4), 2), ((3, 4, 2), 1), ((4, 4, 0), 1)]
 )
-def test_the_last_full_average_is_kept_and_the_last_of_all_until_there_is_one(
-    one, n_segments, kept
-):
+def test_the_last_full_average_is_kept_and_the_last_of_all_until_then(one, n_segments, kept):
     last = LastAverages()
     for number, n in enumerate(n_segments):
         last.put(averaged(one, "UJB", number, n))

@@ -119,9 +119,7 @@ async def test_a_link_that_stays_lost_ends_a_recording_and_keeps_it(
     assert open_recording(tmp_path / "run").manifest.n_samples == (100 if policy is None else 200)
 
 
-async def test_a_lost_link_may_be_recorded_across_and_is_an_exact_gap(
-    plant, tmp_path, stepped_clock
-):
+async def test_a_lost_link_may_be_recorded_across_as_an_exact_gap(plant, tmp_path, stepped_clock):
     unit = plant.unit[0]
     writer = recording_writer(unit, tmp_path / "run", "a test")
     policy = ReconnectPolicy(10.0, stepped_clock)

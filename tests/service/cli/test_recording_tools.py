@@ -190,18 +190,8 @@ def test_what_is_exported_can_be_imported_again(folder, plant_path, unit, tmp_pa
 @pytest.mark.parametrize(
     ("old", "new", "code", "words"),
     [
-        (
-            'unit = "um"',
-            'unit = "mm/s"',
-            1,
-            "channel ujb_shaft_x: unit 'mm/s' cannot be converted to gap_um",
-        ),
-        (
-            "ujb_shaft_x",
-            "ujb_shaft_z",
-            1,
-            "channel ujb_shaft_z is mapped, but unit U1 has only ujb_shaft",
-        ),
+        ('unit = "um"', 'unit = "mm/s"', 1, "ujb_shaft_x: unit 'mm/s' cannot be converted to gap"),
+        ("ujb_shaft_x", "ujb_shaft_z", 1, "ujb_shaft_z is mapped, but unit U1 has only ujb_shaft"),
         ('zone = "UTC"', "", 2, "time.zone (by default): is required"),
         (
             'unit = "r/min"',
@@ -272,9 +262,7 @@ def test_every_sample_flag_and_stamp_comes_back(
     assert on_grid(raws, counts_calibration()) == on_grid(feed.sent, counts_calibration())
 
 
-def test_a_log_of_two_devices_under_the_same_ids_is_refused(
-    counting_feed, counts_calibration, tmp_path
-):
+def test_a_log_of_two_devices_of_one_id_is_refused(counting_feed, counts_calibration, tmp_path):
     shape = CanShape(
         channels=(DaqSignal("c0", "V", 1.0), DaqSignal("c1", "V", 1.0)),
         slow=(DaqSignal("slow0", "degC"), DaqSignal("slow1", "degC")),

@@ -72,11 +72,7 @@ def test_what_was_set_is_listed_with_time_author_and_what_was_before(plant_path)
         ((), {"opposite_x_um": 2000}, "bearing UJB has no opposite probe in x"),
         ((), {"bearing": "XJB"}, "unit U1: unknown bearing XJB; known bearings: UJB, LJB, TJB"),
         ((), {"unit": "U9"}, "unknown unit U9; known units: U1, U2"),
-        (
-            ("--measured",),
-            {"x_um": None, "y_um": None},
-            "no result is stored yet",
-        ),
+        (("--measured",), {"x_um": None, "y_um": None}, "no result is stored yet"),
         (("--measured",), {}, "padwatch reference set: give gaps or --measured, not both"),
     ],
     ids=lambda value: None if isinstance(value, str) else "-".join(value),

@@ -39,7 +39,7 @@ def client() -> TestClient:
 
 
 @pytest.mark.parametrize("page", ["/", "/docs"])
-def test_no_inline_script_may_run_on_any_page(client, page: str) -> None:
+def test_no_inline_script_may_run_on_any_page(client, page):
     answer = client.get(page)
     policy = dict(
         directive.split(maxsplit=1)
@@ -51,7 +51,7 @@ def test_no_inline_script_may_run_on_any_page(client, page: str) -> None:
 
 
 @pytest.mark.parametrize("page", ["/", "/docs"])
-def test_a_page_is_asked_for_each_time_and_its_files_once_for_each_hash(client, page: str) -> None:
+def test_a_page_is_asked_for_each_time_and_its_files_once_for_each_hash(client, page):
     answer = client.get(page, headers=AS_IS)
     assert answer.headers["cache-control"] == "no-cache"
     named = re.findall(r'(?:href|src)="(/[^"]+)"', answer.text)
@@ -63,7 +63,7 @@ def test_a_page_is_asked_for_each_time_and_its_files_once_for_each_hash(client, 
         assert file.headers["cache-control"] == "public, max-age=31536000, immutable"
 
 
-def test_a_browser_learns_all_modules_of_the_first_page_from_the_page(client) -> None:
+def test_a_browser_learns_all_modules_of_the_first_page_from_the_page(client):
     preloaded = re.findall(r'rel="modulepreload" href="([^"]+)"', client.get("/").text)
     modules = {path for path in pages() if path.endswith(".js")}
     assert {path.removeprefix(FILES) for path in preloaded} == modules - {"docs.js"}
@@ -75,7 +75,7 @@ SIX = httpx2.Limits(max_connections=6)
 """As many connections as a browser opens."""
 
 
-async def test_twenty_browsers_that_open_the_dashboard_at_once_all_get_every_file() -> None:
+async def test_twenty_browsers_that_open_the_dashboard_at_once_all_get_every_file():
     app = FastAPI()
     app.add_middleware(StaticFiles)
     listener = socket.create_server(("127.0.0.1", 0))
@@ -106,7 +106,7 @@ async def test_twenty_browsers_that_open_the_dashboard_at_once_all_get_every_fil
     assert found[200] > 20 * 130
 
 
-def test_a_page_of_another_edition_gets_no_file_of_this_one(client) -> None:
+def test_a_page_of_another_edition_gets_no_file_of_this_one(client):
     for path in ("0.0.1-12345678/app.js", "0123456789ab/plotly.min.js"):
         answer = client.get(f"/static/{path}")
         assert answer.status_code == 404
@@ -114,7 +114,7 @@ def test_a_page_of_another_edition_gets_no_file_of_this_one(client) -> None:
         assert "reload the page" in answer.json()["detail"]
 
 
-def test_the_libraries_are_the_installed_ones_and_named_by_their_content(client) -> None:
+def test_the_libraries_are_the_installed_ones_and_named_by_their_content(client):
     answer = client.get(PLOTLY, headers=AS_IS)
     assert b"plotly.js v" in answer.content[:200]
     assert PLOTLY.split("/")[2] == libraries()["plotly.min.js"][1].digest[:12]
@@ -123,7 +123,7 @@ def test_the_libraries_are_the_installed_ones_and_named_by_their_content(client)
 
 
 @pytest.mark.parametrize("path", ["/", "/docs", FILES + "app.js", PLOTLY])
-def test_a_browser_that_has_the_file_is_not_sent_it_again(client, path: str) -> None:
+def test_a_browser_that_has_the_file_is_not_sent_it_again(client, path):
     etag = client.get(path).headers["etag"]
     again = client.get(path, headers={"If-None-Match": etag})
     assert again.status_code == 304
@@ -132,7 +132,7 @@ def test_a_browser_that_has_the_file_is_not_sent_it_again(client, path: str) -> 
     assert changed.status_code == 200
 
 
-def test_packed_and_plain_are_the_same_file_with_different_tags(client) -> None:
+def test_packed_and_plain_are_the_same_file_with_different_tags(client):
     compress_all()
     for path, asset in served().items():
         assert asset.gzipped is not None, path
@@ -145,7 +145,7 @@ def test_packed_and_plain_are_the_same_file_with_different_tags(client) -> None:
     assert packed.headers["etag"] != plain.headers["etag"]
 
 
-def test_a_file_that_is_not_compressed_yet_is_sent_as_it_is(client, monkeypatch) -> None:
+def test_a_file_that_is_not_compressed_yet_is_sent_as_it_is(client, monkeypatch):
     monkeypatch.setattr(served()[FILES + "app.js"], "gzipped", None)
     answer = client.get(FILES + "app.js", headers={"Accept-Encoding": "gzip"})
     assert "content-encoding" not in answer.headers
@@ -160,13 +160,13 @@ def test_a_file_that_is_not_compressed_yet_is_sent_as_it_is(client, monkeypatch)
         *("%252e%252e%252fetc/passwd", "..\\..\\..\\etc\\passwd", "/etc/passwd", "%00"),
     ],
 )
-def test_nothing_else_is_served(client, path: str) -> None:
+def test_nothing_else_is_served(client, path):
     answer = client.get(FILES + path)
     assert answer.status_code == 404
     assert "root:" not in answer.text
 
 
-def test_another_byte_in_any_file_of_the_dashboard_is_another_edition(monkeypatch) -> None:
+def test_another_byte_in_any_file_of_the_dashboard_is_another_edition(monkeypatch):
     before = edition()
     changed = dict(told.pages())
     changed["app.js"] = Asset(changed["app.js"].body + b"\n", changed["app.js"].media_type)

@@ -1,6 +1,5 @@
 """What a serving process shows is as old as its samples, not as the report on it."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,6 @@ import numpy as np
 import pytest
 from rigs.blocks import given_block
 
-from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reason
 from core.samples.gaps import SampleAccount
 from service.live.current_state import SILENT_AFTER_S, LiveUnits
@@ -27,11 +25,8 @@ BLOCK = given_block(UNIT.id, 1, 0, 0, 600.0, np.zeros((1, 60), dtype=np.float32)
 
 @pytest.mark.parametrize(("behind_s", "is_current"), [(0.0, True), (29.0, True), (31.0, False)])
 def test_what_has_waited_for_the_analysis_is_as_old_in_the_serving_process(
-    stepped_clock: Any,
-    assessment: Callable[..., Assessment],
-    behind_s: float,
-    is_current: bool,
-) -> None:
+    stepped_clock, assessment, behind_s, is_current
+):
     live = LiveView([UNIT.id], stepped_clock, STALE_AFTER_S)
     replica = LiveUnits([UNIT.id], stepped_clock, STALE_AFTER_S)
     found = replace(assessment(), unit=UNIT.id, bearing=BEARING)
@@ -74,8 +69,8 @@ def signs(data_age_s: float, said_s: float | None) -> UnitLink:
 
 @pytest.mark.parametrize("held_up_s", [0.0, 4.0, 40.0])
 def test_a_report_that_the_database_has_kept_back_makes_nothing_younger(
-    stepped_clock: Any, replica: LiveUnits, held_up_s: float
-) -> None:
+    stepped_clock, replica, held_up_s
+):
     stepped_clock.step(1.0)
     said_s = stepped_clock.monotonic_s()
     stepped_clock.step(held_up_s)
@@ -87,9 +82,7 @@ def test_a_report_that_the_database_has_kept_back_makes_nothing_younger(
     assert replica.data_age_s(UNIT.id) == pytest.approx(0.2)
 
 
-def test_another_process_is_believed_from_its_second_report_on(
-    stepped_clock: Any, replica: LiveUnits
-) -> None:
+def test_another_process_is_believed_from_its_second_report_on(stepped_clock, replica):
     said_s = stepped_clock.monotonic_s()
     stepped_clock.step(3.0)  # kept back, of which nobody can know yet
     replica.update(UNIT.id, "two", 1, signs(0.2, said_s))

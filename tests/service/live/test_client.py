@@ -1,12 +1,9 @@
 """Reports that cannot be applied in full: what is known is shown, and the rest is not."""
 
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from core.monitor.assessment import Assessment
 from service.live.client import LiveClient
 from service.live.snapshot import Report, UnitLink, UnitReport, UnitSnapshot
 from service.live.status import LinkState, UnitStatus
@@ -19,9 +16,7 @@ UNIT = PLANT.unit[0].id
 BEARING = PLANT.unit[0].bearing[0].id
 
 
-async def test_a_baseline_that_cannot_be_read_hides_no_result(
-    assessment: Callable[..., Assessment], stepped_clock: Any, tmp_path: Path
-) -> None:
+async def test_a_baseline_that_cannot_be_read_hides_no_result(assessment, stepped_clock, tmp_path):
     found = replace(assessment(), unit=UNIT, bearing=BEARING)
     bearings = {BEARING: bearing_snapshot(found)}
     snapshot = UnitSnapshot(bearings, (), frozenset(), frozenset(), {}, {BEARING: 2})

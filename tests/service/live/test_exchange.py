@@ -33,7 +33,7 @@ def nothing(_: bool) -> None:
     """Report nothing."""
 
 
-async def test_the_first_report_is_whole_and_answers_go_to_those_who_asked() -> None:
+async def test_the_first_report_is_whole_and_answers_go_to_those_who_asked():
     taken: list[bool] = []
 
     async def take(report: bool) -> None:
@@ -56,7 +56,7 @@ async def test_the_first_report_is_whole_and_answers_go_to_those_who_asked() -> 
     assert serving.exception() is None
 
 
-async def test_a_question_is_not_left_waiting_when_the_measuring_process_ends() -> None:
+async def test_a_question_is_not_left_waiting_when_the_measuring_process_ends():
     ours, theirs = socket.socketpair()
     reader, writer = await asyncio.open_connection(sock=theirs)
     end = ServingEnd(writer, lambda _: asyncio.sleep(0))
@@ -73,9 +73,7 @@ async def test_a_question_is_not_left_waiting_when_the_measuring_process_ends() 
         await end.ask("echo", "[]")
 
 
-async def test_a_serving_process_that_reads_nothing_is_given_up(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+async def test_a_serving_process_that_reads_nothing_is_given_up(monkeypatch):
     monkeypatch.setattr(exchange, "TAKEN_WITHIN_S", 0.05)
     serving, _, writer = await connected(lambda _: bytes(1_000_000))
     await serving
@@ -83,9 +81,7 @@ async def test_a_serving_process_that_reads_nothing_is_given_up(
 
 
 @pytest.mark.parametrize("n_bytes", [1, 1_000_000])
-async def test_a_serving_process_that_ends_is_no_fault_of_the_measuring_process(
-    n_bytes: int,
-) -> None:
+async def test_a_serving_process_that_ends_is_no_fault_of_the_measuring_process(n_bytes):
     serving, reader, writer = await connected(lambda _: bytes(n_bytes))
     await reader.readexactly(4)
 
@@ -94,7 +90,7 @@ async def test_a_serving_process_that_ends_is_no_fault_of_the_measuring_process(
     await serving
 
 
-async def test_a_report_that_cannot_be_built_is_not_kept_secret() -> None:
+async def test_a_report_that_cannot_be_built_is_not_kept_secret():
     serving, _, writer = await connected(lambda _: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         await serving
@@ -112,9 +108,7 @@ async def test_a_report_that_cannot_be_built_is_not_kept_secret() -> None:
     ],
     ids=["too long", "no question", "pickled", "cut off", "half a length"],
 )
-async def test_a_message_that_is_no_question_ends_the_connection_and_nothing_else(
-    message: bytes,
-) -> None:
+async def test_a_message_that_is_no_question_ends_the_connection_and_nothing_else(message):
     serving, reader, writer = await connected(nothing)
     writer.write(message)
     writer.write_eof()

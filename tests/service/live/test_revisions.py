@@ -1,6 +1,5 @@
 """A revision changes whenever an answer may change, and never because only time has passed."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -8,7 +7,6 @@ import pytest
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState
 from core.alarms.statistics import ChatterRule
-from core.monitor.assessment import Assessment
 from service.live.current_state import SILENT_AFTER_S, LiveAlarms, LiveUnits
 from service.live.snapshot import UnitLink, UnitSnapshot, link_document, link_of_document
 from service.live.status import LinkState, StoredResults, UnitStatus
@@ -45,8 +43,8 @@ class Reports:
 
 
 def test_a_unit_changes_with_results_links_and_staleness_but_neither_samples_nor_time(
-    live: LiveUnits, stepped_clock: Any, assessment: Callable[..., Assessment]
-) -> None:
+    live, stepped_clock, assessment
+):
     reports, result = Reports(live, stepped_clock), assessment()
     seen = [live.revision("U1")]
 
@@ -78,9 +76,7 @@ def test_a_unit_changes_with_results_links_and_staleness_but_neither_samples_nor
     assert changes()
 
 
-def test_a_result_keeps_its_arrival_time_whatever_the_clock_is_set_to(
-    live: LiveUnits, stepped_clock: Any, assessment: Callable[..., Assessment]
-) -> None:
+def test_a_result_keeps_its_arrival_time_however_the_clock_is_set(live, stepped_clock, assessment):
     reports = Reports(live, stepped_clock)
     live.set_results("U1", {"UJB": bearing_snapshot(assessment())})
     reports.send(2.0)
@@ -94,9 +90,7 @@ def test_a_result_keeps_its_arrival_time_whatever_the_clock_is_set_to(
     assert live.status("U1").received_ns == stepped_clock.now_ns() - 3_250_000_000
 
 
-def test_stored_results_are_known_by_the_process_that_has_written_them(
-    live: LiveUnits, stepped_clock: Any
-) -> None:
+def test_stored_results_are_known_by_the_process_that_has_written_them(live, stepped_clock):
     def end(process: str, n_writes: int, newest_ns: int) -> tuple[object, object]:
         stored = StoredResults(n_writes, newest_ns)
         Reports(live, stepped_clock, process).send(stored=stored)
@@ -115,7 +109,7 @@ def test_stored_results_are_known_by_the_process_that_has_written_them(
     assert live.past_revision("U1", 50) != third, "retention has deleted results"
 
 
-def test_the_alarm_list_changes_with_what_it_shows_and_not_with_every_result() -> None:
+def test_the_alarm_list_changes_with_what_it_shows_and_not_with_every_result():
     alive = {"U1"}
     alarms = LiveAlarms(["U1"], alive.__contains__, ChatterRule())
     quiet, loud = (Alarm(AlarmIdentity("U1", name, "channel_not_ok")) for name in ("x", "y"))

@@ -39,14 +39,14 @@ def published(assessment: Callable[..., Assessment]) -> UnitSnapshot:
     )
 
 
-def test_a_snapshot_is_read_as_it_was_written(published: UnitSnapshot) -> None:
+def test_a_snapshot_is_read_as_it_was_written(published):
     read = snapshot_of_document(snapshot_document(published))
 
     assert repr(read) == repr(published)  # NaN is not equal to itself
     assert read.alarms == published.alarms
 
 
-def test_a_snapshot_of_another_version_is_refused_with_both_named(published: UnitSnapshot) -> None:
+def test_a_snapshot_of_another_version_is_refused_with_both_named(published):
     _, _, content = snapshot_document(published).partition(b"\n")
 
     with pytest.raises(UnreadableSnapshotError) as refused:
@@ -56,7 +56,7 @@ def test_a_snapshot_of_another_version_is_refused_with_both_named(published: Uni
     assert f"this is padwatch {version('padwatch')}" in str(refused.value)
 
 
-def test_a_damaged_snapshot_is_refused_or_read_as_it_was(published: UnitSnapshot) -> None:
+def test_a_damaged_snapshot_is_refused_or_read_as_it_was(published):
     document = snapshot_document(published)
     refused = 0
     for at in range(0, len(document), 7):
@@ -73,7 +73,7 @@ def test_a_damaged_snapshot_is_refused_or_read_as_it_was(published: UnitSnapshot
     assert refused > 0.9 * len(document) / 7
 
 
-def test_a_snapshot_that_unpacks_to_too_much_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_snapshot_that_unpacks_to_too_much_is_refused(monkeypatch):
     monkeypatch.setattr(snapshot, "MAX_BYTES", 1000)
     with pytest.raises(UnreadableSnapshotError, match="longer than 1000 bytes"):
         snapshot_of_document(snapshot.OWN_VERSION + zlib.compress(b"0" * 1001))

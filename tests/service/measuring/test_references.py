@@ -93,9 +93,7 @@ async def test_a_reference_of_a_bearing_that_is_gone_is_ignored_and_said_once(
     assert watched(monitor)["UJB"] == (1998.5, 2003.1)
 
 
-async def test_while_the_store_cannot_be_read_the_references_stay(
-    in_force, monitor, store, tmp_path, logged
-):
+async def test_references_outlast_an_unreadable_store(in_force, monitor, store, tmp_path, logged):
     store.gap_references.add(reference())
     await in_force.look()
     path, away = tmp_path / "padwatch.sqlite3", tmp_path / "away"

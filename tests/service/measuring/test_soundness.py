@@ -102,9 +102,7 @@ async def test_a_file_that_is_gone_is_told_and_nothing_is_written_until_it_is_ba
         assert list(store.trend(EVERYTHING).time_ns) == [T0 + n for n in (0, 1, 2, 8, 9)]
 
 
-def test_a_log_is_not_taken_for_that_of_the_file_that_has_replaced_its_own(
-    path, assessment, tmp_path
-):
+def test_a_log_is_not_taken_for_that_of_the_file_that_replaced_its_own(path, assessment, tmp_path):
     shutil.copyfile(path, tmp_path / "old")
     with closing(SqliteStore(path)) as store:
         store.append([assessment(T0 + n, speed_rpm=9.0) for n in range(3, 50)], [])

@@ -95,9 +95,7 @@ def test_readings_are_picked_by_time_state_and_condition(store, film_news, film_
     assert len(store.films.history(query(estimator=Estimator.RATIO_ORDER1))) == 0
 
 
-def test_what_is_written_twice_counts_once_and_simulated_readings_stay_marked(
-    store, film_news, film_life
-):
+def test_readings_written_twice_count_once_and_simulated_stay_marked(store, film_news, film_life):
     news = film_news(film_life(2, days=1))
     store.films.add_simulated(news[:40])
     store.append([], [], [], news)

@@ -271,9 +271,7 @@ async def test_a_message_goes_to_the_name_it_is_meant_for(room):
     assert request.line == "POST /alarms?x=1 HTTP/1.1"
 
 
-async def test_nothing_is_told_to_a_server_whose_certificate_is_not_believed(
-    room, server_tls, certificate
-):
+async def test_nothing_is_told_to_a_server_with_a_false_certificate(room, server_tls, certificate):
     server = await room.web(room.answers("200 OK"), context=server_tls)
     trusting = room.settings(server.url, ca_file=str(certificate[0]))
 

@@ -11,7 +11,6 @@ from harness.waiting import at_work, until
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
-from core.monitor.assessment import Assessment
 from core.quality import Reading
 from service.app.kept_files import captures_of, evidence_of
 from service.app.storage import evidence_folders
@@ -106,9 +105,7 @@ def plant(tmp_path: Path, deploy: Path) -> PlantFile:
 
 
 @pytest.fixture
-async def rig_of(
-    plant: PlantFile, tmp_path: Path, stepped_clock: Any, assessment: Callable[..., Assessment]
-) -> AsyncIterator[Callable[..., Any]]:
+async def rig_of(plant, tmp_path, stepped_clock, assessment) -> AsyncIterator[Callable[..., Any]]:
     """Builds a rig; another one over the same plant is the service after a restart."""
     opened: list[SqliteStore] = []
 

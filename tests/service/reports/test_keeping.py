@@ -173,9 +173,7 @@ async def test_a_disk_that_stays_away_takes_no_more_memory_than_is_allowed(rig, 
     assert [number for number, state in states(rig) if state == "complete"] == [5, 4, 3]
 
 
-async def test_old_evidence_makes_room_and_one_chattering_alarm_only_for_itself(
-    rig_of, news, plant
-):
+async def test_old_evidence_makes_room_and_a_chattering_alarm_only_for_itself(rig_of, news, plant):
     evidence = plant.evidence.model_copy(update={"max_per_alarm": 3})
     rig = await rig_of(plant.model_copy(update={"evidence": evidence}))
     async with rig.running():
@@ -217,9 +215,7 @@ async def test_samples_that_could_not_be_kept_are_said_to_be_lost(rig, news):
     assert samples(rig) == "lost"
 
 
-async def test_a_capture_that_was_finished_just_before_a_crash_is_linked_after_it(
-    rig_of, rig, news
-):
+async def test_a_capture_finished_just_before_a_crash_is_linked_after_it(rig_of, rig, news):
     raised = news()
     await rig.write(raised)
     assert samples(rig) == "none"  # this service has not kept any

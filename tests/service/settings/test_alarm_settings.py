@@ -60,9 +60,7 @@ def rules(plant_of: PlantOf) -> Callable[[str], BearingRules]:
     return build
 
 
-def test_without_limits_nothing_of_a_bearing_is_watched_and_in_a_replay_neither_link_nor_clock(
-    plant_of,
-):
+def test_without_limits_no_bearing_is_watched_and_in_a_replay_neither_link_nor_clock(plant_of):
     plant = plant_of()
 
     rules = rules_of(plant.unit[0], plant.alarms, Origin.LIVE)
@@ -215,12 +213,7 @@ BETWEEN = "alert_below = 600.0, alert = 700.0"
         (ORDER1, f"{{ {OTHER} danger = 140.0 }}] }}", ".table[1].danger", "above alert = 150"),
         (ORDER1, f"{{ {OTHER} alert = -1.0 }}] }}", ".table[1].alert", "greater than 0"),
         (ORDER1, f"{{ {OTHER} alert_below = 9.0 }}] }}", ".table[1].alert_below", "not permitted"),
-        (
-            ORDER1,
-            f"{{ {OTHER} attitude_deg = [-5.0, 9.0] }}] }}",
-            ".table[1].attitude_deg",
-            "0 to 360",
-        ),
+        (ORDER1, f"{{ {OTHER} attitude_deg = [-5, 9] }}] }}", ".table[1].attitude_deg", "0 to 360"),
         (
             ORDER1,
             f"{{ {OTHER} eccentricity_ratio = [0.4, 0.3] }}] }}",

@@ -87,12 +87,7 @@ BOTH = f'postgresql = "{ADDRESS} passfile=x"\npassword_file = "y"'
     [
         ("analysis", "vortex_order = 0.45", "vortex_order = 0.45", "[0.2, 0.4]"),
         ("analysis", "vortex_band = [0.3, 0.4]", "vortex_order (by default)", "[0.3, 0.4]"),
-        (
-            "analysis",
-            "vortex_band = [0.4, 0.2]",
-            "vortex_band = [0.4, 0.2]",
-            "0.05 <= low < high <= 0.95",
-        ),
+        ("analysis", "vortex_band = [0.4, 0.2]", "vortex_band = [0.4, 0.2]", "0.05 <= low < high"),
         ("analysis", "segment_samples = 1024", "segment_samples = 1024", "at least 3121 samples"),
         ("analysis", "max_frequency_hz = 3.0", "max_frequency_hz = 3.0", "3.07667 Hz"),
         ("analysis", "max_frequency_hz = 300", "max_frequency_hz = 300", "half the sampling rate"),
@@ -111,12 +106,7 @@ BOTH = f'postgresql = "{ADDRESS} passfile=x"\npassword_file = "y"'
         ("alarms", "max_samples_lost_share = 0.0", "max_samples_lost_share = 0.0", "than 0"),
         ("alarms", "store_failing_after_s = -1.0", "store_failing_after_s = -1.0", "equal to 0"),
         ("store", 'password_file = "x"', "password_file = 'x'", "requires postgresql"),
-        (
-            "store",
-            f'postgresql = "{ADDRESS} password=x"',
-            "postgresql",
-            "must not contain a password",
-        ),
+        ("store", f'postgresql = "{ADDRESS} password=x"', "postgresql", "not contain a password"),
         ("store", 'postgresql = "postgresql://a:x@b.c/d"', "postgresql", "not contain a password"),
         ("store", 'postgresql = "no address"', "postgresql", "is not a libpq connection string"),
         ("store", 'postgresql = "hostname=x"', "postgresql", "is not a libpq connection string"),
@@ -175,9 +165,7 @@ def test_several_mistakes_are_all_named_at_once(plant_text, mistakes):
     )
 
 
-def test_lines_are_counted_as_editors_count_them_also_where_a_file_is_not_utf_8(
-    plant_text, mistakes
-):
+def test_lines_are_counted_as_editors_do_also_where_a_file_is_not_utf_8(plant_text, mistakes):
     text = f"# a comment with \u2028 and \x85\r\n{plant_text.replace('= 1.18e9', '= 1.18', 1)}"
 
     [found] = mistakes(text)
@@ -256,9 +244,7 @@ address = 1
 """
 
 
-def test_a_line_that_two_units_or_two_devices_of_a_unit_are_read_on_is_refused(
-    plant_text, mistakes, changed
-):
+def test_a_line_that_two_units_or_devices_are_read_on_is_refused(plant_text, mistakes, changed):
     text = plant_text.replace(HOST, 'device = "/dev/ttyUSB0"')
     line = text.rpartition("device =")[0].count("\n") + 1
 
@@ -276,9 +262,7 @@ def test_a_line_that_two_units_or_two_devices_of_a_unit_are_read_on_is_refused(
 
 
 @pytest.mark.parametrize("devices", [("/dev/ttyUSB0", "/dev/ttyUSB1"), ("pty", "pty")])
-def test_lines_of_their_own_and_those_that_the_simulated_daq_makes_are_fine(
-    plant_text, tmp_path, devices
-):
+def test_own_lines_and_those_that_the_simulated_daq_makes_are_fine(plant_text, tmp_path, devices):
     for device in devices:
         plant_text = plant_text.replace(HOST, f'device = "{device}"', 1)
     path = tmp_path / "plant.toml"

@@ -141,9 +141,7 @@ def test_events_are_found_by_alarm_unit_kind_and_time_page_by_page(store):
         ({"states": (FULL,), "attitude_deg": ValueRange(high=0.0)}, "A"),
     ],
 )
-def test_events_are_found_by_the_condition_at_which_their_occurrence_was_raised(
-    store, wanted, found
-):
+def test_events_are_found_by_the_condition_at_raising(store, wanted, found):
     others = (OperatingPoint(FULL, 0.5, 10.0, 40.0), OperatingPoint(PART, 0.38, 20.0, 48.0))
     points = dict(zip("ABCDE", (POINT, *others, OperatingPoint(), None), strict=True))
     for subject, point in points.items():

@@ -277,9 +277,7 @@ def test_keys_that_are_no_text_stop_nothing(path, execute):
         assert {place.table for place in store.integrity.damaged} == {"shaft_response"}
 
 
-async def test_what_it_finds_is_told_in_the_audit_trail_and_makes_the_alarm(
-    path, stepped_clock, execute
-):
+async def test_its_findings_are_in_the_audit_trail_and_make_the_alarm(path, stepped_clock, execute):
     execute(f"DELETE FROM assessment WHERE time_ns = {at(3)}")  # noqa: S608
     with closing(SqliteStore(path)) as store:
         soundness = IntegrityMonitor(store, stepped_clock, LiveView([], stepped_clock, 30.0))

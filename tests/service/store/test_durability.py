@@ -238,9 +238,7 @@ def test_an_empty_file_is_a_new_database_and_one_that_became_empty_is_told(path)
 
 
 @pytest.mark.parametrize("n_before", [2, 3, len(MIGRATIONS) - 1])
-def test_an_older_database_keeps_its_data_and_gets_room_for_what_is_new(
-    path, monkeypatch, n_before
-):
+def test_an_older_database_keeps_its_data_and_gets_new_tables(path, monkeypatch, n_before):
     path.parent.mkdir()
     with monkeypatch.context() as at_that_time, closing(sqlite3.connect(path)) as old:
         at_that_time.setattr(schema, "MIGRATIONS", MIGRATIONS[:n_before])

@@ -52,9 +52,7 @@ def test_a_row_decodes_to_the_readings_it_was_made_of(given_):
 
 
 @pytest.mark.parametrize("spoilt", [{"time_ns": 2**63}, {"bearing": "\ud800"}])
-def test_a_row_that_no_database_takes_is_told_apart_from_a_database_that_takes_nothing(
-    store, spoilt
-):
+def test_a_row_that_no_database_takes_differs_from_a_database_that_takes_nothing(store, spoilt):
     good = assessment(at(0), speed_rpm=1.0)
 
     with pytest.raises(RefusedRowError):
@@ -327,9 +325,7 @@ def test_buckets_lose_no_reading_no_extreme_and_no_doubt(points, width_ns):
 )
 @example(999_999_999, 10_000_000_000, 10, 0.0, 1.0)
 @settings(max_examples=150, deadline=None)
-def test_a_range_never_takes_more_buckets_than_asked_for(
-    start_ns, length_ns, max_points, first, last
-):
+def test_a_range_never_takes_more_buckets_than_asked(start_ns, length_ns, max_points, first, last):
     width_ns = bucket_width_ns(start_ns, start_ns + length_ns, max_points)
     inside = sorted(start_ns + min(int(f * length_ns), length_ns - 1) for f in (first, last))
 

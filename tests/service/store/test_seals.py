@@ -229,9 +229,7 @@ def test_a_damaged_roll_up_is_not_gathered_into_a_wider_one(full_store, execute)
 
 
 @pytest.mark.parametrize("hour", range(N_HOURS))
-def test_numbers_whose_cell_is_damaged_are_not_taken_for_those_of_another_condition(
-    full_store, execute, hour
-):
+def test_numbers_of_a_damaged_cell_are_not_those_of_another_condition(full_store, execute, hour):
     gather_all(full_store)
     right = extremes(full_store)
     execute(

@@ -94,9 +94,7 @@ def read() -> Callable[[Path, ImportJob], Found]:
 
 
 @pytest.fixture
-def read_text(
-    tmp_path: Path, job: ImportJob, read: Callable[[Path, ImportJob], Found]
-) -> Callable[..., Found]:
+def read_text(tmp_path, job, read) -> Callable[..., Found]:
     """Reads a text without slow values as CSV; keywords change the job."""
 
     def read_it(text: str, **changes: Any) -> Found:

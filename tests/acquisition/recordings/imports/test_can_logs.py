@@ -1,6 +1,6 @@
 """Frames come back from candump and BLF logs as they were on the bus."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -50,9 +50,7 @@ def all_frames(path: Path, job: ImportJob) -> list[Frames]:
 
 
 @pytest.mark.parametrize("kind", WRITERS)
-def test_data_frames_come_back_with_time_to_a_microsecond(
-    tmp_path: Path, log_job: Callable[..., ImportJob], kind: str
-) -> None:
+def test_data_frames_come_back_with_time_to_a_microsecond(tmp_path, log_job, kind):
     sent = messages()
     with WRITERS[kind](tmp_path / "log") as log:
         for message in sent:
@@ -73,9 +71,7 @@ def test_data_frames_come_back_with_time_to_a_microsecond(
     assert np.abs(times_ns // 1000 - due_us).max() <= 1
 
 
-def test_a_blf_log_is_in_the_zone_of_the_mapping(
-    tmp_path: Path, log_job: Callable[..., ImportJob]
-) -> None:
+def test_a_blf_log_is_in_the_zone_of_the_mapping(tmp_path, log_job):
     with can.BLFWriter(tmp_path / "log") as log:
         log(messages(8)[0])
     (batch,) = all_frames(tmp_path / "log", log_job("blf", utc_offset_s=-10_800))
@@ -83,9 +79,7 @@ def test_a_blf_log_is_in_the_zone_of_the_mapping(
 
 
 @pytest.mark.parametrize(("kind", "buses"), [("candump", ("can0", "can1")), ("blf", ("1", "2"))])
-def test_like_frames_of_two_buses_are_never_mixed(
-    tmp_path: Path, log_job: Callable[..., ImportJob], kind: str, buses: tuple[str, str]
-) -> None:
+def test_like_frames_of_two_buses_are_never_mixed(tmp_path, log_job, kind, buses):
     with WRITERS[kind](tmp_path / "log") as log:
         for n in range(100):
             channel = f"can{n % 2}" if kind == "candump" else n % 2
@@ -117,9 +111,7 @@ def test_like_frames_of_two_buses_are_never_mixed(
         (["(1.0) can0 123#" + "zz"], "line 1: .* is not a candump frame"),
     ],
 )
-def test_frames_that_were_on_no_bus_are_refused(
-    tmp_path: Path, log_job: Callable[..., ImportJob], lines: Iterable[str], words: str
-) -> None:
+def test_frames_that_were_on_no_bus_are_refused(tmp_path, log_job, lines, words):
     path = tmp_path / "log"
     path.write_text("\n".join(lines) + "\n")
     with pytest.raises(ConfigError, match=words) as error:

@@ -92,9 +92,7 @@ def read_all(path: Path, job: ImportJob) -> int:
 
 
 @pytest.mark.parametrize("kind", WRITERS)
-def test_a_file_that_was_cut_off_anywhere_is_refused(
-    tmp_path: Path, job_for: Callable[[str], ImportJob], kind: str
-) -> None:
+def test_a_file_that_was_cut_off_anywhere_is_refused(tmp_path, job_for, kind):
     path, job = tmp_path / "run.mf4", job_for(kind)
     WRITERS[kind](path)
     content = path.read_bytes()
@@ -108,9 +106,7 @@ def test_a_file_that_was_cut_off_anywhere_is_refused(
 
 
 @pytest.mark.parametrize("kind", ["tdms", "blf"])
-def test_parts_that_are_missing_at_the_end_are_noticed_at_their_border_too(
-    tmp_path: Path, job_for: Callable[[str], ImportJob], kind: str
-) -> None:
+def test_parts_that_are_missing_at_the_end_are_noticed_at_their_border_too(tmp_path, job_for, kind):
     path, job = tmp_path / "run", job_for(kind)
     WRITERS[kind](path)
     content = path.read_bytes()
@@ -124,9 +120,7 @@ def test_parts_that_are_missing_at_the_end_are_noticed_at_their_border_too(
 
 @pytest.mark.parametrize("n_damaged", fast_and_long(2, 8))
 @pytest.mark.parametrize("kind", ["tdms", "mdf4", "blf", "hdf5"])
-def test_any_damage_is_read_or_refused_but_never_more(
-    tmp_path: Path, job_for: Callable[[str], ImportJob], kind: str, n_damaged: int
-) -> None:
+def test_any_damage_is_read_or_refused_but_never_more(tmp_path, job_for, kind, n_damaged):
     """Cut off anywhere, and bytes changed at random: the reading process may do what it likes."""
     path, job = tmp_path / "run.mf4", job_for(kind)
     WRITERS[kind](path)
@@ -149,9 +143,7 @@ def test_any_damage_is_read_or_refused_but_never_more(
     assert n_refused > 0
 
 
-def test_an_index_file_beside_a_tdms_file_is_not_believed(
-    tmp_path: Path, job_for: Callable[[str], ImportJob]
-) -> None:
+def test_an_index_file_beside_a_tdms_file_is_not_believed(tmp_path, job_for):
     write_tdms(tmp_path / "run.tdms")
     (tmp_path / "run.tdms_index").write_bytes(b"TDSh" + bytes(100))
     assert read_all(tmp_path / "run.tdms", job_for("tdms")) == 600

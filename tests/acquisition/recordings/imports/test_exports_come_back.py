@@ -1,10 +1,8 @@
 """A recording that is exported and imported again is the same recording."""
 
 import itertools
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -95,9 +93,7 @@ JOB = ImportJob(
 
 
 @pytest.mark.parametrize("sample_type", ["float32", "int16"])
-def test_every_block_is_the_same_to_the_last_bit(
-    recording: Recording, tmp_path: Path, read: Callable[..., Any]
-) -> None:
+def test_every_block_is_the_same_to_the_last_bit(recording, tmp_path, read):
     export_recording(recording, ExportFormat.CSV, tmp_path / "run.csv")
     found = read(tmp_path / "run.csv", JOB)
     calibration = recording.manifest.calibration

@@ -21,9 +21,7 @@ START_NS = 1_767_225_600_000_000_000
 START = datetime(2026, 1, 1, tzinfo=UTC)
 PER_COUNT = 12.0 / 32768 * 250.0
 
-Read = Callable[[Path, ImportJob], Any]
 Placed = Callable[..., ImportJob]
-Imported = Callable[..., Any]
 Change = Callable[[ImportJob], ImportJob]
 
 
@@ -110,9 +108,7 @@ def job_for(job: ImportJob, placed: Placed) -> Callable[[str], ImportJob]:
 
 
 @pytest.fixture
-def imported(
-    tmp_path: Path, run: Any, read: Read, job_for: Callable[[str], ImportJob]
-) -> Callable[..., Any]:
+def imported(tmp_path, run, read, job_for) -> Callable[..., Any]:
     """Writes samples of the run into a file and reads it, by a job that some change."""
 
     def through(kind: str, samples: np.ndarray, change: Change = lambda job: job) -> Any:
@@ -133,9 +129,7 @@ def with_channels(**changes: Any) -> Change:
     [("units_um", None, "float32"), ("counts", 1.0, "int16"), ("counts", 1.01, "float32")],
     ids=["engineering units", "counts of the calibrated scale", "counts of another scale"],
 )
-def test_samples_come_back_equal(
-    run: Any, imported: Imported, kind: str, in_file: str, scale: float | None, sample_type: str
-) -> None:
+def test_samples_come_back_equal(run, imported, kind, in_file, scale, sample_type):
     """Counts stay counts only where they have the calibrated scale."""
     changes = {"calibrated_per_count": scale * PER_COUNT} if scale else {}
     if scale and (kind == "csv" or scale != 1.0):
@@ -148,9 +142,7 @@ def test_samples_come_back_equal(
 
 
 @pytest.mark.parametrize("kind", ["hdf5", "tdms"])
-def test_slow_values_whose_time_goes_back_are_refused(
-    run: Any, imported: Imported, monkeypatch: pytest.MonkeyPatch, kind: str
-) -> None:
+def test_slow_values_whose_time_goes_back_are_refused(run, imported, monkeypatch, kind):
     monkeypatch.setattr(type(run), "slow_s", np.array([0.0, 2.0, 1.0]))
     with pytest.raises(ConfigError, match="the times of slow channel oil go back"):
         imported(kind, run.units_um)
@@ -167,9 +159,7 @@ def assert_times_and_slow_values(found: Any, run: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", WRITERS)
-def test_a_unit_or_a_column_that_is_not_the_mapped_one_is_refused(
-    run: Any, imported: Imported, kind: str
-) -> None:
+def test_a_unit_or_a_column_that_is_not_the_mapped_one_is_refused(run, imported, kind):
     group = "" if kind == "csv" else "waveforms"
     with pytest.raises(ConfigError, match="shaft z' does not exist"):
         imported(kind, run.units_um, with_channels(place=ColumnName("shaft z", group)))
@@ -179,9 +169,7 @@ def test_a_unit_or_a_column_that_is_not_the_mapped_one_is_refused(
             imported(kind, run.units_um, with_channels(unit="mm/s"))
 
 
-def test_a_csv_file_may_have_semicolons_decimal_commas_and_lines_before_its_header(
-    tmp_path: Path, run: Any, read: Read, job: ImportJob
-) -> None:
+def test_a_csv_file_may_have_semicolons_decimal_commas_and_a_preamble(tmp_path, run, read, job):
     write_csv(tmp_path / "run.mf4", run, run.units_um)
     text = (tmp_path / "run.mf4").read_text().replace(",", ";").replace(".", ",")
     (tmp_path / "run.mf4").write_text("Rohdaten;;;\n\n" + text, encoding="utf-8-sig")
@@ -190,9 +178,7 @@ def test_a_csv_file_may_have_semicolons_decimal_commas_and_lines_before_its_head
     np.testing.assert_array_equal(found.samples, run.units_um)
 
 
-def test_tdms_waveform_properties_are_its_time(
-    tmp_path: Path, run: Any, read: Read, job: ImportJob, placed: Placed
-) -> None:
+def test_tdms_waveform_properties_are_its_time(tmp_path, run, read, job, placed):
     properties = {
         "wf_start_time": np.datetime64("2026-01-01T00:00:00.250000"),
         "wf_increment": 1 / 600.0,
@@ -214,9 +200,7 @@ def test_tdms_waveform_properties_are_its_time(
     assert found.blocks[1].start_ns == START_NS + 250_000_000 + 83_333_000
 
 
-def test_local_time_in_an_mdf_file_is_read_in_the_zone_of_the_mapping(
-    tmp_path: Path, run: Any, read: Read, job_for: Callable[[str], ImportJob]
-) -> None:
+def test_local_time_in_an_mdf_file_is_read_in_the_zone_of_the_mapping(tmp_path, run, read, job_for):
     write_mdf4(tmp_path / "run.mf4", run, run.units_um)
     with asammdf.MDF(tmp_path / "run.mf4") as mdf:
         mdf.header.start_time = datetime(2026, 1, 1)
@@ -227,9 +211,7 @@ def test_local_time_in_an_mdf_file_is_read_in_the_zone_of_the_mapping(
 
 
 @pytest.mark.parametrize("of", ["counts", "units_um"])
-def test_samples_that_an_mdf_file_calls_invalid_are_none(
-    tmp_path: Path, run: Any, read: Read, job_for: Callable[[str], ImportJob], of: str
-) -> None:
+def test_samples_that_an_mdf_file_calls_invalid_are_none(tmp_path, run, read, job_for, of):
     invalid = np.isin(run.index, (0, 7, 600))
     scale = ChannelConversion(conversion_type=1, a=PER_COUNT, b=0.0)
     values, conversion = getattr(run, of), scale if of == "counts" else None
@@ -248,9 +230,7 @@ def test_samples_that_an_mdf_file_calls_invalid_are_none(
     np.testing.assert_array_equal(found.index, run.index)
 
 
-def test_waveforms_of_different_lengths_or_times_are_refused(
-    tmp_path: Path, run: Any, read: Read, job: ImportJob
-) -> None:
+def test_waveforms_of_different_lengths_or_times_are_refused(tmp_path, run, read, job):
     with h5py.File(tmp_path / "run.mf4", "w") as file:
         file["time"] = run.since_start_s
         file["shaft x"], file["shaft y"] = run.units_um[0], run.units_um[1, :-1]

@@ -4,7 +4,6 @@ import pickle
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ import h5py
 import nptdms
 import numpy as np
 import pytest
-from rigs.hostile_files import Placed, Read, measured, refusal, write_hdf5
+from rigs.hostile_files import measured, refusal, write_hdf5
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ColumnName, ImportJob, TimeAxis
@@ -42,14 +41,8 @@ def csv_job(job: ImportJob) -> ImportJob:
         (b"time,shaft x,shaft y\n0,=1+1,2\n", "'=1+1' is not a valid number"),
         (b"time,shaft x,shaft y\nnan,1,2\n", "value nan of the time column is not a valid time"),
         (b"time,shaft x,shaft y\n1e300,1,2\n", "of the time column is not a valid time"),
-        (
-            b"time,shaft x,shaft y\n9007199254,1,2\n",
-            "time 1.07744e+10 s since 1970 is out of range",
-        ),
-        (
-            b"time,shaft x,shaft y\n0,1_000,2\n",
-            "line 2: number '1_000'",
-        ),
+        (b"time,shaft x,shaft y\n9007199254,1,2\n", "time 1.07744e+10 s since 1970 is out of"),
+        (b"time,shaft x,shaft y\n0,1_000,2\n", "line 2: number '1_000'"),
         (b"time,shaft x,shaft x\n0,1,2\n", "column 'shaft x' occurs 2 times"),
         (b"time,shaft x,shaft y\n\xff\xfe,1,2\n", "line 2: the line is not valid UTF-8"),
         (b'time,shaft x,shaft y\n"0,1,2\n' * 2, "line 4: "),
@@ -58,24 +51,20 @@ def csv_job(job: ImportJob) -> ImportJob:
     ],
     ids=range(17),
 )
-def test_wrong_text_is_refused_naming_the_line(
-    tmp_path: Path, read: Read, csv_job: ImportJob, content: bytes, words: str
-) -> None:
+def test_wrong_text_is_refused_naming_the_line(tmp_path, read, csv_job, content, words):
     (tmp_path / "run").write_bytes(content)
     says = refusal(read, tmp_path / "run", csv_job)
     assert words in says
     assert "not readable as" not in says
 
 
-def test_a_file_that_is_none_is_refused(tmp_path: Path, read: Read, csv_job: ImportJob) -> None:
+def test_a_file_that_is_none_is_refused(tmp_path, read, csv_job):
     assert "No such file" in refusal(read, tmp_path / "absent", csv_job)
     assert "not a regular file" in refusal(read, tmp_path, csv_job)
 
 
 @pytest.mark.long
-def test_a_million_columns_are_refused_or_read_in_bounded_memory(
-    tmp_path: Path, job: ImportJob, placed: Placed
-) -> None:
+def test_a_million_columns_are_refused_or_read_in_bounded_memory(tmp_path, job, placed):
     names = [f"channel {n}" for n in range(1_000_000)]
     segment = b"".join(
         struct.pack("<I", len(path)) + path + struct.pack("<II", 0xFFFFFFFF, 0)
@@ -91,9 +80,7 @@ def test_a_million_columns_are_refused_or_read_in_bounded_memory(
     assert child_mb < 2200
 
 
-def test_objects_that_were_pickled_are_never_loaded(
-    tmp_path: Path, read: Read, job: ImportJob
-) -> None:
+def test_objects_that_were_pickled_are_never_loaded(tmp_path, read, job):
     class Evil:
         def __reduce__(self) -> tuple[Any, ...]:
             return (Path.touch, (tmp_path / "harmed",))
@@ -108,7 +95,7 @@ def test_objects_that_were_pickled_are_never_loaded(
     assert not (tmp_path / "harmed").exists()
 
 
-def test_an_archive_is_not_unpacked(tmp_path: Path, read: Read, job: ImportJob) -> None:
+def test_an_archive_is_not_unpacked(tmp_path, read, job):
     with zipfile.ZipFile(tmp_path / "run.mf4", "w") as archive:
         archive.writestr("../../escaped.mf4", b"MDF     4.10    " + bytes(100))
     says = refusal(read, tmp_path / "run.mf4", replace(job, format="mdf4"))
@@ -116,14 +103,14 @@ def test_an_archive_is_not_unpacked(tmp_path: Path, read: Read, job: ImportJob) 
     assert [path.name for path in tmp_path.iterdir()] == ["run.mf4"]
 
 
-def test_a_reader_that_crashes_is_a_refusal(tmp_path: Path, read: Read, job: ImportJob) -> None:
+def test_a_reader_that_crashes_is_a_refusal(tmp_path, read, job):
     lead = b"TDSm" + struct.pack("<IIQQ", 0x2, 4713, 72, 72)
     (tmp_path / "run").write_bytes(lead + struct.pack("<II", 1, 64) + b"\xff" * 64)
     says = refusal(read, tmp_path / "run", replace(job, format="tdms", slow=()))
     assert ": cannot be read as tdms: " in says
 
 
-def test_places_in_groups_are_told_apart(tmp_path: Path, read: Read, job: ImportJob) -> None:
+def test_places_in_groups_are_told_apart(tmp_path, read, job):
     with nptdms.TdmsWriter(tmp_path / "run") as file:
         for group in ("a", "b"):
             file.write_segment([nptdms.ChannelObject(group, "shaft x", np.zeros(5))])
@@ -138,9 +125,7 @@ def hdf5_job(job: ImportJob) -> ImportJob:
     return replace(job, format="hdf5", slow=())
 
 
-def test_hdf5_links_to_elsewhere_are_not_followed(
-    tmp_path: Path, read: Read, hdf5_job: ImportJob
-) -> None:
+def test_hdf5_links_to_elsewhere_are_not_followed(tmp_path, read, hdf5_job):
     write_hdf5(tmp_path / "other")
     write_hdf5(tmp_path / "external", shaft_x=h5py.ExternalLink("other", "/shaft x"))
     assert "'shaft x' is a soft or external link" in refusal(read, tmp_path / "external", hdf5_job)
@@ -148,9 +133,7 @@ def test_hdf5_links_to_elsewhere_are_not_followed(
     assert "'shaft x' is a soft or external link" in refusal(read, tmp_path / "soft", hdf5_job)
 
 
-def test_hdf5_that_has_no_such_dataset_is_refused(
-    tmp_path: Path, read: Read, hdf5_job: ImportJob
-) -> None:
+def test_hdf5_that_has_no_such_dataset_is_refused(tmp_path, read, hdf5_job):
     path = tmp_path / "run"
     with h5py.File(path, "w") as file:
         file.create_group("shaft x")
@@ -160,9 +143,7 @@ def test_hdf5_that_has_no_such_dataset_is_refused(
     assert "dataset 'shaft x/y' does not exist" in says
 
 
-def test_a_file_without_times_of_its_own_says_what_to_name(
-    tmp_path: Path, read: Read, hdf5_job: ImportJob
-) -> None:
+def test_a_file_without_times_of_its_own_says_what_to_name(tmp_path, read, hdf5_job):
     own_times = replace(hdf5_job, time=TimeAxis("file", 0))
     says = "column 'shaft x' has no times in the file; name a time column or a start"
     write_hdf5(tmp_path / "run.h5")
@@ -173,9 +154,7 @@ def test_a_file_without_times_of_its_own_says_what_to_name(
     assert says in refusal(read, tmp_path / "run.tdms", replace(own_times, format="tdms"))
 
 
-def test_tdms_that_is_unfinished_or_no_tdms_is_refused(
-    tmp_path: Path, read: Read, job: ImportJob
-) -> None:
+def test_tdms_that_is_unfinished_or_no_tdms_is_refused(tmp_path, read, job):
     tdms_job, path = replace(job, format="tdms", slow=()), tmp_path / "run"
     path.write_bytes(b"TDSm" + struct.pack("<IIQQ", 0x2, 4713, 2**64 - 1, 0))
     assert "the file is unfinished" in refusal(read, path, tdms_job)
@@ -189,9 +168,7 @@ def test_tdms_that_is_unfinished_or_no_tdms_is_refused(
     assert "'shaft x' does not exist; the file has a/shaft y" in refusal(read, path, tdms_job)
 
 
-def test_hdf5_values_in_other_files_are_not_read(
-    tmp_path: Path, read: Read, hdf5_job: ImportJob
-) -> None:
+def test_hdf5_values_in_other_files_are_not_read(tmp_path, read, hdf5_job):
     secret = tmp_path / "secret"
     secret.write_bytes(bytes(800))
     with h5py.File(tmp_path / "external", "w") as file:
@@ -209,9 +186,7 @@ def test_hdf5_values_in_other_files_are_not_read(
 
 
 @pytest.mark.parametrize("chunks", [None, (30,)])
-def test_hdf5_values_that_nobody_has_written_are_not_zeros(
-    tmp_path: Path, read: Read, hdf5_job: ImportJob, chunks: tuple[int, ...] | None
-) -> None:
+def test_hdf5_values_that_nobody_has_written_are_not_zeros(tmp_path, read, hdf5_job, chunks):
     with h5py.File(tmp_path / "run", "w") as file:
         file["time"] = file["shaft x"] = np.arange(100) / 600.0
         begun = file.create_dataset("shaft y", (100,), "f4", chunks=chunks)
@@ -232,15 +207,13 @@ def test_hdf5_values_that_nobody_has_written_are_not_zeros(
     ids=["matrix", "text", "complex", "empty"],
 )
 def test_hdf5_values_that_are_no_numbers_in_a_row_are_refused(
-    tmp_path: Path, read: Read, hdf5_job: ImportJob, values: np.ndarray, words: str
-) -> None:
+    tmp_path, read, hdf5_job, values, words
+):
     write_hdf5(tmp_path / "run", shaft_y=values)
     assert words in refusal(read, tmp_path / "run", hdf5_job)
 
 
-def test_hdf5_of_declared_and_packed_gigabytes_is_refused_in_little_memory(
-    tmp_path: Path, hdf5_job: ImportJob
-) -> None:
+def test_hdf5_of_declared_and_packed_gigabytes_is_refused_in_little_memory(tmp_path, hdf5_job):
     packed = zlib.compress(bytes(2**20), 1)
     with h5py.File(tmp_path / "declared", "w") as file:
         for name in ("time", "shaft x", "shaft y"):
@@ -300,9 +273,7 @@ def changed(objects: bytes, number: int, at: int, value: int) -> bytes:
     return objects[:place] + struct.pack("<H", value) + objects[place + 2 :]
 
 
-def test_objects_may_go_on_in_the_next_container(
-    tmp_path: Path, blf_job: ImportJob, objects: bytes
-) -> None:
+def test_objects_may_go_on_in_the_next_container(tmp_path, blf_job, objects):
     packed = zlib.compress(objects[1001:])
     both = container(objects[:1001]) + container(packed, method=2, n_bytes=len(objects) - 1001)
     write(tmp_path / "run", both)
@@ -326,29 +297,19 @@ def test_objects_may_go_on_in_the_next_container(
     ],
     ids=range(11),
 )
-def test_a_log_of_which_anything_is_missing_is_refused(
-    tmp_path: Path,
-    blf_job: ImportJob,
-    objects: bytes,
-    content: Callable[[bytes], bytes],
-    words: str,
-) -> None:
+def test_a_log_of_which_anything_is_missing_is_refused(tmp_path, blf_job, objects, content, words):
     write(tmp_path / "run", content(objects))
     with pytest.raises(ConfigError, match=words):
         n_frames(tmp_path / "run", blf_job)
 
 
-def test_a_log_that_was_not_finished_is_refused(
-    tmp_path: Path, blf_job: ImportJob, objects: bytes
-) -> None:
+def test_a_log_that_was_not_finished_is_refused(tmp_path, blf_job, objects):
     write(tmp_path / "run", container(objects), n_objects=0, n_bytes=HEADER)
     with pytest.raises(ConfigError, match=r"144 according to its header; it is truncated"):
         n_frames(tmp_path / "run", blf_job)
 
 
-def test_a_container_that_unpacks_to_gigabytes_is_refused_in_little_memory(
-    tmp_path: Path, blf_job: ImportJob
-) -> None:
+def test_a_container_that_unpacks_to_gigabytes_is_refused_in_little_memory(tmp_path, blf_job):
     packer = zlib.compressobj(1)
     block = packer.compress(bytes(2**24)) + packer.flush(zlib.Z_FULL_FLUSH)
     packed = block + 255 * block[2:]  # without the head of the stream

@@ -93,9 +93,7 @@ async def test_a_device_that_nobody_reads_stays_bounded(device):
 
 
 @pytest.mark.parametrize("patient", [True, False], ids=["patient", "on demand"])
-async def test_a_daq_that_waits_for_its_reader_loses_nothing_and_ends(
-    counting_feed, stepped_clock, patient
-):
+async def test_a_daq_that_waits_for_its_reader_loses_nothing(counting_feed, stepped_clock, patient):
     device = CanDevice(counting_feed(stop_index=15_000), SHAPE)
     how = {"clock": stepped_clock, "patient": True} if patient else {"on_demand": True}
     async with SlcanTcpServer(device, **how) as server:

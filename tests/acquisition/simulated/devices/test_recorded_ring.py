@@ -98,9 +98,7 @@ def assert_recorded(blocks: list[SampleBlock], found: dict[tuple[int, int], int]
 
 
 @pytest.mark.parametrize("kind", [ModbusTcpServer, ModbusRtuServer, "patient"])
-async def test_a_replay_loses_nothing_however_small_the_ring_and_fast_the_clock(
-    kind, counts_calibration
-):
+async def test_a_replay_loses_nothing_with_a_small_ring_and_a_fast_clock(kind, counts_calibration):
     """Gaps are as long behind the wire, and epochs are those of the recording."""
     device = RingDevice(PiecewiseFeed(*PIECES), settings=SETTINGS)
     device.patient = kind == "patient"
@@ -158,7 +156,7 @@ def read(device: RingDevice, *sequences: int) -> None:
     device.produce(1000)
 
 
-def test_time_stands_still_when_the_ring_is_full_of_what_nobody_has_read() -> None:
+def test_time_stands_still_when_the_ring_is_full_of_what_nobody_has_read():
     pieces = ((7, 0, 200), (7, 350, 600), (8, 0, 600))
     device = RingDevice(PiecewiseFeed(*pieces), settings=RingDeviceSettings(n_slots=8))
     device.patient = True
@@ -236,7 +234,7 @@ LOOK = ()
 )
 def test_a_slot_is_read_when_a_reader_that_was_told_of_it_cannot_come_back_for_it(
     written_read_or_looked, n_unread, waiting
-) -> None:
+):
     """Sequences in tuples are written, places in lists are read."""
     watch = ReadingWatch(LAYOUT)
     for done in written_read_or_looked:

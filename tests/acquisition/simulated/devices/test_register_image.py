@@ -47,9 +47,7 @@ class Device:
     st.sampled_from([1.0, 0.01, -0.5]),
     st.sampled_from([0.0, -40.0]),
 )
-def test_a_value_comes_back_within_the_resolution_of_its_registers(
-    type_, order, number, scale, offset
-) -> None:
+def test_a_value_comes_back_within_its_registers_resolution(type_, order, number, scale, offset):
     value = MapValue(
         id="v",
         cell=Cell(address=3, type=type_, byte_order=order),
@@ -71,7 +69,7 @@ def test_a_value_comes_back_within_the_resolution_of_its_registers(
 
 
 @pytest.mark.parametrize("number", [-250.0, 0.0, 0.3, 1999.5])
-def test_a_scale_register_is_as_large_as_the_value_needs(number: float) -> None:
+def test_a_scale_register_is_as_large_as_the_value_needs(number):
     value = MapValue(
         id="v",
         cell=Cell(address=609, type=NumberType.INT16),
@@ -89,7 +87,7 @@ def test_a_scale_register_is_as_large_as_the_value_needs(number: float) -> None:
 @pytest.mark.parametrize(
     ("number", "state"), [(20.0, ValueState.OK), (900.0, ValueState.CLIPPED), (-900, 1)]
 )
-def test_a_range_is_told_by_the_device_and_clips(number: float, state: ValueState) -> None:
+def test_a_range_is_told_by_the_device_and_clips(number, state):
     ends = [Cell(address=a, function=4, type=NumberType.FLOAT32) for a in (10, 12)]
     value = MapValue(
         id="v",
@@ -125,7 +123,7 @@ BIT = {"type": NumberType.BIT}
     + [(flag, BIT | at) for flag in ONE_BIT for at in ({"bit": 3}, {"function": 2})],
 )
 @pytest.mark.parametrize("good", [True, False])
-def test_a_flag_says_what_it_is_told_to_say(flag, cell, good: bool) -> None:
+def test_a_flag_says_what_it_is_told_to_say(flag, cell, good):
     check = FlagCheck(cell=Cell(address=1, **cell), **flag)
     device = Device(MapValue(id="v", cell=Cell(address=0), flags=(check,)))
     device.image.put_flag(check, not good)
@@ -144,7 +142,7 @@ def test_a_flag_says_what_it_is_told_to_say(flag, cell, good: bool) -> None:
         ("uint32", {"invalid_above": 1e6}),
     ],
 )
-def test_what_a_device_does_not_know_is_no_value(type_: str, settings) -> None:
+def test_what_a_device_does_not_know_is_no_value(type_, settings):
     value = MapValue(id="v", cell=Cell(address=0, type=NumberType(type_)), **settings)
     device = Device(value)
     device.image.put_value(value, math.nan)
@@ -152,7 +150,7 @@ def test_what_a_device_does_not_know_is_no_value(type_: str, settings) -> None:
     assert device.read().states[0] is ValueState.INVALID
 
 
-def test_bits_are_written_where_they_are_read_and_leave_the_others_of_a_register() -> None:
+def test_bits_are_written_where_they_are_read_and_leave_the_others_of_a_register():
     cells = [
         Cell(address=3, type=NumberType.BIT, bit=5),
         Cell(address=3, type=NumberType.BIT, bit=13),
@@ -180,7 +178,7 @@ def test_bits_are_written_where_they_are_read_and_leave_the_others_of_a_register
         CalendarTime(first=Cell(address=1), utc_offset_s=3600.0),
     ],
 )
-def test_a_time_comes_back(time) -> None:
+def test_a_time_comes_back(time):
     device = Device(MapValue(id="v", cell=Cell(address=0)), time=time)
     device.image.put_time(1_800_000_123_250_000_000)
 
@@ -189,7 +187,7 @@ def test_a_time_comes_back(time) -> None:
     assert found // 10**9 == 1_800_000_123
 
 
-def test_a_register_that_the_map_does_not_name_does_not_exist() -> None:
+def test_a_register_that_the_map_does_not_name_does_not_exist():
     registers = RegisterMap(
         values=(MapValue(id="v", cell=Cell(address=0)),), together=(Together(address=4, count=3),)
     )

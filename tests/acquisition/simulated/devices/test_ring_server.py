@@ -244,9 +244,7 @@ async def test_a_wrong_stamp_is_flagged_and_a_reset_begins_a_new_epoch(server, d
 
 
 @pytest.mark.parametrize("fault", ["shift_map", "word_order"])
-async def test_a_reply_from_a_wrong_map_is_read_again_and_never_believed(
-    fault, server, device, source
-):
+async def test_a_reply_from_a_wrong_map_is_read_again_not_believed(fault, server, device, source):
     async with source.connect() as stream:
         await anext(stream)
         for _ in range(4):

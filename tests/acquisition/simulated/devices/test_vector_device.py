@@ -74,7 +74,7 @@ def rack(calibration) -> VectorDevice:
     return device
 
 
-def test_a_rack_states_amplitudes_phases_and_gaps_in_its_own_conventions(rack) -> None:
+def test_a_rack_states_amplitudes_phases_and_gaps_in_its_own_conventions(rack):
     decoder = MapDecoder(load_map_file(RACK).register_map())
     content = b"".join(
         rack.image.read_registers(r.function, r.address, r.count) for r in decoder.plan.spans
@@ -89,9 +89,7 @@ def test_a_rack_states_amplitudes_phases_and_gaps_in_its_own_conventions(rack) -
     assert found["speed"] == pytest.approx(92.3, abs=0.05)
 
 
-async def test_equation_5_comes_out_of_a_rack_over_the_wire(
-    rack, calibration, stepped_clock
-) -> None:
+async def test_equation_5_comes_out_of_a_rack_over_the_wire(rack, calibration, stepped_clock):
     rows, rate_hz = rows_of(RACK), 1.0
     rack.on_demand = True
     channels = tuple(

@@ -19,7 +19,7 @@ Life = Callable[..., UnitLife]
 SEEDS = (0, *fast_and_long(1, 2))
 
 
-def test_the_same_seed_lives_the_same_life_and_another_one_another(two_years: Life) -> None:
+def test_the_same_seed_lives_the_same_life_and_another_one_another(two_years):
     life = two_years(1)
     again = live(1, int(life.operation.time_ns[0]) // 86_400_000_000_000 * 86_400_000_000_000, 2.0)
     other = two_years(2)
@@ -32,9 +32,7 @@ def test_the_same_seed_lives_the_same_life_and_another_one_another(two_years: Li
     assert other.operation.time_ns.size != life.operation.time_ns.size
 
 
-def test_damage_changes_nothing_before_it_and_nothing_in_other_bearings(
-    two_years: Life, day_ns: Callable[[float], int]
-) -> None:
+def test_damage_changes_nothing_before_it_and_nothing_in_other_bearings(two_years, day_ns):
     damage = Damage(DamageKind.STIFFNESS_LOSS, "LJB", day_ns(400), 0.1)
     healthy, ill = two_years(1), two_years(1, damage)
 
@@ -49,7 +47,7 @@ def test_damage_changes_nothing_before_it_and_nothing_in_other_bearings(
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_healthy_machine_meets_a_four_fold_range_of_stiffness(two_years: Life, seed: int) -> None:
+def test_a_healthy_machine_meets_a_four_fold_range_of_stiffness(two_years, seed):
     # "may increase significantly, in four times or more" (Brito et al., section 4): the widest
     # direction of the three bearings, but for one reading in a hundred at either end
     for truth in two_years(seed).truth.values():
@@ -58,7 +56,7 @@ def test_a_healthy_machine_meets_a_four_fold_range_of_stiffness(two_years: Life,
 
 
 @pytest.mark.parametrize("n_lives", fast_and_long(3, 6))
-def test_healthy_films_have_no_trend(two_years: Life, n_lives: int) -> None:
+def test_healthy_films_have_no_trend(two_years, n_lives):
     # condition wanders for weeks: the slope of 18 films is zero within its own scatter
     slopes = [
         np.polyfit(life.operation.time_ns / 3.15576e16, ln_k, 1)[0]
@@ -71,7 +69,7 @@ def test_healthy_films_have_no_trend(two_years: Life, n_lives: int) -> None:
     assert abs(np.mean(lives)) < 3.0 * np.std(lives) / np.sqrt(n_lives) + 0.02
 
 
-def test_in_the_same_condition_a_healthy_film_is_the_same_in_both_years(two_years: Life) -> None:
+def test_in_the_same_condition_a_healthy_film_is_the_same_in_both_years(two_years):
     for name, truth in two_years(0).truth.items():
         eccentricity, oil_c = truth.eccentricity_ratio, truth.oil_temperature_c
         alike = (np.abs(eccentricity - 0.35) < 0.02) & (np.abs(oil_c - np.median(oil_c)) < 2.0)
@@ -83,7 +81,7 @@ def test_in_the_same_condition_a_healthy_film_is_the_same_in_both_years(two_year
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_oil_stays_where_table_1_has_it_once_the_unit_is_warm(two_years: Life, seed: int) -> None:
+def test_oil_stays_where_table_1_has_it_once_the_unit_is_warm(two_years, seed):
     life = two_years(seed)
     time_ns = life.operation.time_ns
     starts = np.flatnonzero(np.diff(time_ns, prepend=0) > 3_600_000_000_000)
@@ -98,7 +96,7 @@ def test_oil_stays_where_table_1_has_it_once_the_unit_is_warm(two_years: Life, s
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_units_run_most_of_the_time_and_start_some_times_a_week(two_years: Life, seed: int) -> None:
+def test_units_run_most_of_the_time_and_start_some_times_a_week(two_years, seed):
     operation = two_years(seed).operation
     starts = np.flatnonzero(np.diff(operation.time_ns) > 3_600_000_000_000) + 1
 
@@ -110,7 +108,7 @@ def test_units_run_most_of_the_time_and_start_some_times_a_week(two_years: Life,
     assert operation.power_mw.max() < 715.0
 
 
-def test_readings_scatter_by_what_they_say_and_by_what_is_alike_for_hours(two_years: Life) -> None:
+def test_readings_scatter_by_what_they_say_and_by_what_is_alike_for_hours(two_years):
     life = two_years(0)
     for name, readings in life.readings.items():
         error = readings.ln_k - life.truth[name].ln_k
@@ -125,7 +123,7 @@ def test_readings_scatter_by_what_they_say_and_by_what_is_alike_for_hours(two_ye
     assert np.all(readings.u_eccentricity < 0.02)
 
 
-def test_little_load_means_little_excitation_and_more_uncertainty(two_years: Life) -> None:
+def test_little_load_means_little_excitation_and_more_uncertainty(two_years):
     life = two_years(0)
     readings, load = life.readings["UJB"], life.operation.load
     no_load, full = load < 0.05, load > 0.9
@@ -137,14 +135,13 @@ def test_little_load_means_little_excitation_and_more_uncertainty(two_years: Lif
     assert silent[no_load].mean() > 10.0 * silent[full].mean()
 
 
-def test_a_life_of_no_day_and_damage_to_no_bearing_are_refused() -> None:
+def test_a_life_of_no_day_and_damage_to_no_bearing_are_refused():
     with pytest.raises(ValueError, match="years must be at least one day, got 0"):
         live(1, 0, 0)
     with pytest.raises(ValueError, match="unknown bearing 'GGB'; known: LJB, TJB, UJB"):
         live(1, 0, 0.1, [Damage(DamageKind.STIFFNESS_LOSS, "GGB", 0, 0.1)])
 
 
-Day = Callable[[float], int]
 SEED = 1
 
 
@@ -224,9 +221,7 @@ SIGNS = {
         *(pytest.param(*loss_of_film(loss), marks=pytest.mark.long) for loss in (0.05, 0.1)),
     ],
 )
-def test_each_damage_has_its_signs(
-    two_years: Life, day_ns: Day, damage: Damage, expected: dict[str, Any]
-) -> None:
+def test_each_damage_has_its_signs(two_years, day_ns, damage, expected):
     over_ns = day_ns(damage.onset_ns + damage.ramp_days + 1)
     found = seen(two_years, replace(damage, onset_ns=day_ns(damage.onset_ns)), over_ns)
 
@@ -238,8 +233,8 @@ def test_each_damage_has_its_signs(
 
 
 def test_clearance_grown_over_90_days_takes_its_tenth_in_the_end_and_half_of_it_half_way(
-    two_years: Life, day_ns: Day
-) -> None:
+    two_years, day_ns
+):
     damage = Damage(DamageKind.CLEARANCE_GROWTH, "LJB", day_ns(400), 0.1, ramp_days=90.0)
     life = two_years(SEED, damage)
     loss, time_ns = life.truth["LJB"].film_loss, life.operation.time_ns
@@ -252,7 +247,7 @@ def test_clearance_grown_over_90_days_takes_its_tenth_in_the_end_and_half_of_it_
     np.testing.assert_allclose(found["eccentricity"], 1.036, atol=0.003)
 
 
-def test_a_worn_pivot_softens_the_film_towards_its_pad(two_years: Life, day_ns: Day) -> None:
+def test_a_worn_pivot_softens_the_film_towards_its_pad(two_years, day_ns):
     damage = Damage(DamageKind.PIVOT_WEAR, "UJB", day_ns(400), 0.3, ramp_days=30.0)
     truth = two_years(SEED, damage).truth["UJB"]
     x_um, y_um = np.median(truth.centre_um, axis=1)
@@ -265,9 +260,7 @@ def test_a_worn_pivot_softens_the_film_towards_its_pad(two_years: Life, day_ns: 
 
 
 @pytest.mark.parametrize("stiffer", [True, False])
-def test_condition_alone_changes_stiffness_four_times(
-    two_years: Life, day_ns: Day, stiffer: bool
-) -> None:
+def test_condition_alone_changes_stiffness_four_times(two_years, day_ns, stiffer):
     life = two_years(SEED, changes=four_fold(day_ns(560), stiffer=stiffer))
     time_ns, usual = life.operation.time_ns, two_years(SEED)
     before = (time_ns > day_ns(532)) & (time_ns < day_ns(560))
@@ -283,7 +276,7 @@ def test_condition_alone_changes_stiffness_four_times(
         assert life.readings[name].eccentricity_ratio[before | after].max() < healthy_most + 0.05
 
 
-def test_a_failing_cooler_leads_out_of_everything_seen_before(two_years: Life, day_ns: Day) -> None:
+def test_a_failing_cooler_leads_out_of_everything_seen_before(two_years, day_ns):
     life = two_years(SEED, changes=(cooling_failure(day_ns(420)),))
     time_ns = life.operation.time_ns
     hot = (time_ns > day_ns(420.5)) & (time_ns < day_ns(425))
@@ -304,9 +297,7 @@ def test_a_failing_cooler_leads_out_of_everything_seen_before(two_years: Life, d
         ({"directions": ("z",)}, "directions must be x, y or both, got z"),
     ],
 )
-def test_damage_that_makes_no_sense_is_refused_with_key_and_value(
-    changed: dict[str, object], message: str
-) -> None:
+def test_damage_that_makes_no_sense_is_refused_with_key_and_value(changed, message):
     given: dict[str, object] = {"size": 0.1} | changed
     with pytest.raises(ValueError, match=message):
         Damage(DamageKind.STIFFNESS_LOSS, "UJB", 0, **given)  # type: ignore[arg-type]

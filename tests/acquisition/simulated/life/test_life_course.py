@@ -36,7 +36,7 @@ def running_ns(inputs: LifeInputs) -> int:
     return int(inputs.operation.time_ns[rows[rows.size // 2]])
 
 
-def test_at_a_reading_the_course_is_what_the_reading_was_made_of(inputs: LifeInputs) -> None:
+def test_at_a_reading_the_course_is_what_the_reading_was_made_of(inputs):
     now_ns = running_ns(inputs)
     damage = (Damage(DamageKind.PIVOT_WEAR, "LJB", now_ns - 10 * STEP_NS, 0.1),)
     found = LifeCourse(inputs, damage, UNIT, now_ns).at(0.0)
@@ -57,7 +57,7 @@ def test_at_a_reading_the_course_is_what_the_reading_was_made_of(inputs: LifeInp
         )  # its median has the damage in it
 
 
-def test_between_readings_everything_runs_in_straight_lines(inputs: LifeInputs) -> None:
+def test_between_readings_everything_runs_in_straight_lines(inputs):
     course = LifeCourse(inputs, (), UNIT, running_ns(inputs))
     first, middle, last = (course.at(s).bearings["UJB"] for s in (0.0, 300.0, 600.0))
     for name in ("centre_x_um", "oil_temperature_c", "gap_growth_um"):
@@ -65,7 +65,7 @@ def test_between_readings_everything_runs_in_straight_lines(inputs: LifeInputs) 
         assert getattr(middle, name) == pytest.approx(mean, abs=1e-9), name
 
 
-def test_damage_sets_in_to_the_second_and_grows_as_told(inputs: LifeInputs) -> None:
+def test_damage_sets_in_to_the_second_and_grows_as_told(inputs):
     now_ns = running_ns(inputs)
     loss = Damage(DamageKind.STIFFNESS_LOSS, "UJB", now_ns + 100 * NS_PER_S, 0.2, 60.0 / 86_400.0)
     healthy, damaged = (LifeCourse(inputs, d, UNIT, now_ns) for d in ((), (loss,)))
@@ -74,7 +74,7 @@ def test_damage_sets_in_to_the_second_and_grows_as_told(inputs: LifeInputs) -> N
         assert after.k_yy_n_per_m / before.k_yy_n_per_m == pytest.approx(left)
 
 
-def test_a_unit_that_stands_still_is_sampled_too(inputs: LifeInputs) -> None:
+def test_a_unit_that_stands_still_is_sampled_too(inputs):
     standing = np.flatnonzero(~inputs.operation.is_turning)
     now_ns = int(inputs.operation.time_ns[standing[5]])
     unit = SimulatedUnit(UNIT, CALIBRATION, LifeCourse(inputs, (), UNIT, now_ns), 1, now_ns)
@@ -87,9 +87,7 @@ def test_a_unit_that_stands_still_is_sampled_too(inputs: LifeInputs) -> None:
     assert np.std(gap_um) == pytest.approx(1.2, rel=0.1)
 
 
-def test_a_unit_that_is_kept_running_never_stops_and_has_the_same_past(
-    inputs: LifeInputs,
-) -> None:
+def test_a_unit_that_is_kept_running_never_stops_and_has_the_same_past(inputs):
     from_ns = START_NS + 60 * 144 * STEP_NS
     held = draw_inputs(SEED, START_NS, YEARS, held=HeldLoad(from_ns, 0.9))
     later = inputs.operation.time_ns >= from_ns
@@ -102,7 +100,7 @@ def test_a_unit_that_is_kept_running_never_stops_and_has_the_same_past(
         assert np.array_equal(one.position_um[:, ~later], other.position_um[:, ~later])
 
 
-def test_what_cannot_be_is_refused(inputs: LifeInputs) -> None:
+def test_what_cannot_be_is_refused(inputs):
     with pytest.raises(ValueError, match=r"load = 1\.2 must be above 0"):
         HeldLoad(0, 1.2)
     with pytest.raises(ValueError, match="outside the life of unit 4"):
@@ -119,14 +117,14 @@ def test_what_cannot_be_is_refused(inputs: LifeInputs) -> None:
         history_until(PLAN, NOW_NS, years=2.0)
 
 
-def test_readings_reach_until_now_and_a_year_back() -> None:
+def test_readings_reach_until_now_and_a_year_back():
     life = history_until(PLAN, NOW_NS)
     for history in life.readings.values():
         assert NOW_NS - STEP_NS <= history.time_ns[-1] < NOW_NS
         assert 364.0 < (history.time_ns[-1] - history.time_ns[0]) / (86_400 * NS_PER_S) <= 365.25
 
 
-def test_a_unit_watched_again_tomorrow_has_the_same_past() -> None:
+def test_a_unit_watched_again_tomorrow_has_the_same_past():
     today, tomorrow = (history_until(LifePlan(2), ns) for ns in (NOW_NS, NOW_NS + 144 * STEP_NS))
     for name, history in today.readings.items():
         shared = np.isin(tomorrow.readings[name].time_ns, history.time_ns)

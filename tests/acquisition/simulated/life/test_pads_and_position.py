@@ -28,7 +28,7 @@ from core.machine.channel import Measurand
 Life = Callable[..., UnitLife]
 
 
-def test_the_field_of_the_generator_widens_a_bearing_one_way_and_narrows_it_the_other() -> None:
+def test_the_field_of_the_generator_widens_a_bearing_one_way_and_narrows_it_the_other():
     usual, loaded = (
         film_course(
             LIFE_UJB,
@@ -45,9 +45,7 @@ def test_the_field_of_the_generator_widens_a_bearing_one_way_and_narrows_it_the_
     assert loaded.film.k_yy_n_per_m[0] > 1.02 * usual.film.k_yy_n_per_m[0]
 
 
-def test_the_shaft_moves_along_a_line_and_a_hundredth_of_the_clearance_across(
-    two_years: Life,
-) -> None:
+def test_the_shaft_moves_along_a_line_and_a_hundredth_of_the_clearance_across(two_years):
     spread_um = np.sqrt(
         [np.linalg.eigvalsh(np.cov(two_years(n).truth["UJB"].centre_um)) for n in range(3)]
     )
@@ -56,9 +54,7 @@ def test_the_shaft_moves_along_a_line_and_a_hundredth_of_the_clearance_across(
     assert 4.0 < np.mean(spread_um[:, 0]) < 6.0
 
 
-def test_warm_clearance_wanders_by_micrometres_for_no_reason_that_is_measured(
-    two_years: Life,
-) -> None:
+def test_warm_clearance_wanders_by_micrometres_for_no_reason_that_is_measured(two_years):
     for seed in range(3):
         clearance_um = two_years(seed).truth["UJB"].clearance_um
         warm_um = clearance_um[clearance_um < np.median(clearance_um)]
@@ -66,7 +62,7 @@ def test_warm_clearance_wanders_by_micrometres_for_no_reason_that_is_measured(
         assert 0.3 < np.std(warm_um) < 1.2
 
 
-def test_eliminated_brackets_change_no_amplitude_and_no_phase() -> None:
+def test_eliminated_brackets_change_no_amplitude_and_no_phase():
     random = np.random.default_rng(3)
     rotor, n = RotorParameters(), 5
     films = {
@@ -88,7 +84,7 @@ def test_eliminated_brackets_change_no_amplitude_and_no_phase() -> None:
             np.testing.assert_allclose(found[name][:, row], 1e6 * phasors, rtol=1e-9)
 
 
-def test_wander_has_its_size_from_the_beginning_and_forgets_in_its_time() -> None:
+def test_wander_has_its_size_from_the_beginning_and_forgets_in_its_time():
     first = [wander(np.random.default_rng(i), 2, 1.0, 1e6, 1.0)[0] for i in range(2000)]
     assert np.std(first) == pytest.approx(1.0, rel=0.1)
     steps = wander(np.random.default_rng(1), 400_000, 600.0, 6000.0, 2.0)
@@ -98,7 +94,7 @@ def test_wander_has_its_size_from_the_beginning_and_forgets_in_its_time() -> Non
     assert after_ten == pytest.approx(np.exp(-1.0), abs=0.03)
 
 
-def test_a_lag_comes_63_percent_of_the_way_in_its_time_and_slower_when_it_is_slower() -> None:
+def test_a_lag_comes_63_percent_of_the_way_in_its_time_and_slower_when_it_is_slower():
     time_s = np.repeat([1000.0, 10_000.0], 10)
     followed = lagged(np.repeat([1.0, 0.0], 10), time_s, 100.0, 0.0)
 
@@ -106,7 +102,6 @@ def test_a_lag_comes_63_percent_of_the_way_in_its_time_and_slower_when_it_is_slo
     assert followed[19] == pytest.approx(followed[9] * np.exp(-0.1))
 
 
-Day = Callable[[float], int]
 MACHINE = machine(Measurand.ACCELERATION_M_S2)
 
 
@@ -116,7 +111,7 @@ def running_ns(life: UnitLife, from_ns: int) -> int:
     return int(operation.time_ns[(operation.time_ns >= from_ns) & (operation.load > 0.5)][0])
 
 
-def test_a_scenario_holds_what_was_so_at_that_moment(two_years: Life, day_ns: Day) -> None:
+def test_a_scenario_holds_what_was_so_at_that_moment(two_years, day_ns):
     damage = (
         Damage(DamageKind.BRACKET_LOOSENING, "LJB", day_ns(100), 0.2),
         Damage(DamageKind.ACCELEROMETER_GAIN, "UJB", day_ns(100), -0.2, directions=("y",)),
@@ -140,7 +135,7 @@ def test_a_scenario_holds_what_was_so_at_that_moment(two_years: Life, day_ns: Da
     assert scenario.channels["UJB_ux"].gain == chain.probe_gain[0]
 
 
-def test_the_vortex_is_there_at_part_load_only(two_years: Life) -> None:
+def test_the_vortex_is_there_at_part_load_only(two_years):
     life = two_years(0)
     loads, times = life.operation.load, life.operation.time_ns
     part, full = (
@@ -153,7 +148,7 @@ def test_the_vortex_is_there_at_part_load_only(two_years: Life) -> None:
     assert part.hydraulic.rms_n > 0.0
 
 
-def test_there_is_no_scenario_before_birth_nor_during_a_run_up(two_years: Life) -> None:
+def test_there_is_no_scenario_before_birth_nor_during_a_run_up(two_years):
     life = two_years(0)
     with pytest.raises(ValueError, match="begins after 5 ns"):
         scenario_at(life, 5, MACHINE)

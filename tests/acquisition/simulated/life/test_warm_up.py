@@ -66,7 +66,7 @@ def at(hour: float) -> int:
         *(("LJB", *row) for row in [(0.0, 0.31), (6.5, 0.37), (7.0, 0.37)]),
     ],
 )
-def test_bearings_stiffen_as_in_tables_8_and_9(bearing: str, hour: float, k_eff: float) -> None:
+def test_bearings_stiffen_as_in_tables_8_and_9(bearing, hour, k_eff):
     # two figures are printed; 5 % holds them all
     # 0.26 GN/m at 5.5 h, between 0.31 and 0.37, is left out: bearing motion was 5.6 µm there
     assert second_day()[0][bearing][0, at(hour)] == pytest.approx(k_eff, rel=0.05)
@@ -84,8 +84,8 @@ def test_bearings_stiffen_as_in_tables_8_and_9(bearing: str, hour: float, k_eff:
     ],
 )
 def test_motion_falls_as_measured_and_what_was_not_fitted_comes_out_within_a_third(
-    bearing: str, row: int, cold_um_pk: float, warm_um_pk: float, within: float
-) -> None:
+    bearing, row, cold_um_pk, warm_um_pk, within
+):
     # shaft Y and bearing X of both bearings, from one unbalance and the paper's rotor
     amplitude = second_day()[2][bearing][row]
 
@@ -93,7 +93,7 @@ def test_motion_falls_as_measured_and_what_was_not_fitted_comes_out_within_a_thi
     assert amplitude[at(7.0)] == pytest.approx(warm_um_pk, rel=within)
 
 
-def test_stiffness_first_rests_then_rises_as_on_all_three_days() -> None:
+def test_stiffness_first_rests_then_rises_as_on_all_three_days():
     # day 1: 0.44, after half an hour 0.42; day 3: 0.18, after 1 h 0.19, after 6.5 h 0.26
     k = second_day()[0]["UJB"][0] / second_day()[0]["UJB"][0, 0]
 
@@ -105,9 +105,7 @@ def test_stiffness_first_rests_then_rises_as_on_all_three_days() -> None:
 @pytest.mark.parametrize(
     ("bearing", "shrinks_um"), [("UJB", (119.0, 179.0)), ("LJB", (161.0, 278.0))]
 )
-def test_clearance_closes_about_as_much_as_the_gaps_did(
-    bearing: str, shrinks_um: tuple[float, float]
-) -> None:
+def test_clearance_closes_about_as_much_as_the_gaps_did(bearing, shrinks_um):
     # gaps of both probes on days 2 and 3 after 5.5 to 7 h; they hold shaft motion as well
     clearance_um = second_day()[1][bearing]
 

@@ -1,6 +1,5 @@
 """What the transducers of a simulated unit, and their faults, make of the motion of the machine."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +9,11 @@ from acquisition.errors import ConfigError
 from acquisition.simulated.plant.faults import Fault, FaultInjector, FaultKind
 from acquisition.simulated.plant.plant import SimulatedPlant
 from acquisition.simulated.plant.scenario import ChannelScenario, Scenario, TransducerNoise
-from acquisition.simulated.plant.unit import SimulatedUnit
 from core.arrays import CountArray, FloatArray
 from core.machine.channel import Channel, Measurand
 from core.machine.response import HighPass, Resonance
 from core.machine.unit import Unit
 
-BuildUnit = Callable[..., SimulatedUnit]
 UJB = 0
 TURN = 400
 """Samples of one turn at 90 r/min."""
@@ -55,9 +52,7 @@ def four_probes(machine: Unit) -> Unit:
     )
 
 
-def test_an_accelerometer_s_corner_takes_what_it_should_and_a_probe_s_resonance_no_gap(
-    machine: Unit, quiet: Scenario
-) -> None:
+def test_an_accelerometer_s_corner_takes_its_share_and_a_probe_s_resonance_no_gap(machine, quiet):
     corner, soft = HighPass(0.5, order=2), Resonance(60.0, 0.05)
     channels = {
         "UJB_vx": ChannelScenario(response=corner),
@@ -73,9 +68,7 @@ def test_an_accelerometer_s_corner_takes_what_it_should_and_a_probe_s_resonance_
     assert np.abs(difference).max() < 0.2
 
 
-def test_runout_passes_each_probe_in_turn_and_shakes_no_bearing(
-    four_probes: Unit, quiet: Scenario
-) -> None:
+def test_runout_passes_each_probe_in_turn_and_shakes_no_bearing(four_probes, quiet):
     rough = with_bearing(quiet, runout_um_pk=(10.0, 4.0j))
 
     runout = readings(four_probes, rough) - readings(four_probes, quiet)
@@ -89,9 +82,7 @@ def test_runout_passes_each_probe_in_turn_and_shakes_no_bearing(
     assert np.abs(runout[2:12]).max() == 0.0
 
 
-def test_a_bump_is_a_smaller_gap_and_a_shaft_that_seems_nearer(
-    machine: Unit, quiet: Scenario
-) -> None:
+def test_a_bump_is_a_smaller_gap_and_a_shaft_that_seems_nearer(machine, quiet):
     rough = with_bearing(quiet, runout_um_pk=(10.0,))
     bare = replace(
         machine, channels=(Channel("UJB_ux", Measurand.DISPLACEMENT_UM), *machine.channels[1:])
@@ -106,9 +97,7 @@ def test_a_bump_is_a_smaller_gap_and_a_shaft_that_seems_nearer(
     assert displacement == pytest.approx(-gap)
 
 
-def test_runout_of_one_probe_is_motion_along_its_axis_and_nobody_else_sees_it(
-    four_probes: Unit, quiet: Scenario
-) -> None:
+def test_runout_of_one_probe_is_motion_along_its_axis_and_nobody_else_sees_it(four_probes, quiet):
     own = {name: ChannelScenario(runout_um_pk=(3.0 - 4.0j,)) for name in ("UJB_uy", "UJB_x_far")}
 
     seen = readings(four_probes, replace(quiet, channels=own)) - readings(four_probes, quiet)
@@ -120,9 +109,7 @@ def test_runout_of_one_probe_is_motion_along_its_axis_and_nobody_else_sees_it(
     assert np.abs(seen[list(rows.values())]).max() == 0.0
 
 
-def test_a_probe_that_drifts_and_a_thermometer_that_errs_tell_what_is_not_there(
-    build_unit: BuildUnit, quiet: Scenario
-) -> None:
+def test_a_probe_that_drifts_and_a_thermometer_that_errs_tell_what_is_not_there(build_unit, quiet):
     wrong = with_bearing(quiet, position_error_um=(7.0, -3.0), oil_temperature_error_c=0.4)
     right, found = (build_unit(scenario) for scenario in (quiet, wrong))
     told, shown = right.advance(600), found.advance(600)
@@ -135,7 +122,7 @@ def test_a_probe_that_drifts_and_a_thermometer_that_errs_tell_what_is_not_there(
     assert found.truth() == right.truth()
 
 
-def test_a_gain_error_leaves_the_reference_gap_as_it_is(machine: Unit, quiet: Scenario) -> None:
+def test_a_gain_error_leaves_the_reference_gap_as_it_is(machine, quiet):
     wrong = {"UJB_ux": ChannelScenario(gain=1.05), "UJB_vy": ChannelScenario(gain=0.97)}
 
     right = readings(machine, quiet)
@@ -146,9 +133,7 @@ def test_a_gain_error_leaves_the_reference_gap_as_it_is(machine: Unit, quiet: Sc
     assert np.array_equal(found[1], right[1])
 
 
-def test_a_softer_bracket_than_the_monitor_is_told_moves_more(
-    machine: Unit, quiet: Scenario, build_unit: BuildUnit
-) -> None:
+def test_a_softer_bracket_than_the_monitor_is_told_moves_more(machine, quiet, build_unit):
     soft = with_bearing(quiet, bracket_stiffness_factor=0.9)
 
     right, found = readings(machine, quiet), readings(machine, soft)
@@ -160,9 +145,7 @@ def test_a_softer_bracket_than_the_monitor_is_told_moves_more(
     assert machine.bearings[UJB].bracket_stiffness_n_per_m == 1.18e9
 
 
-def test_growth_widens_all_gaps_alike_and_displacement_opposite_ones_against_each_other(
-    four_probes: Unit, quiet: Scenario
-) -> None:
+def test_growth_widens_all_gaps_alike_and_displacement_opposite_ones_inversely(four_probes, quiet):
     grown = with_bearing(quiet, gap_growth_um=70.0)
 
     mean = readings(four_probes, grown)[:, : 5 * TURN].mean(axis=1)
@@ -172,9 +155,7 @@ def test_growth_widens_all_gaps_alike_and_displacement_opposite_ones_against_eac
     assert mean[[12, 13]] == pytest.approx([1900.0 + 60.0 + 70.0, 1950.0 - 80.0 + 70.0], abs=0.01)
 
 
-def test_the_growth_of_the_gaps_wanders_and_moves_nothing_else(
-    build_unit: BuildUnit, full_load: Scenario
-) -> None:
+def test_the_growth_of_the_gaps_wanders_and_moves_nothing_else(build_unit, full_load):
     steady = replace(full_load, wander_time_s=60.0)
     wandering = with_bearing(steady, gap_growth_wander_um_rms=20.0)
     one, other = build_unit(wandering), build_unit(steady)
@@ -185,9 +166,7 @@ def test_the_growth_of_the_gaps_wanders_and_moves_nothing_else(
     assert one.truth().bearings["UJB"].centre_x_um == other.truth().bearings["UJB"].centre_x_um
 
 
-def test_the_speed_channel_follows_a_wandering_speed_exactly(
-    build_unit: BuildUnit, quiet: Scenario
-) -> None:
+def test_the_speed_channel_follows_a_wandering_speed_exactly(build_unit, quiet):
     unit = build_unit(replace(quiet, speed_wander=0.003, wander_time_s=60.0))
     blocks = [unit.advance(60) for _ in range(3000)]
     speed_rpm = np.array([block.side.slow[0, 0] for block in blocks])
@@ -205,7 +184,7 @@ def test_the_speed_channel_follows_a_wandering_speed_exactly(
     assert unit.truth().speed_rpm == unit.advance(1).side.slow[0, 0]
 
 
-def test_noise_of_an_accelerometer_passes_its_own_corner(machine: Unit, quiet: Scenario) -> None:
+def test_noise_of_an_accelerometer_passes_its_own_corner(machine, quiet):
     silent = replace(quiet, unbalance_grade_mm_s=0.0)
     noisy = replace(
         silent,
@@ -220,9 +199,7 @@ def test_noise_of_an_accelerometer_passes_its_own_corner(machine: Unit, quiet: S
     assert rms[0] < 1e-6
 
 
-def test_everything_at_once_does_not_depend_on_the_pieces_it_is_asked_for_in(
-    build_unit: BuildUnit, part_load: Scenario
-) -> None:
+def test_everything_at_once_does_not_depend_on_the_pieces_it_is_asked_for_in(build_unit, part_load):
     rough = with_bearing(
         part_load, runout_um_pk=(10.0, 3.0), gap_growth_um=30.0, gap_growth_wander_um_rms=5.0
     )
@@ -267,16 +244,14 @@ def spoiled(kind: FaultKind, start: int = START, pieces: int = 1) -> CountArray:
 
 
 @pytest.mark.parametrize("start", [0, START])
-def test_a_dead_channel_gives_nothing_and_a_stuck_one_its_last_value_but_for_one_count(
-    start: int,
-) -> None:
+def test_a_dead_channel_gives_nothing_and_a_stuck_one_its_last_value_but_for_one_count(start):
     assert not spoiled(FaultKind.DEAD, start)[start:].any()
     counts = spoiled(FaultKind.STUCK, start, pieces=10)
     last = counts[start - 1] if start else 1000
     assert set(counts[start:] - last) == {-1, 0, 1}
 
 
-def test_a_clipped_channel_loses_its_upper_half_and_a_loose_contact_hits_both_rails() -> None:
+def test_a_clipped_channel_loses_its_upper_half_and_a_loose_contact_hits_both_rails():
     clipped, loose = (spoiled(k)[START:] for k in (FaultKind.CLIPPED, FaultKind.RAIL_HITS))
     assert 0.2 < np.mean(clipped == 32767) < 0.8
     assert clipped.min() > 31_000
@@ -284,9 +259,7 @@ def test_a_clipped_channel_loses_its_upper_half_and_a_loose_contact_hits_both_ra
 
 
 @pytest.mark.parametrize("kind", FaultKind)
-def test_a_fault_begins_with_its_sample_in_its_channel_alone(
-    build_unit: BuildUnit, full_load: Scenario, kind: FaultKind
-) -> None:
+def test_a_fault_begins_with_its_sample_in_its_channel_alone(build_unit, full_load, kind):
     faulty = replace(full_load, channels={"UJB_ux": ChannelScenario(faults=(Fault(kind, START),))})
     healthy = build_unit(full_load).advance(9000).counts
     whole = build_unit(faulty).advance(9000).counts
@@ -296,18 +269,14 @@ def test_a_fault_begins_with_its_sample_in_its_channel_alone(
     assert not np.array_equal(whole[0, START:], healthy[0, START:])
 
 
-def test_swapped_cables_carry_each_other_s_signal(
-    build_unit: BuildUnit, full_load: Scenario
-) -> None:
+def test_swapped_cables_carry_each_other_s_signal(build_unit, full_load):
     right = build_unit(full_load).advance(3000).counts
     swapped = build_unit(replace(full_load, exchanged=(("UJB_ux", "UJB_uy"),))).advance(3000).counts
 
     assert np.array_equal(swapped[[1, 0, *range(2, 12)]], right)
 
 
-def test_faults_of_channels_that_are_not_there_are_refused(
-    build_unit: BuildUnit, full_load: Scenario
-) -> None:
+def test_faults_of_channels_that_are_not_there_are_refused(build_unit, full_load):
     with pytest.raises(ConfigError, match="has no channel UJB_uz"):
         build_unit(replace(full_load, channels={"UJB_uz": ChannelScenario()}))
     with pytest.raises(ConfigError, match=r"channels UJB_ux and UJB_uz must both be in unit"):

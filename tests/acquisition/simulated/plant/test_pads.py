@@ -65,12 +65,8 @@ ROSS = [
 
 @pytest.mark.parametrize(("bearing", "clearance_um", "eccentricity", "whirl", "theirs"), ROSS)
 def test_pads_have_the_films_of_an_independent_program(
-    bearing: str,
-    clearance_um: float,
-    eccentricity: float,
-    whirl: float,
-    theirs: tuple[float, ...],
-) -> None:
+    bearing, clearance_um, eccentricity, whirl, theirs
+):
     ours = coefficients(film(bearing, clearance_um, eccentricity), whirl)
 
     # Its mesh of 20 instead of 16 moves k by up to 1.5 %, so that of 16 is off by up to 4 %. Films
@@ -80,9 +76,7 @@ def test_pads_have_the_films_of_an_independent_program(
 
 
 @pytest.mark.parametrize("place", [(0, 1), (6, 7), (9, 10), (11, 12)])
-def test_films_change_with_whirl_frequency_as_in_an_independent_program(
-    place: tuple[int, int],
-) -> None:
+def test_films_change_with_whirl_frequency_as_in_an_independent_program(place):
     (bearing, clearance_um, eccentricity, _, slow), (*_, fast) = (ROSS[row] for row in place)
     found = film(bearing, clearance_um, eccentricity)
 
@@ -94,7 +88,7 @@ def test_films_change_with_whirl_frequency_as_in_an_independent_program(
     np.testing.assert_allclose(change[2:], theirs[2:], atol=0.06)
 
 
-def test_clearance_oil_and_uneven_pads_act_as_they_should() -> None:
+def test_clearance_oil_and_uneven_pads_act_as_they_should():
     ring, wide = PADS["UJB"], np.full(16, 500.0)
 
     def stiffness(clearance_um: FloatArray, viscosity_pa_s: float = VISCOSITY_PA_S) -> FloatArray:
@@ -115,7 +109,7 @@ def test_clearance_oil_and_uneven_pads_act_as_they_should() -> None:
         ring.film(wide, (510.0, 0.0), VISCOSITY_PA_S, 92.3)
 
 
-def test_the_rotor_moves_on_tilting_pads_as_their_dynamic_stiffness_demands() -> None:
+def test_the_rotor_moves_on_tilting_pads_as_their_dynamic_stiffness_demands():
     parameters = RotorParameters()
     films = {"UJB": film("UJB", 500.0, 0.3), "LJB": film("LJB", 615.0, 0.4)}
     films["TJB"] = film("TJB", 425.0, 0.2)
@@ -140,14 +134,14 @@ def test_the_rotor_moves_on_tilting_pads_as_their_dynamic_stiffness_demands() ->
         np.testing.assert_allclose(response, relative @ expected, rtol=0.003)
 
 
-def test_a_film_without_lags_is_the_same_at_all_frequencies() -> None:
+def test_a_film_without_lags_is_the_same_at_all_frequencies():
     constant = Film.proportional(1.0e9, 0.7e9, 0.1e9)
 
     assert constant.at(3.0) == constant
     assert film("TJB", 425.0, 0.3).at(60.0).k_xx_n_per_m < 1.4e9
 
 
-def test_a_rotor_follows_films_of_tilting_pads_from_one_moment_to_the_next() -> None:
+def test_a_rotor_follows_films_of_tilting_pads_from_one_moment_to_the_next():
     def scenario(eccentricity: float) -> Scenario:
         places = (("UJB", 500.0), ("LJB", 615.0), ("TJB", 425.0))
         return Scenario(

@@ -34,7 +34,7 @@ RESPONSES: dict[str, Response] = {
 
 @pytest.mark.parametrize("rate_hz", [600.0, 1200.0])
 @pytest.mark.parametrize("name", RESPONSES)
-def test_the_samples_have_the_response_of_the_transducer(name: str, rate_hz: float) -> None:
+def test_the_samples_have_the_response_of_the_transducer(name, rate_hz):
     response = RESPONSES[name]
     frequency_hz = np.geomspace(0.1, 25.0, 100)
 
@@ -46,7 +46,7 @@ def test_the_samples_have_the_response_of_the_transducer(name: str, rate_hz: flo
 
 
 @pytest.mark.parametrize("name", RESPONSES)
-def test_a_filter_joins_from_piece_to_piece_without_a_seam(name: str) -> None:
+def test_a_filter_joins_from_piece_to_piece_without_a_seam(name):
     signal: FloatArray = np.random.default_rng(1).standard_normal(3000)
     whole = ResponseFilter(RESPONSES[name], RATE_HZ).advance(signal)
     stream = ResponseFilter(RESPONSES[name], RATE_HZ)
@@ -56,7 +56,7 @@ def test_a_filter_joins_from_piece_to_piece_without_a_seam(name: str) -> None:
     assert np.array_equal(np.concatenate(pieces), whole)
 
 
-def test_a_standing_gap_leaves_no_transient() -> None:
+def test_a_standing_gap_leaves_no_transient():
     passed = ResponseFilter(Resonance(60.0, 0.1), RATE_HZ).advance(np.full(500, 2000.0))
     blocked = ResponseFilter(HighPass(0.5), RATE_HZ).advance(np.full(500, 2000.0))
 
@@ -65,7 +65,7 @@ def test_a_standing_gap_leaves_no_transient() -> None:
     assert np.abs(blocked).max() < 1e-6
 
 
-def test_a_response_that_samples_cannot_show_is_refused() -> None:
+def test_a_response_that_samples_cannot_show_is_refused():
     with pytest.raises(ConfigError, match=r" Hz, at most 0\.001 is allowed"):
         ResponseFilter(Resonance(100.0, 0.3), 200.0)
     with pytest.raises(ConfigError, match="requires a model of its response, got a table"):
@@ -90,9 +90,7 @@ def density(samples: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 @pytest.mark.parametrize(("channel", "per_m_s2"), [(0, lambda _: 1.0), (1, mm_s_per_m_s2)])
-def test_the_noise_has_the_density_of_its_data_sheet_and_rises_below_its_corner(
-    channel: int, per_m_s2: Callable[[FloatArray], FloatArray]
-) -> None:
+def test_the_noise_has_the_density_of_its_data_sheet_and_rises_below_its_corner(channel, per_m_s2):
     """A velocity channel carries the integral of such noise."""
     frequency_hz, power = density(noise().advance(1_200_000)[channel])
     white = (DENSITY_G * 9.80665 * per_m_s2(frequency_hz)) ** 2
@@ -106,7 +104,7 @@ def test_the_noise_has_the_density_of_its_data_sheet_and_rises_below_its_corner(
             assert power[band].sum() == pytest.approx(expected[band].sum(), rel=0.06)
 
 
-def test_integrated_noise_neither_runs_away_nor_steps_from_chunk_to_chunk() -> None:
+def test_integrated_noise_neither_runs_away_nor_steps_from_chunk_to_chunk():
     stream = noise(2)
     early, _, late = (stream.advance(600_000)[1] for _ in range(3))
 
@@ -117,7 +115,7 @@ def test_integrated_noise_neither_runs_away_nor_steps_from_chunk_to_chunk() -> N
     assert steps[2047::2048].mean() == pytest.approx(steps.mean(), rel=0.5)
 
 
-def test_no_two_channels_share_their_noise() -> None:
+def test_no_two_channels_share_their_noise():
     two = AccelerometerNoise(np.random.default_rng(4), (False, False), 1.0, 2.0, RATE_HZ)
 
     first, second = two.advance(600_000)
@@ -137,7 +135,7 @@ STREAMS: dict[str, Callable[[], Excitation]] = {
 
 
 @pytest.mark.parametrize("name", STREAMS)
-def test_a_force_joins_from_piece_to_piece_without_a_seam(name: str) -> None:
+def test_a_force_joins_from_piece_to_piece_without_a_seam(name):
     whole = STREAMS[name]().advance(1000)
     stream = STREAMS[name]()
     pieces = [stream.advance(n) for n in (1, 2, 97, 400, 500)]
@@ -145,7 +143,7 @@ def test_a_force_joins_from_piece_to_piece_without_a_seam(name: str) -> None:
     assert np.array_equal(np.concatenate(pieces, axis=1), whole)
 
 
-def test_unbalance_turns_forward_once_per_revolution_with_constant_force() -> None:
+def test_unbalance_turns_forward_once_per_revolution_with_constant_force():
     x, y = UnbalanceForce(75.6e3, rotation(1.5)).advance(800)
     angle = np.unwrap(np.arctan2(y, x))
 
@@ -153,7 +151,7 @@ def test_unbalance_turns_forward_once_per_revolution_with_constant_force() -> No
     assert angle == pytest.approx(2 * np.pi * 1.5 / RATE_HZ * np.arange(800))
 
 
-def test_unbalance_grows_with_the_square_of_the_speed() -> None:
+def test_unbalance_grows_with_the_square_of_the_speed():
     wandering = rotation(1.5, 0.01)
     force = np.hypot(*UnbalanceForce(75.6e3, wandering).advance(60_000))
 
@@ -162,7 +160,7 @@ def test_unbalance_grows_with_the_square_of_the_speed() -> None:
 
 
 @pytest.mark.parametrize("cutoff_hz", [None, 20.0, 5.0])
-def test_hydraulic_force_has_the_rms_and_the_band_it_is_given(cutoff_hz: float | None) -> None:
+def test_hydraulic_force_has_the_rms_and_the_band_it_is_given(cutoff_hz):
     force = HydraulicForce(np.random.default_rng(4), 20.0e3, cutoff_hz, RATE_HZ).advance(600_000)
 
     # 1000 s of a 5 Hz band are 10,000 independent values: 1 % scatter at most.
@@ -176,7 +174,7 @@ def test_hydraulic_force_has_the_rms_and_the_band_it_is_given(cutoff_hz: float |
         assert density[:, frequency_hz > 3.0 * edge_hz].mean() < 1e-3 * below
 
 
-def test_the_rope_keeps_its_mean_frequency_but_no_fixed_phase_to_the_shaft() -> None:
+def test_the_rope_keeps_its_mean_frequency_but_no_fixed_phase_to_the_shaft():
     width_hz, seconds = 0.01, 20_000
     rope = RopeForce(np.random.default_rng(6), 150.0e3, 0.385, width_hz, 10.0)
     x, y = rope.advance(seconds * 10)
@@ -198,7 +196,7 @@ def wandering() -> Rotation:
     return Rotation(np.random.default_rng(1), TURN_HZ, RATE_HZ, 0.003, 120.0)
 
 
-def test_the_shaft_turns_as_fast_as_its_speed_says_which_wanders_by_what_it_is_told() -> None:
+def test_the_shaft_turns_as_fast_as_its_speed_says_which_wanders_by_what_it_is_told():
     index = np.arange(0.0, 300.0 * RATE_HZ)
     rotation = wandering()
 
@@ -211,7 +209,7 @@ def test_the_shaft_turns_as_fast_as_its_speed_says_which_wanders_by_what_it_is_t
     assert relative.mean() == pytest.approx(1.0, abs=1e-4)
 
 
-def test_a_shaft_that_is_followed_turns_by_its_mean_speed_without_a_jump() -> None:
+def test_a_shaft_that_is_followed_turns_by_its_mean_speed_without_a_jump():
     rotation, passed = FollowedRotation(60.0, RATE_HZ), []
     for number, (start_rpm, stop_rpm) in enumerate(((60.0, 60.0), (60.0, 30.0), (30.0, 0.0))):
         rotation.follow(600 * number, 600, start_rpm, stop_rpm)

@@ -22,7 +22,7 @@ FILMS = {
 ISOTROPIC = {name: Film.proportional(1.0e9, 1.0e9) for name in FILMS}
 
 
-def test_mass_and_stiffness_are_symmetric_and_a_bearing_without_a_film_is_refused() -> None:
+def test_mass_and_stiffness_are_symmetric_and_a_bearing_without_a_film_is_refused():
     films = FILMS | {"UJB": Film.proportional(3.33e9, 1.11e9, -0.33e9)}
     matrices = rotor_matrices(PARAMETERS, films, 92.3)
 
@@ -42,9 +42,7 @@ def test_mass_and_stiffness_are_symmetric_and_a_bearing_without_a_film_is_refuse
 
 @pytest.mark.parametrize("frequency_hz", [0.1, 0.385, 1.538, 4.0, 20.0])
 @pytest.mark.parametrize("plane", ForcePlane)
-def test_film_and_bracket_are_related_whatever_excites_the_rotor(
-    frequency_hz: float, plane: ForcePlane
-) -> None:
+def test_film_and_bracket_are_related_whatever_excites_the_rotor(frequency_hz, plane):
     matrices = rotor_matrices(PARAMETERS, FILMS, 92.3)
     force = force_map(PARAMETERS, plane) @ np.array([1.0e4 + 3.0e3j, -2.0e3 + 5.0e3j])
     response = bearing_response(PARAMETERS, matrices, frequency_hz, force)
@@ -58,7 +56,7 @@ def test_film_and_bracket_are_related_whatever_excites_the_rotor(
         assert bracket_force == pytest.approx(film_force, rel=1e-11)
 
 
-def test_a_pull_at_the_runner_moves_the_turbine_bearing_most_unless_the_seals_hold_it() -> None:
+def test_a_pull_at_the_runner_moves_the_turbine_bearing_most_unless_the_seals_hold_it():
     matrices = rotor_matrices(PARAMETERS, ISOTROPIC, 92.3)
     pull_y = force_map(PARAMETERS, ForcePlane.RUNNER) @ np.array([0.0, 1.0e5 + 0j])
 
@@ -74,7 +72,7 @@ def test_a_pull_at_the_runner_moves_the_turbine_bearing_most_unless_the_seals_ho
     assert all(np.abs(motion).max() < 1e-7 for motion in response.values())
 
 
-def test_an_isotropic_machine_whirls_forward_in_circles_under_unbalance() -> None:
+def test_an_isotropic_machine_whirls_forward_in_circles_under_unbalance():
     matrices = rotor_matrices(PARAMETERS, ISOTROPIC, 92.3)
     force = forward_force(PARAMETERS, ForcePlane.MASS_CENTRE, 75.6e3)
 
@@ -83,7 +81,7 @@ def test_an_isotropic_machine_whirls_forward_in_circles_under_unbalance() -> Non
         assert y_b == pytest.approx(-1j * x_b)
 
 
-def test_an_excited_generator_pulls_the_shaft_further_off_centre() -> None:
+def test_an_excited_generator_pulls_the_shaft_further_off_centre():
     excited = RotorParameters(magnetic_stiffness_n_per_m=-0.6e9)
     force = force_map(PARAMETERS, ForcePlane.GENERATOR) @ np.array([1.0e5 + 0j, 0.0])
     deflection = {
@@ -96,13 +94,13 @@ def test_an_excited_generator_pulls_the_shaft_further_off_centre() -> None:
     assert deflection[-0.6e9] > deflection[0.0] > 0.0
 
 
-def test_unbalance_force_grows_with_the_grade_and_the_square_of_speed() -> None:
+def test_unbalance_force_grows_with_the_grade_and_the_square_of_speed():
     assert unbalance_force_n(4.25, 92.3) == pytest.approx(75.6e3)
     assert unbalance_force_n(8.5, 92.3) == pytest.approx(2 * 75.6e3)
     assert unbalance_force_n(4.25, 46.15) == pytest.approx(75.6e3 / 4)
 
 
-def test_effective_stiffness_is_the_magnitude_of_spring_and_dashpot_together() -> None:
+def test_effective_stiffness_is_the_magnitude_of_spring_and_dashpot_together():
     film = Film.proportional(3.0e9, 1.0e9, damping_over_stiffness_s=0.75)
 
     assert film.effective_stiffness_n_per_m(1.0) == pytest.approx((3.75e9, 1.25e9))

@@ -44,7 +44,7 @@ def step_by_step(
 
 
 @pytest.mark.parametrize("n_steps", [1, 2, 32, 64])
-def test_many_steps_at_once_equal_the_same_steps_one_by_one(n_steps: int) -> None:
+def test_many_steps_at_once_equal_the_same_steps_one_by_one(n_steps):
     rotor = discrete_rotor()
     forces = 1.0e4 * np.random.default_rng(1).standard_normal((6, 1280))
     state = np.random.default_rng(2).standard_normal(20) * 1.0e-5
@@ -56,7 +56,7 @@ def test_many_steps_at_once_equal_the_same_steps_one_by_one(n_steps: int) -> Non
     assert np.abs(after - expected_state).max() <= 1e-11 * np.abs(expected_state).max()
 
 
-def test_a_run_in_two_parts_equals_the_run_in_one() -> None:
+def test_a_run_in_two_parts_equals_the_run_in_one():
     rotor = lift(discrete_rotor(), 32)
     forces = 1.0e4 * np.random.default_rng(3).standard_normal((6, 640))
 
@@ -67,7 +67,7 @@ def test_a_run_in_two_parts_equals_the_run_in_one() -> None:
     assert np.hstack([first, second]) == pytest.approx(whole, rel=1e-11, abs=1e-18)
 
 
-def test_a_held_force_settles_where_the_springs_balance_it() -> None:
+def test_a_held_force_settles_where_the_springs_balance_it():
     forces = np.zeros((6, 600 * 60))
     forces[4] = 1.0e5
     outputs, _ = simulate(lift(discrete_rotor(), 32), np.zeros(20), forces)
@@ -85,7 +85,7 @@ def test_a_held_force_settles_where_the_springs_balance_it() -> None:
 
 
 @pytest.mark.parametrize("plane", PLANES)
-def test_steady_state_under_a_rotating_force_is_the_frequency_response(plane: ForcePlane) -> None:
+def test_steady_state_under_a_rotating_force_is_the_frequency_response(plane):
     frequency_hz = 92.3 / 60.0
     angle = 2.0 * np.pi * frequency_hz * np.arange(600 * 60) / RATE_HZ
     forces = np.zeros((6, angle.size))
@@ -105,7 +105,7 @@ def test_steady_state_under_a_rotating_force_is_the_frequency_response(plane: Fo
         assert np.abs(outputs[rows][:, 600 * 50 :] - expected).max() <= 3e-5 * np.abs(phasor).max()
 
 
-def test_forces_of_uneven_blocks_and_a_rate_of_zero_are_refused() -> None:
+def test_forces_of_uneven_blocks_and_a_rate_of_zero_are_refused():
     rotor = lift(discrete_rotor(), 32)
     with pytest.raises(ValueError, match=r"\(6, 33\).*32 steps"):
         simulate(rotor, np.zeros(20), np.zeros((6, 33)))

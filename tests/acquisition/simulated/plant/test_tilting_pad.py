@@ -29,7 +29,7 @@ def k_xx(ring: PadRing, ratio: float = 0.0, angle_deg: float = 0.0, **changed: f
     return float(film(ring, ratio, angle_deg, **changed).k_xx_n_per_m[0])
 
 
-def test_a_centred_shaft_meets_the_design_stiffness_which_grows_with_eccentricity() -> None:
+def test_a_centred_shaft_meets_the_design_stiffness_which_grows_with_eccentricity():
     centred = film(RING)
 
     assert centred.k_xx_n_per_m[0] == pytest.approx(6.67e9)
@@ -50,9 +50,7 @@ def test_a_centred_shaft_meets_the_design_stiffness_which_grows_with_eccentricit
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.3, 0.6])
-def test_stiffness_grows_with_viscosity_and_speed_and_falls_with_the_cube_of_clearance(
-    ratio: float,
-) -> None:
+def test_stiffness_grows_with_viscosity_and_speed_and_falls_with_the_cube_of_clearance(ratio):
     usual = k_xx(RING, ratio, 30.0)
 
     assert k_xx(RING, ratio, 30.0, viscosity_pa_s=0.068) == pytest.approx(2.0 * usual)
@@ -61,7 +59,7 @@ def test_stiffness_grows_with_viscosity_and_speed_and_falls_with_the_cube_of_cle
 
 
 @pytest.mark.parametrize("ratio", [0.2, 0.4, 0.6])
-def test_many_pads_come_to_the_integral_around_the_shaft(ratio: float) -> None:
+def test_many_pads_come_to_the_integral_around_the_shaft(ratio):
     # (1/π) ∫ cos²θ / (1 − ε cos θ)³ dθ and the same with sin²θ, over a full turn
     pushed = film(MANY, ratio)
 
@@ -71,7 +69,7 @@ def test_many_pads_come_to_the_integral_around_the_shaft(ratio: float) -> None:
     assert pushed.k_yy_n_per_m[0] / 6.67e9 == pytest.approx(across, rel=1e-6)
 
 
-def test_stiffness_of_uneven_pads_is_how_their_force_grows() -> None:
+def test_stiffness_of_uneven_pads_is_how_their_force_grows():
     pads_um: FloatArray = 200.0 + 20.0 * np.random.default_rng(5).standard_normal(16)
     angles, step_um = RING.pad_angles_rad, 1e-3
     towards = np.array([np.cos(angles), np.sin(angles)])
@@ -90,7 +88,7 @@ def test_stiffness_of_uneven_pads_is_how_their_force_grows() -> None:
     np.testing.assert_allclose(np.column_stack([by_x, by_y]), found.stiffness_n_per_m, rtol=1e-6)
 
 
-def test_damping_is_that_of_the_paper_until_the_shaft_would_touch_a_pad() -> None:
+def test_damping_is_that_of_the_paper_until_the_shaft_would_touch_a_pad():
     found = film(RING, 0.4, 20.0).at(0)
 
     np.testing.assert_allclose(found.damping_n_s_per_m, 0.0125 * found.stiffness_n_per_m)
@@ -99,7 +97,7 @@ def test_damping_is_that_of_the_paper_until_the_shaft_would_touch_a_pad() -> Non
         film(RING, 1.1, 11.25)
 
 
-def test_the_oil_has_the_viscosities_of_tables_and_gets_thinner_as_it_warms() -> None:
+def test_the_oil_has_the_viscosities_of_tables_and_gets_thinner_as_it_warms():
     at_both = Oil().viscosity_pa_s(np.array([40.0, 100.0]))
 
     np.testing.assert_allclose(at_both, [0.047, 0.0068], rtol=1e-9)

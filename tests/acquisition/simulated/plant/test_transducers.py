@@ -1,5 +1,4 @@
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -15,11 +14,8 @@ from core.arrays import FloatArray
 from core.checks.channels import COUNTS_FULL_SCALE
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
-from core.samples.calibration import UnitCalibration
 from core.spectra.lines import part_phasors, turning_factors
 from core.spectra.speed import KeyPhase, read_key_phase
-
-MachineWith = Callable[[Measurand], Unit]
 
 
 def readings(machine: Unit, scenario: Scenario, n_chunks: int = 1) -> FloatArray:
@@ -27,9 +23,7 @@ def readings(machine: Unit, scenario: Scenario, n_chunks: int = 1) -> FloatArray
     return np.concatenate([plant.advance().readings for _ in range(n_chunks)], axis=1)
 
 
-def test_velocity_and_acceleration_are_derivatives_of_displacement(
-    machine_with: MachineWith, quiet: Scenario
-) -> None:
+def test_velocity_and_acceleration_are_derivatives_of_displacement(machine_with, quiet):
     displacement_um, velocity_mm_s, acceleration_m_s2 = (
         readings(machine_with(measurand), quiet)[2]
         for measurand in (
@@ -49,9 +43,7 @@ def test_velocity_and_acceleration_are_derivatives_of_displacement(
     )
 
 
-def test_a_displacement_probe_without_gap_reads_the_vibration_alone(
-    machine: Unit, quiet: Scenario
-) -> None:
+def test_a_displacement_probe_without_gap_reads_the_vibration_alone(machine, quiet):
     probe = Channel("UJB_ux", Measurand.DISPLACEMENT_UM)
     bare = replace(machine, channels=(probe, *machine.channels[1:]))
 
@@ -61,9 +53,7 @@ def test_a_displacement_probe_without_gap_reads_the_vibration_alone(
     assert np.abs(vibration_um).max() == pytest.approx(9.3, rel=0.01)
 
 
-def test_the_machine_has_long_been_running_when_the_first_sample_is_taken(
-    machine: Unit, quiet: Scenario
-) -> None:
+def test_the_machine_has_long_been_running_when_the_first_sample_is_taken(machine, quiet):
     soft = {
         name: replace(b, film=Film.proportional(0.4e9, 0.4e9)) for name, b in quiet.bearings.items()
     }
@@ -73,7 +63,7 @@ def test_the_machine_has_long_been_running_when_the_first_sample_is_taken(
     assert signal[:, 400:800] == pytest.approx(signal[:, :400], abs=1e-3)
 
 
-def test_a_wandering_shaft_leaves_no_step_in_the_gap(machine: Unit, quiet: Scenario) -> None:
+def test_a_wandering_shaft_leaves_no_step_in_the_gap(machine, quiet):
     wandering = {name: replace(b, centre_wander_um_rms=30.0) for name, b in quiet.bearings.items()}
     still = replace(quiet, unbalance_grade_mm_s=0.0, wander_time_s=20.0)
 
@@ -83,7 +73,7 @@ def test_a_wandering_shaft_leaves_no_step_in_the_gap(machine: Unit, quiet: Scena
     assert np.abs(np.diff(gap_um)).max() < 0.1
 
 
-def test_each_kind_of_transducer_has_its_own_noise(machine: Unit, quiet: Scenario) -> None:
+def test_each_kind_of_transducer_has_its_own_noise(machine, quiet):
     noisy = replace(quiet, noise=TransducerNoise(gap_um_rms=0.5, velocity_mm_s_rms=0.02))
 
     noise = readings(machine, noisy, 20) - readings(machine, quiet, 20)
@@ -93,9 +83,7 @@ def test_each_kind_of_transducer_has_its_own_noise(machine: Unit, quiet: Scenari
     assert np.abs(np.corrcoef(noise) - np.eye(12)).max() < 0.03
 
 
-def test_the_converter_rounds_to_counts_and_clips_at_its_rails(
-    calibration: UnitCalibration,
-) -> None:
+def test_the_converter_rounds_to_counts_and_clips_at_its_rails(calibration):
     per_count = np.array([c.unit_per_count for c in calibration.channels])
     signal = np.array([0.0, 0.4, 0.6, -1.4, 32767.4, 4.0e4, -4.0e4])
 
@@ -114,16 +102,14 @@ def test_the_converter_rounds_to_counts_and_clips_at_its_rails(
         (2, "UJB_vx", "gap_um", "cannot measure gap_um"),
     ],
 )
-def test_a_channel_that_no_bearing_has_is_refused(
-    machine: Unit, quiet: Scenario, place: int, channel: str, measurand: str, words: str
-) -> None:
+def test_a_channel_that_no_bearing_has_is_refused(machine, quiet, place, channel, measurand, words):
     channels = list(machine.channels)
     channels[place : place + 1] = [Channel(channel, Measurand(measurand))]
     with pytest.raises(ConfigError, match=words):
         SimulatedPlant(replace(machine, channels=tuple(channels)), quiet, seed=1)
 
 
-def test_a_bearing_the_rotor_does_not_have_is_refused(machine: Unit, quiet: Scenario) -> None:
+def test_a_bearing_the_rotor_does_not_have_is_refused(machine, quiet):
     strange: Bearing = replace(machine.bearings[0], id="GEN-DE")
     with pytest.raises(ConfigError, match="unknown bearing 'GEN-DE'; the simulated rotor has UJB"):
         SimulatedPlant(
@@ -149,8 +135,8 @@ def with_key_phase(machine: Unit) -> Unit:
 @pytest.mark.parametrize("mark_turns", [0.0, 0.37])
 @pytest.mark.parametrize("speed_rpm", [60.0, 92.3, 150.0])
 def test_runout_has_the_same_phase_to_the_mark_whenever_a_record_begins(
-    with_key_phase: Unit, quiet: Scenario, speed_rpm: float, mark_turns: float
-) -> None:
+    with_key_phase, quiet, speed_rpm, mark_turns
+):
     bearings = {
         name: replace(bearing, runout_um_pk=(20.0 * np.exp(0.8j),) if name == "UJB" else ())
         for name, bearing in quiet.bearings.items()
@@ -177,9 +163,7 @@ def test_runout_has_the_same_phase_to_the_mark_whenever_a_record_begins(
         assert abs(np.angle(to_mark * np.exp(-1j * expected), deg=True)) < 0.5
 
 
-def test_pulses_that_fall_are_those_that_rise_upside_down(
-    with_key_phase: Unit, quiet: Scenario
-) -> None:
+def test_pulses_that_fall_are_those_that_rise_upside_down(with_key_phase, quiet):
     up, down = readings(with_key_phase, quiet, N_CHUNKS)[-2:]
     assert up - 0.5 == pytest.approx(0.5 - down)
     assert up.max() == pytest.approx(5.5)
@@ -188,8 +172,8 @@ def test_pulses_that_fall_are_those_that_rise_upside_down(
 
 
 def test_a_key_phase_has_noise_of_its_own_and_leaves_the_other_channels_as_they_are(
-    machine: Unit, with_key_phase: Unit, quiet: Scenario
-) -> None:
+    machine, with_key_phase, quiet
+):
     noisy = replace(quiet, noise=TransducerNoise(key_phase_v_rms=0.05))
     silent, found = (readings(with_key_phase, scenario, N_CHUNKS) for scenario in (quiet, noisy))
     assert (found - silent)[-2].std() == pytest.approx(0.05, rel=0.05)
@@ -198,9 +182,7 @@ def test_a_key_phase_has_noise_of_its_own_and_leaves_the_other_channels_as_they_
 
 
 @pytest.mark.parametrize(("mark_turns", "is_under"), [(0.5, False), (1e-3, True)])
-def test_a_standing_shaft_gives_one_level(
-    with_key_phase: Unit, mark_turns: float, is_under: bool
-) -> None:
+def test_a_standing_shaft_gives_one_level(with_key_phase, mark_turns, is_under):
     pulse = KeyPhasePulse(mark_turns=mark_turns)
     signal = np.zeros((len(with_key_phase.channels), 100))
     KeyPhasePulses(with_key_phase, pulse).add_to(signal, np.zeros(100))

@@ -2,7 +2,6 @@ import math
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,17 +15,11 @@ from acquisition.simulated.plant.scenario import Scenario
 from acquisition.simulated.plant.unit import SimulatedUnit
 from acquisition.source import SampleSource
 from core.arrays import FloatArray
-from core.machine.unit import Unit
 from core.quality import Level
 from core.samples.blocks import SampleBlock
-from core.samples.calibration import UnitCalibration
-
-BuildUnit = Callable[..., SimulatedUnit]
 
 
-def test_an_ordinary_day_is_the_same_in_every_version(
-    build_unit: BuildUnit, full_load: Scenario, part_load: Scenario
-) -> None:
+def test_an_ordinary_day_is_the_same_in_every_version(build_unit, full_load, part_load):
     sums = [
         zlib.crc32(build_unit(s).advance(180_000).counts.tobytes()) for s in (full_load, part_load)
     ]
@@ -34,9 +27,7 @@ def test_an_ordinary_day_is_the_same_in_every_version(
     assert sums == [3341452830, 3235138598]
 
 
-def test_blocks_follow_on_each_other_in_index_and_time(
-    build_unit: BuildUnit, full_load: Scenario
-) -> None:
+def test_blocks_follow_on_each_other_in_index_and_time(build_unit, full_load):
     unit = build_unit(full_load)
     start_ns = unit.advance(700).start_ns
 
@@ -48,18 +39,14 @@ def test_blocks_follow_on_each_other_in_index_and_time(
     assert unit.advance(1).epoch == block.epoch
 
 
-def test_a_healthy_unit_is_read_without_a_flag(
-    build_unit: BuildUnit, full_load: Scenario, part_load: Scenario
-) -> None:
+def test_a_healthy_unit_is_read_without_a_flag(build_unit, full_load, part_load):
     for scenario in (full_load, part_load):
         block = build_unit(scenario).advance(60 * 600)
 
         assert all(quality.level is Level.GOOD for quality in block.channel_quality)
 
 
-def test_slow_channels_agree_with_the_waveforms_and_the_truth(
-    build_unit: BuildUnit, full_load: Scenario
-) -> None:
+def test_slow_channels_agree_with_the_waveforms_and_the_truth(build_unit, full_load):
     unit = build_unit(full_load)
     truth = unit.truth()
     block = unit.advance(390)
@@ -79,7 +66,7 @@ def test_slow_channels_agree_with_the_waveforms_and_the_truth(
         )
 
 
-def test_the_truth_is_what_equation_5_should_find(build_unit: BuildUnit, quiet: Scenario) -> None:
+def test_the_truth_is_what_equation_5_should_find(build_unit, quiet):
     truth = build_unit(quiet).truth().bearings["UJB"]
 
     assert truth.film.k_xx_n_per_m == 3.33e9
@@ -87,9 +74,7 @@ def test_the_truth_is_what_equation_5_should_find(build_unit: BuildUnit, quiet: 
     assert truth.eccentricity == pytest.approx(0.5)
 
 
-def test_the_shaft_centre_and_the_oil_wander_slowly_by_what_the_scenario_says(
-    build_unit: BuildUnit, quiet: Scenario
-) -> None:
+def test_the_shaft_centre_and_the_oil_wander_slowly_by_what_the_scenario_says(build_unit, quiet):
     wandering = {
         name: replace(b, centre_wander_um_rms=8.0, oil_temperature_wander_c_rms=0.7)
         for name, b in quiet.bearings.items()
@@ -108,9 +93,7 @@ def test_the_shaft_centre_and_the_oil_wander_slowly_by_what_the_scenario_says(
     assert np.abs(np.diff(centre_um)).max() < 8.0
 
 
-def test_a_monitor_of_two_bearings_needs_no_third(
-    machine: Unit, calibration: UnitCalibration, quiet: Scenario
-) -> None:
+def test_a_monitor_of_two_bearings_needs_no_third(machine, calibration, quiet):
     two = replace(machine, channels=machine.channels[:8], bearings=machine.bearings[:2])
     fitting = replace(calibration, channels=calibration.channels[:8])
 
@@ -121,9 +104,7 @@ def test_a_monitor_of_two_bearings_needs_no_third(
     assert all(math.isnan(value) for value in part.side.slow[-3:, 0])
 
 
-def test_settings_that_do_not_fit_together_are_refused(
-    machine: Unit, calibration: UnitCalibration, quiet: Scenario
-) -> None:
+def test_settings_that_do_not_fit_together_are_refused(machine, calibration, quiet):
     without_turbine = {name: quiet.bearings[name] for name in ("UJB", "LJB")}
     wrong = [
         (replace(calibration, channels=calibration.channels[1:]), quiet, "12 channels.* 11"),
@@ -150,9 +131,7 @@ async def take(
     return blocks
 
 
-async def test_an_unpaced_source_goes_on_where_it_was_left(
-    build_unit: BuildUnit, calibration: UnitCalibration, stepped_clock: Any, full_load: Scenario
-) -> None:
+async def test_an_unpaced_source_is_continued(build_unit, calibration, stepped_clock, full_load):
     feed = build_unit(full_load)
     in_500s = replace(calibration, block_samples=500)
     source = SimulatedSource(feed, in_500s, stepped_clock, paced=False)
@@ -169,13 +148,8 @@ async def test_an_unpaced_source_goes_on_where_it_was_left(
 
 @pytest.mark.parametrize(("busy_s", "finished_s"), [(0.0, 2.5), (2.0, 8.5)])
 async def test_a_paced_source_delivers_samples_once_they_have_happened_and_loses_none(
-    build_unit: BuildUnit,
-    calibration: UnitCalibration,
-    stepped_clock: Any,
-    full_load: Scenario,
-    busy_s: float,
-    finished_s: float,
-) -> None:
+    build_unit, calibration, stepped_clock, full_load, busy_s, finished_s
+):
     """Also to a reader that is busy for longer than a block lasts."""
     in_halves = replace(calibration, block_samples=300)
     source = SimulatedSource(build_unit(full_load), in_halves, stepped_clock)
@@ -214,14 +188,12 @@ def readings(plant: SimulatedPlant, n_chunks: int) -> FloatArray:
     return np.concatenate([plant.advance().readings for _ in range(n_chunks)], axis=1)
 
 
-def test_a_course_that_stands_still_is_a_scenario(machine: Unit, quiet: Scenario) -> None:
+def test_a_course_that_stands_still_is_a_scenario(machine, quiet):
     steady, course = (SimulatedPlant(machine, s, 3) for s in (quiet, Told(lambda _: quiet)))
     assert readings(course, 4) == pytest.approx(readings(steady, 4), abs=1e-9)
 
 
-def test_a_film_that_softens_within_a_minute_leaves_no_click(
-    machine: Unit, quiet: Scenario
-) -> None:
+def test_a_film_that_softens_within_a_minute_leaves_no_click(machine, quiet):
     course = Told(lambda s: softened(quiet, 0.2 * min(max(s - 7.0, 0.0) / 60.0, 1.0)))
     seen = readings(SimulatedPlant(machine, course, 3), 24)[BEARING]
     before, after = (np.ptp(seen[part]) for part in (slice(0, 3000), slice(-3000, None)))
@@ -233,9 +205,7 @@ def test_a_film_that_softens_within_a_minute_leaves_no_click(
     assert np.max(np.abs(high[600:-600])) < 1e-3 * before
 
 
-def test_a_shaft_that_moves_over_and_a_load_that_rises_leave_no_step(
-    machine: Unit, quiet: Scenario
-) -> None:
+def test_a_shaft_that_moves_over_and_a_load_that_rises_leave_no_step(machine, quiet):
     def moved(elapsed_s: float) -> Scenario:
         upper = replace(quiet.bearings["UJB"], centre_x_um=60.0 + elapsed_s)
         bearings = {**quiet.bearings, "UJB": upper}
@@ -249,7 +219,7 @@ def test_a_shaft_that_moves_over_and_a_load_that_rises_leave_no_step(
     assert np.max(np.abs(np.diff(seen))) < 1.5 * np.max(np.abs(np.diff(still)))
 
 
-def test_a_shaft_that_comes_to_rest_shakes_nothing(machine: Unit, full_load: Scenario) -> None:
+def test_a_shaft_that_comes_to_rest_shakes_nothing(machine, full_load):
     def stopping(elapsed_s: float) -> Scenario:
         share = max(1.0 - elapsed_s / 30.0, 0.0)
         hydraulic = replace(full_load.hydraulic, rms_n=share**2 * full_load.hydraulic.rms_n)

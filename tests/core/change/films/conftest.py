@@ -66,9 +66,7 @@ class Films:
 
 
 @pytest.fixture(scope="session")
-def films(
-    film_life: Callable[..., StiffnessHistory], assessment: Callable[..., Assessment]
-) -> Films:
+def films(film_life, assessment) -> Films:
     history = film_life(3)
     found = operation_history(history.time_ns, history.speed_rpm, history.power_mw, OPERATING)
     n = learned_rows(history)

@@ -183,9 +183,7 @@ def test_a_block_of_something_else_is_refused(rack):
 
 @pytest.mark.parametrize("first", range(4), ids="{} polls after a result".format)
 @pytest.mark.parametrize("delay_s", [0.0, 10.0])
-def test_a_step_of_vibration_is_an_alarm_within_half_a_minute_and_its_delay(
-    unit, rack, first, delay_s
-):
+def test_a_step_of_vibration_is_an_alarm_in_half_a_minute_and_delay(unit, rack, first, delay_s):
     limits = LimitRule(Limits(100.0), rule_of(delay_s, 30.0))
     board = UnitAlarms(unit, UnitRules(bearings={"UJB": {"shaft_order1": limits}}))
     monitor, n_before = rack(averaging=PollSettings()), 40 + first

@@ -51,9 +51,7 @@ async def test_an_account_is_added_changed_and_removed(access, admin):
     assert OTHER not in str(told)
 
 
-async def test_a_password_that_somebody_else_has_set_opens_nothing_but_its_change(
-    access, admin, as_token
-):
+async def test_a_password_set_by_somebody_else_opens_only_its_change(access, admin, as_token):
     await admin.post(ACCOUNTS, json=BERT)
     for password in (PASSWORD, OTHER):
         async with access.client(Origin="http://padwatch") as client:

@@ -203,9 +203,7 @@ async def test_with_a_cookie_only_the_dashboard_itself_acts_and_logs_in(access, 
         assert (await client.post(SESSION, json=ANNA)).status_code == 403
 
 
-async def test_a_new_password_ends_all_other_logins_and_logging_out_this_one(
-    access, anna, as_token
-):
+async def test_a_new_password_ends_all_other_logins_and_logout_this_one(access, anna, as_token):
     new = "the river is low in august"
     body = {"password": PASSWORD, "new_password": new}
     async with access.client(**cookie(anna), Origin="http://padwatch") as client:
@@ -286,9 +284,7 @@ def n_reads(access: Any, monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
     return read
 
 
-async def test_many_polls_in_a_second_read_a_session_once_and_the_next_second_again(
-    access, anna, n_reads
-):
+async def test_many_polls_in_a_second_read_a_session_once_and_later_again(access, anna, n_reads):
     async with access.client(**cookie(anna)) as client:
         for n_expected in (1, 2):
             for _ in range(20):
@@ -312,9 +308,7 @@ async def test_what_another_process_revokes_is_refused_a_second_later(access, an
             assert (await client.get(UNITS)).status_code == 401
 
 
-async def test_logging_out_counts_at_once_also_for_a_session_that_is_just_being_read(
-    access, anna, monkeypatch
-):
+async def test_logging_out_counts_at_once_also_for_a_session_being_read(access, anna, monkeypatch):
     sessions, read, go_on = access.service.access.sessions, threading.Event(), threading.Event()
     get = sessions.get
 

@@ -183,9 +183,7 @@ def test_no_key_is_made_for_ever_or_for_an_admin_of_one_unit(access):
         AccessService(access).create_key("historian", Role.ADMIN, ("U1",), 30, T0)
 
 
-def test_a_revoked_key_opens_nothing_and_the_database_refuses_to_bring_it_back(
-    access, doors, store_place
-):
+def test_a_revoked_key_opens_nothing_and_no_database_restores_it(access, doors, store_place):
     key, shown = AccessService(access).create_key("historian", Role.VIEWER, (), 30, T0)
     assert access.keys.revoke(key.id, T0 + S)
     assert not access.keys.revoke(key.id, T0 + 2 * S)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from core.baseline.history import DIRECTIONS, StiffnessHistory
-from core.change.film_judge import FilmNews
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Quality, Reading
@@ -48,12 +47,7 @@ def lived(film_life: Callable[..., StiffnessHistory]) -> StiffnessHistory:
 
 
 @pytest.fixture(scope="session")
-def database_file(
-    tmp_path_factory: pytest.TempPathFactory,
-    plant: PlantFile,
-    lived: StiffnessHistory,
-    film_news: Callable[..., list[FilmNews]],
-) -> Path:
+def database_file(tmp_path_factory, plant, lived, film_news) -> Path:
     """A database with these days and the baseline that was learned of them, for copies."""
     path = tmp_path_factory.mktemp("learned") / "padwatch.sqlite3"
     store = SqliteStore(path)
@@ -113,9 +107,7 @@ class Machine:
 
 
 @pytest.fixture
-async def machine(
-    service: Any, lived: StiffnessHistory, assessment: Callable[..., Assessment]
-) -> Machine:
+async def machine(service, lived, assessment) -> Machine:
     """That machine, running on."""
     await asyncio.sleep(0)
     return Machine(service, lived, assessment)

@@ -71,9 +71,7 @@ async def test_cells_and_export_are_what_was_learned(learned):
     assert baseline_from_json(export.text) == learned.store.films.baseline("U1", "UJB", 1)
 
 
-async def test_a_rejected_baseline_is_in_force_no_longer_and_may_be_accepted_again(
-    service, machine
-):
+async def test_a_rejected_baseline_is_not_in_force_and_may_be_accepted_again(service, machine):
     machine.run(2)
     rejected = await post(service, f"{BASELINES}/1/reject", ANNA)
     then = await service.json(FILM)
@@ -100,9 +98,7 @@ async def test_a_rejected_baseline_is_in_force_no_longer_and_may_be_accepted_aga
     assert thawed["is_frozen"] is False
 
 
-async def test_after_an_overhaul_nothing_is_in_force_until_it_has_been_learned(
-    service, machine, lived
-):
+async def test_after_an_overhaul_nothing_is_in_force_until_learned(service, machine, lived):
     machine.run(1)
     event = rfc3339(int(lived.time_ns[-1]))
 

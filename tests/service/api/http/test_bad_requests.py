@@ -51,9 +51,7 @@ THOUSANDS = json.dumps({f"{number:x}": 1 for number in range(1500)}).encode()
         (b"GET /?nothing=1 HTTP/1.1\r\nHost: localhost\r\n\r\n", 422, "unknown parameter"),
     ],
 )
-async def test_a_bad_request_is_answered_by_a_problem_document(
-    running, request_, status, said, caplog
-):
+async def test_a_bad_request_gets_a_problem_document(running, request_, status, said, caplog):
     client = await running.client()
 
     await client.send(request_)

@@ -89,9 +89,7 @@ async def test_the_watchdog_is_fed_while_every_loop_is_alive(program, manager_so
     assert manager_socket.received == [{"WATCHDOG": "1", "STATUS": "1 of 2 units connected"}] * 5
 
 
-async def test_a_stuck_loop_is_named_and_starves_the_watchdog_until_it_goes_on(
-    program, manager_socket
-):
+async def test_a_stuck_loop_is_named_and_starves_the_watchdog_meanwhile(program, manager_socket):
     program.clock.step(PATIENCE_S + 1.0)
     await program.loops["alarms"].go_on()
     program.supervision.look()

@@ -82,9 +82,7 @@ class TwoUnits:
 
 
 @pytest.fixture(scope="session", params=fast_and_long((90, 110, 0.45), (365, 400, 1.3)), ids=str)
-def two_units(
-    tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
-) -> Iterator[TwoUnits]:
+def two_units(tmp_path_factory, request) -> Iterator[TwoUnits]:
     learning_days, damaged_day, years = request.param
     damaged_ns = START_NS + damaged_day * DAY_NS
     folder = tmp_path_factory.mktemp("two_units")

@@ -128,9 +128,7 @@ async def test_a_block_is_acknowledged_after_its_results_are_stored(plant, serve
     await check_acknowledging(plant, server)
 
 
-async def test_of_what_is_delivered_again_what_is_stored_is_acknowledged_again(
-    plant, server, monkeypatch
-):
+async def test_stored_blocks_delivered_again_are_acknowledged_again(plant, server, monkeypatch):
     ack, lost = Msg.ack, []
 
     async def lossy(message: Msg) -> None:

@@ -254,9 +254,7 @@ async def test_blocks_that_come_again_late_with_their_old_time_are_dropped(movin
     assert found_in(late.database)["gap"] == found_in(clean.database)["gap"]
 
 
-async def test_blocks_that_no_device_can_have_given_are_refused_and_nothing_dies_of_them(
-    moving_unit, rng
-):
+async def test_blocks_that_no_device_can_have_given_are_refused_harmlessly(moving_unit, rng):
     clean, spoilt = moving_unit("clean"), moving_unit("spoilt")
     once = blocks(clean)
     await clean.live(numbered(clean, once), None, rng)

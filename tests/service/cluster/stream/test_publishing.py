@@ -207,9 +207,7 @@ async def test_a_stream_of_another_plant_is_left_alone(plant, server):
     assert numbers(await kept(shared, server)) == [0]
 
 
-async def test_a_server_that_lets_nobody_in_without_a_token_is_named_with_what_to_do(
-    plant, tmp_path
-):
+async def test_a_server_that_lets_no_one_in_without_a_token_is_named_with_advice(plant, tmp_path):
     token = tmp_path / "token"
     token.write_text("s3cret\n")
     with nats_server(tmp_path / "closed", 'authorization { token: "s3cret" }') as closed:

@@ -142,9 +142,7 @@ async def test_a_lost_unit_stays_lost_through_restarts_until_blocks_come(place, 
 
 
 @pytest.mark.parametrize("back", Back)
-async def test_a_unit_that_falls_silent_while_nobody_analyses_it_is_lost_after_the_start(
-    place, back
-):
+async def test_a_unit_that_falls_silent_while_not_analysed_is_lost_after_the_start(place, back):
     async with place.process() as first:
         await first.take(place.messages[:N_BLOCKS])
     async with place.process(back) as again:
@@ -176,9 +174,7 @@ async def test_a_unit_whose_messages_are_all_of_no_use_is_lost_and_the_reason_is
 
 
 @pytest.mark.parametrize("is_kept_as_lost", [False, True])
-async def test_a_process_that_was_killed_after_blocks_came_back_raises_nothing_again(
-    place, is_kept_as_lost
-):
+async def test_a_process_killed_after_blocks_came_back_raises_none_again(place, is_kept_as_lost):
     async with place.process() as first:
         await first.take(place.messages[:N_BLOCKS])
         await first.wait(SURELY_S)

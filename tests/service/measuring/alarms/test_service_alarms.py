@@ -110,9 +110,7 @@ def test_lost_samples_count_over_ten_minutes(watched):
     assert [words for words in later if words] == [["plant:U1:samples_lost returned"]]
 
 
-def test_an_alarm_about_lost_samples_goes_on_after_a_restart_until_ten_minutes_without(
-    watched, host
-):
+def test_an_alarm_about_lost_samples_goes_on_after_a_restart_for_ten_minutes(watched, host):
     watched.after(0.5, **account(60_000, 0))
     watched.after(10.0, **account(61_000, 5_000))
     again = Watched(host)
@@ -164,9 +162,7 @@ def test_a_lost_link_is_told_after_its_delay_whatever_the_clock_is_set_to(host, 
 
 
 @pytest.fixture
-def stored(
-    database: Callable[[], Path], host: Any, tools: Any
-) -> Callable[[], tuple[Any, Any, Any]]:
+def stored(database, host, tools) -> Callable[[], tuple[Any, Any, Any]]:
     """An engine, its recorder and its store, begun anew on the same file each time."""
     path = database()
 
@@ -187,9 +183,7 @@ def stored(
     return begin
 
 
-async def test_an_alarm_about_the_store_stands_while_it_fails_and_is_stored_as_soon_as_it_works(
-    stored, host
-):
+async def test_an_alarm_about_the_store_stands_while_it_fails_and_is_stored_after_it(stored, host):
     engine, recorder, (store, uncertain) = stored()
     uncertain.fate = "refuses"
     other = Alarm(AlarmIdentity("U9", "sx", "channel_not_ok"))
@@ -312,9 +306,7 @@ async def test_a_unit_that_nobody_ever_analysed_is_one(store, host):
     assert await Process(store, host).after(SILENT_AFTER_S + 3, "U1") == [GONE]
 
 
-async def test_the_next_leader_goes_on_with_the_alarm_and_neither_clears_nor_doubles_it(
-    store, host
-):
+async def test_the_next_leader_goes_on_with_the_alarm_and_does_not_clear_or_double_it(store, host):
     first = Process(store, host)
     await first.after(SILENT_AFTER_S + 3, "U1")
     first.alarms.operate(GONE, Acknowledge("A. Name", 1))

@@ -38,7 +38,6 @@ from service.store.sqlite import SqliteStore
 
 RATE_HZ = 100.0
 SEGMENT = 1024
-HOP = 896
 BLOCK = 128
 T0 = 1_767_225_600_000_000_000
 

@@ -27,9 +27,7 @@ from core.limits import ON
 from core.samples.blocks import DeviceClock, SampleBlock
 
 
-async def test_a_probe_is_lost_and_works_again_after_delays_in_the_samples_time(
-    plant, scripted, block
-):
+async def test_a_probe_is_lost_and_works_again_after_delays_in_sample_time(plant, scripted, block):
     too_short, long_enough = (5, 6), range(10, 15)
 
     await play(
@@ -86,9 +84,7 @@ async def test_the_same_samples_give_the_same_events_however_they_come(
 
 
 @pytest.mark.parametrize("plant", [3], indirect=True)
-async def test_news_of_alarms_outlives_a_store_that_fails_for_longer_than_results_do(
-    plant, scripted, block
-):
+async def test_news_of_alarms_outlives_a_failing_store_longer_than_results(plant, scripted, block):
     broken = (
         "CREATE TRIGGER broken BEFORE INSERT ON alarm_event BEGIN SELECT RAISE(ABORT, 'x'); END"
     )
@@ -108,9 +104,7 @@ async def test_news_of_alarms_outlives_a_store_that_fails_for_longer_than_result
     assert [event.change for event in found] == ["raised", "returned"] * 10
 
 
-async def test_after_a_restart_alarms_are_what_they_were_and_their_conditions_unknown(
-    plant, scripted, block
-):
+async def test_after_a_restart_alarms_are_as_before_but_conditions_unknown(plant, scripted, block):
     await play(plant, scripted, [lost(block(n)) for n in range(6)])
     plant.alarms.operate(PROBE, Acknowledge("A. Name", 1))
     plant.alarms.operate("U1:sy:channel_not_ok", Shelve("A. Name", "known", T0 + 10**14))

@@ -24,9 +24,7 @@ async def run_until(plant: Any, exhausted: asyncio.Event, **units: Any) -> None:
         await running
 
 
-async def test_a_device_that_does_not_answer_is_tried_again_in_each_poll_period(
-    plant, scripted, block
-):
+async def test_a_device_without_an_answer_is_tried_in_each_poll_period(plant, scripted, block):
     refusals = [[LinkError("10.0.0.7:502: Connection refused")] for _ in range(12)]
     source = scripted(*refusals, [block(0)], ends=False)
 

@@ -212,9 +212,7 @@ def without_coverage(found: Assessment) -> Assessment:
         (lambda found: replace(found, bearing="\ud800"), "surrogates"),
     ],
 )
-async def test_a_row_that_cannot_be_stored_is_parked_and_everything_else_is_stored(
-    plant, spoil, why
-):
+async def test_a_row_that_cannot_be_stored_is_parked_and_all_else_is_stored(plant, spoil, why):
     results = [assessment(at(n), order1_k_eff_xx_n_per_m=float(n)) for n in range(5)]
     plant.recorder.put(Findings([*results[:2], spoil(results[2])], [gap()], [news_of("sx")]))
     nameless, of_a_person = news_of("\ud800"), news_of("\ud801")

@@ -147,9 +147,7 @@ async def test_a_changed_film_keeps_the_whole_averaging_window_before_it(root):
 
 
 @pytest.mark.parametrize("pause", [False, True])
-async def test_another_alarm_prolongs_the_capture_at_both_ends_instead_of_beginning_one(
-    root, pause
-):
+async def test_another_alarm_prolongs_the_capture_at_both_ends_and_begins_none(root, pause):
     settings = CaptureSettings(pre_s=3.0, post_s=4.0, max_s=14.0, window_s=8.0)
     film = raised(12.0, "film_stiffness")
     told: list[Outcome] = []

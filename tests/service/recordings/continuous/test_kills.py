@@ -79,9 +79,7 @@ def recordings_in(root: Path) -> list[Recording]:
     return [open_recording(folder) for folder in sorted(root.iterdir())]
 
 
-def test_a_kill_at_any_moment_loses_nothing_that_was_synced_and_tells_the_hole(
-    tmp_path, unit, monkeypatch
-):
+def test_a_kill_at_any_moment_loses_nothing_synced_and_tells_the_hole(tmp_path, unit, monkeypatch):
     blocks = [counted_block(n) for n in range(N_BLOCKS)]
     later = [counted_block(n) for n in range(N_BLOCKS + 5, N_BLOCKS + 15)]
     with killed_at(10**9, monkeypatch) as done:

@@ -14,9 +14,7 @@ from service.recordings import continuous_recorder as unit_tape
 from service.recordings.continuous_recorder import DropReason, last_end
 
 
-async def test_every_sample_is_in_recordings_that_end_at_full_multiples_of_their_length(
-    running, root
-):
+async def test_every_sample_is_in_recordings_that_end_at_multiples_of_their_length(running, root):
     async with running(root) as rig:
         rig.send(20, 120)
     first, second, third = rig.recordings()
@@ -55,9 +53,7 @@ async def test_two_units_are_recorded_side_by_side_also_if_their_names_begin_ali
 
 
 @pytest.mark.parametrize("reason", [DropReason.ANALYSIS_BEHIND, DropReason.DISK_FULL])
-async def test_what_gives_way_to_the_analysis_is_a_hole_with_number_and_reason(
-    running, root, reason
-):
+async def test_samples_that_yield_to_analysis_are_a_hole_with_a_reason(running, root, reason):
     async with running(root) as rig:
         rig.send(0, 10)
         rig.reason = reason
@@ -87,9 +83,7 @@ async def test_a_disk_that_does_not_keep_up_costs_samples_and_never_memory(runni
     assert summary_of(recording).rejected == {"disk_slow": 30}
 
 
-async def test_a_disk_that_refuses_is_told_and_recording_goes_on_after_it(
-    running, root, monkeypatch
-):
+async def test_a_refusing_disk_is_told_and_recording_goes_on_after_it(running, root, monkeypatch):
     class RefusedSegment:
         def __init__(self, *_: object) -> None:
             raise OSError(28, "No space left on device")

@@ -172,10 +172,7 @@ ALTERED: list[tuple[str, str]] = [
         "DELETE FROM audit WHERE number = 3; UPDATE audit SET number = 3 WHERE number = 8",
         "entry 3 is out of order; its content is that of entry 8",
     ),
-    (
-        "UPDATE audit SET number = 0 WHERE number = 3",
-        "expected entry 1, found entry 0",
-    ),
+    ("UPDATE audit SET number = 0 WHERE number = 3", "expected entry 1, found entry 0"),
 ]
 
 

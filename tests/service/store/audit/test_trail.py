@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, example, given, settings
@@ -144,9 +143,7 @@ def test_a_crash_before_the_very_first_entry_is_no_tampering(path, deed):
 
 
 @pytest.mark.parametrize("with_head", [True, False])
-def test_a_cut_trail_stays_noticed_after_the_service_has_gone_on(
-    store: SqliteStore, path: Path, deed: Build, *, with_head: bool
-) -> None:
+def test_a_cut_trail_stays_noticed_after_the_service_has_gone_on(store, path, deed, *, with_head):
     store.audit.record([deed(n) for n in range(4)])
     with closing(sqlite3.connect(path)) as other:
         other.executescript("DROP TRIGGER audit_kept; DELETE FROM audit WHERE number > 2")

@@ -53,9 +53,7 @@ def copy(database: Path, folder: Path) -> Path:
     return path
 
 
-def test_a_copy_of_a_database_in_use_is_one_private_file_with_all_that_was_committed(
-    database, folder
-):
+def test_a_copy_of_a_database_in_use_is_one_private_file_with_all_committed(database, folder):
     with closing(SqliteStore(database)) as store:
         write_gaps(store, 0, 100)
         made = back_up(database, folder, NOW_NS, 3)

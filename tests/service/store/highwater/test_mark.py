@@ -61,11 +61,7 @@ def test_an_older_database_is_told_with_what_is_missing_and_since_when():
     ("changes", "kind", "said"),
     [
         ({"nonce": "another"}, Kind.ROLLED_BACK, "transaction 150 differs from"),
-        (
-            {"store": "00" * 16, "n_commits": 7},
-            Kind.REPLACED,
-            "150 transactions.*this one has 7",
-        ),
+        ({"store": "00" * 16, "n_commits": 7}, Kind.REPLACED, "150 transactions.*this one has 7"),
     ],
 )
 def test_an_older_database_that_has_come_as_far_again_and_another_one_are_told(changes, kind, said):

@@ -63,9 +63,7 @@ def proxy(postgres_place: PostgresPlace) -> Iterator[CuttingProxy]:
 
 
 @pytest.fixture
-def cut_store(
-    postgres_place: PostgresPlace, proxy: CuttingProxy, password_file: Path
-) -> Iterator[PostgresStore]:
+def cut_store(postgres_place, proxy, password_file) -> Iterator[PostgresStore]:
     """A store over that way."""
     conninfo = f"host=127.0.0.1 port={proxy.port} user=postgres dbname={postgres_place.database}"
     address = PostgresAddress(conninfo, password_file)

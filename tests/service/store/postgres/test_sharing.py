@@ -152,9 +152,7 @@ def stored(place: PostgresPlace) -> list[int]:
     return [time for (time,) in place.execute("SELECT time_ns FROM assessment ORDER BY time_ns")]
 
 
-def test_a_commit_whose_answer_is_lost_is_looked_up_and_counts_once(
-    cut_store, proxy, postgres_place
-):
+def test_a_commit_with_a_lost_answer_is_looked_up_and_counts_once(cut_store, proxy, postgres_place):
     for number in range(N_CUTS):
         proxy.cut_at(COMMIT, reaches=True)
         cut_store.append([assessment(at(number))], [])

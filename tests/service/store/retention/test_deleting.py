@@ -144,9 +144,7 @@ def test_messages_that_are_done_are_deleted_but_for_the_last_of_an_alarm(path, r
         execute("DELETE FROM outbox WHERE state = 'waiting'")
 
 
-def test_a_message_of_what_happened_lately_stays_whatever_the_clock_said_then(
-    path, rolled, execute
-):
+def test_a_recent_message_stays_whatever_the_clock_said_then(path, rolled, execute):
     for number, event_ns in ((1, T0 - 2 * HOUR_NS), (2, T0), (3, T0)):
         execute(EVENT, (number, event_ns))
         execute(LETTER, (f"probe{number}", "probe", number, "delivered", 0))

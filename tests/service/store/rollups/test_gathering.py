@@ -29,9 +29,7 @@ from service.store.sqlite import SqliteStore
 LONG = pytest.mark.long
 
 
-def test_what_comes_piece_by_piece_is_gathered_like_what_comes_at_once(
-    plain, rolled, results, tmp_path
-):
+def test_pieces_are_gathered_like_what_comes_at_once(plain, rolled, results, tmp_path):
     with closing(SqliteStore(tmp_path / "pieces.sqlite3")) as store:
         for first in range(0, N, 37):
             store.append(results[first : first + 37], [])
@@ -251,9 +249,7 @@ def test_few_readings_of_a_long_time_stay_single(rolled, plain):
     require_same(rolled.trend(few), plain.trend(few))
 
 
-def test_bounds_that_cut_through_too_many_cells_are_refused_before_they_are_all_read(
-    rolled, monkeypatch
-):
+def test_bounds_that_cut_too_many_cells_are_refused_before_all_are_read(rolled, monkeypatch):
     monkeypatch.setattr(cover, "MAX_CUT_SPANS", 5)
     whole_cells = replace(WHOLE, eccentricity_ratio=ValueRange(0.3, 0.4 - 1e-9))
 
