@@ -92,7 +92,10 @@ class EvidenceRetention:
             If a folder cannot be read or removed; the next call surveys all folders again.
         """
         surveyed_s, self._surveyed_s = self._surveyed(), None
-        going = self._surplus()
+        most = self._limits.max_per_alarm
+        going = {
+            held: alarm for alarm in self._crowded for held in sorted(self._sizes[alarm])[:-most]
+        }
         going |= self._beyond_the_limits(going)
         self._remove(going)
         self._surveyed_s = surveyed_s
@@ -108,12 +111,6 @@ class EvidenceRetention:
         for place in places(self._root):
             self.note(place)
         return now_s
-
-    def _surplus(self) -> dict[_Held, str]:
-        most = self._limits.max_per_alarm
-        return {
-            held: alarm for alarm in self._crowded for held in sorted(self._sizes[alarm])[:-most]
-        }
 
     def _beyond_the_limits(self, going: dict[_Held, str]) -> dict[_Held, str]:
         """Return further bundles to remove because of their total size, with their alarms."""

@@ -169,7 +169,8 @@ async def require_declared(request: Request) -> None:
         raise not_logged_in()
     unit = _unit_of(request.path_params)
     if needed.reach is Reach.ASKED:
-        unit = _unit_asked(request)
+        units = request.query_params.getlist("unit")
+        unit = units[0] if len(units) == 1 else None
     if unit is None and needed.reach is not Reach.NO_UNIT and identity.units:
         raise not_this_unit()
     if not identity.may(needed.permission, unit):
@@ -191,12 +192,6 @@ def _unit_of(parameters: Mapping[str, str]) -> str | None:
     if "alarm" in parameters:
         return parameters["alarm"].partition(":")[0]
     return None
-
-
-def _unit_asked(request: Request) -> str | None:
-    """Return the unit in the query parameter ``unit``; None without it, and for several values."""
-    units = request.query_params.getlist("unit")
-    return units[0] if len(units) == 1 else None
 
 
 def actor_or(given: str | None) -> str:

@@ -195,18 +195,15 @@ def _logged_in(found: LoggedIn | NotLoggedIn) -> LoggedIn:
 async def _begun(
     authenticator: Authenticator, request: Request, response: Response, logged_in: LoggedIn
 ) -> SessionModel:
-    is_secure = _is_secure(request)
+    # the browser may use HTTPS although a proxy forwards its requests over HTTP
+    scheme = request.headers.get("origin", "").partition(":")[0]
+    is_secure = "https" in (request.url.scheme, scheme)
     name = COOKIE if is_secure else PLAIN_COOKIE
     response.set_cookie(name, logged_in.token, secure=is_secure, httponly=True, samesite="strict")
     caller = caller_of(request)
     return await session_model(
         Caller(logged_in.identity, caller.shown, caller.must_log_in), authenticator
     )
-
-
-def _is_secure(request: Request) -> bool:
-    """Whether the browser uses HTTPS, even if a proxy forwards its requests over HTTP."""
-    return "https" in (request.url.scheme, request.headers.get("origin", "").partition(":")[0])
 
 
 async def session_model(caller: Caller, authenticator: Authenticator) -> SessionModel:
