@@ -3,7 +3,6 @@
 import json
 import re
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -11,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
-from rigs.command_line import OPEN
+from rigs.command_line import OPEN, free_port
 
 from service.api.auth.passwords import Hashing
 from service.api.auth.service import AccessService
@@ -135,12 +134,6 @@ class Plant(ExitStack):
         path = self._folder / "plant.toml"
         path.write_text(f"{OWN_TABLES.sub('', head)}{self.settings}\n[[unit]]{first_unit}")
         return path
-
-
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        port: int = listener.getsockname()[1]
-        return port
 
 
 def read_line(process: "subprocess.Popen[str]") -> str:

@@ -4,13 +4,13 @@ import asyncio
 import json
 import re
 import shutil
-import socket
 import subprocess
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
+from rigs.command_line import free_port
 from starlette.requests import Request
 from starlette.responses import JSONResponse
 from starlette.types import Receive, Scope, Send
@@ -70,12 +70,6 @@ async def app(scope: Scope, receive: Receive, send: Send) -> None:
     request = Request(scope)
     client = request.client.host if request.client else None
     await JSONResponse({"client": client, "host": request.headers["host"]})(scope, receive, send)
-
-
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        port: int = listener.getsockname()[1]
-        return port
 
 
 @asynccontextmanager

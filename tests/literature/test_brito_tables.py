@@ -65,9 +65,7 @@ def test_the_two_stiffnesses_of_section_3_2_follow_to_their_last_digit():
         ("LJB", 1, 1.440),
     ],
 )
-def test_what_equation_5_estimates_lies_within_a_percent_of_the_papers_estimate(
-    bearing, condition, k_eff_gn_per_m
-):
+def test_equation_5_is_within_a_percent_of_the_papers_estimate(bearing, condition, k_eff_gn_per_m):
     row = paper.SIMULATED[bearing][condition]
     film = Film.proportional(row.k_xx_gn_per_m * 1e9, row.k_yy_gn_per_m * 1e9)
 

@@ -7,6 +7,7 @@ import ssl
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -195,35 +196,27 @@ def write_plant() -> Callable[..., Path]:
     return write_demo
 
 
-def children_of(pid: int) -> dict[int, str]:
-    """Return the command line of each child of a process, by process id."""
-    found = {}
+def child_of(is_serving: bool, pid: int) -> int:
+    """Return the one child of a process that serves, or the one that does not."""
+    found = []
     for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
         with suppress(FileNotFoundError, ProcessLookupError):  # it has ended meanwhile
-            found[int(child)] = Path(f"/proc/{child}/cmdline").read_text().replace("\0", " ")
-    return found
+            line = Path(f"/proc/{child}/cmdline").read_text().replace("\0", " ")
+            found += [int(child)] if (SERVING in line) == is_serving else []
+    [only] = found
+    return only
 
 
 @pytest.fixture
 def daq_of() -> Callable[[int], int]:
     """Process id of the simulated DAQ of a demo or replay, which is a child of it."""
-
-    def find(pid: int) -> int:
-        [daq] = [child for child, line in children_of(pid).items() if SERVING not in line]
-        return daq
-
-    return find
+    return partial(child_of, False)
 
 
 @pytest.fixture
 def serving_of() -> Callable[[int], int]:
     """Process id of the serving process of a measuring process, whose child it is."""
-
-    def find(pid: int) -> int:
-        [serving] = [child for child, line in children_of(pid).items() if SERVING in line]
-        return serving
-
-    return find
+    return partial(child_of, True)
 
 
 @pytest.fixture

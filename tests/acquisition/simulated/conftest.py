@@ -1,6 +1,7 @@
 """A machine with all twelve channels of Table 3, two ordinary days of it, time that tests own."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -109,16 +110,14 @@ def full_load() -> Scenario:
 
 
 @pytest.fixture
-def part_load() -> Scenario:
+def part_load(full_load: Scenario) -> Scenario:
     """320 MW, as in section 3.2 of the paper: a vortex rope at a quarter of the speed."""
-    return Scenario(
-        bearings=_bearings(),
+    return replace(
+        full_load,
         active_power_mw=320.0,
         active_power_wander_mw_rms=4.0,
-        unbalance_grade_mm_s=2.5,
         hydraulic=HydraulicNoise(rms_n=20.0e3, cutoff_hz=20.0),
         rope=VortexRope(force_n=150.0e3),
-        noise=NOISE,
     )
 
 

@@ -1,5 +1,6 @@
 """The command line, in the test's own process and as a program of its own."""
 
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -46,3 +47,10 @@ def padwatch_program(*arguments: object, cwd: Path | None = None) -> Ended:
         check=False,
     )
     return Ended(done.returncode, done.stdout, done.stderr)
+
+
+def free_port() -> int:
+    """Port of loopback at which nobody listens just now."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port: int = listener.getsockname()[1]
+        return port

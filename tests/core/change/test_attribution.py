@@ -98,9 +98,7 @@ def put_down(
 
 @pytest.mark.parametrize(("row", "is_named"), [(0, True), (3, True), (4, False)])
 @pytest.mark.parametrize("factor", [0.8, 0.7])
-def test_a_softer_film_moves_the_shaft_and_is_the_film_unless_probes_would_do_the_same(
-    response, row, is_named, factor
-):
+def test_a_softer_film_is_the_film_unless_probes_would_do_the_same(response, row, is_named, factor):
     pair = {row: factor, row ^ 1: factor}
     found = put_down(response, row, film=pair)
     assert found.cause is (Cause.FILM if is_named else Cause.UNKNOWN)

@@ -225,9 +225,7 @@ def test_foreign_blocks_are_refused_naming_both(monitor, blocks, signals):
 
 
 @pytest.mark.parametrize(("reason", "is_estimated"), [("torn", False), (UNCOUNTED_LOSS, True)])
-def test_what_was_refused_is_missing_too_and_is_recorded_as_a_gap(
-    monitor, blocks, signals, reason, is_estimated
-):
+def test_refused_samples_are_recorded_as_a_gap(monitor, blocks, signals, reason, is_estimated):
     first, *others = list(blocks(signals(14.0)))[:4]
     late = replace(others[-1], rejected=(Rejection(reason, 7),))
     for block in (first, late):

@@ -66,9 +66,7 @@ async def test_an_unknown_unit_bearing_or_path_is_not_found(read_only):
         ("max_point", 10, "unknown parameter 'max_point'; known parameters: quantity, state"),
     ],
 )
-async def test_a_wrong_query_is_answered_with_the_parameter_and_what_is_allowed(
-    read_only, parameter, value, said
-):
+async def test_a_wrong_query_is_answered_with_what_is_allowed(read_only, parameter, value, said):
     problem = await read_only.problem(TRENDS, 422, **{**GOOD, parameter: value})
 
     wrong = "start" if "before end" in said else parameter

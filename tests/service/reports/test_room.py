@@ -124,9 +124,7 @@ def test_what_is_none_of_ours_is_left_alone(root, room_of):
     assert notes.is_dir()
 
 
-def test_names_of_what_was_removed_are_not_lost_where_there_is_no_room_to_write_them(
-    root, room_of, monkeypatch
-):
+def test_names_of_removed_files_are_not_lost_on_a_full_disk(root, room_of, monkeypatch):
     assert room_of(3000).make() == [OLDEST]
     full = Mock(side_effect=OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     monkeypatch.setattr(os, "fsync", full)

@@ -67,9 +67,7 @@ BRACKET, SOFT = "bracket_stiffness_n_per_m", "bracket_stiffnes = 'soft'"
         ("off_hz = 20.0", "off_hz = 300.0", f"{SIMULATION}hydraulic_cutoff_hz = 300.0", "300 Hz"),
     ],
 )
-def test_a_wrong_value_is_named_with_its_line_key_value_and_what_is_allowed(
-    changed, mistakes, old, new, key, said
-):
+def test_a_wrong_value_is_named_with_line_key_and_limits(changed, mistakes, old, new, key, said):
     text, line = changed(old, new)
 
     found = mistakes(text)[0]

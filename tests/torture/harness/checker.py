@@ -69,7 +69,6 @@ class Findings:
     n_shown: int = 0
     n_promised: int = 0
     n_exceedances: int = 0
-    n_probes_lost: int = 0
 
     @property
     def wrong(self) -> dict[str, list[str]]:

@@ -143,12 +143,17 @@ def held() -> Iterator[threading.Event]:
     event.set()
 
 
-async def test_only_so_many_passwords_wait_and_nobody_else_for_them(held):
+async def waiting_logins(held: threading.Event) -> tuple[AccessThreads, list[asyncio.Task[bool]]]:
+    """Begin as many logins as may wait."""
     work = AccessThreads()
-    logins = [
-        asyncio.create_task(work.run_hashing(held.wait, is_known=False)) for _ in range(MAX_WAITING)
-    ]
+    begun = [work.run_hashing(held.wait, is_known=False) for _ in range(MAX_WAITING)]
+    logins = [asyncio.create_task(each) for each in begun]
     await asyncio.sleep(0)
+    return work, logins
+
+
+async def test_only_so_many_passwords_wait_and_nobody_else_for_them(held):
+    work, logins = await waiting_logins(held)
 
     with pytest.raises(TooManyLoginsError):
         await work.run_hashing(held.wait, is_known=False)
@@ -160,11 +165,7 @@ async def test_only_so_many_passwords_wait_and_nobody_else_for_them(held):
 
 
 async def test_at_the_end_nothing_more_is_begun(held):
-    work = AccessThreads()
-    logins = [
-        asyncio.create_task(work.run_hashing(held.wait, is_known=False)) for _ in range(MAX_WAITING)
-    ]
-    await asyncio.sleep(0)
+    work, logins = await waiting_logins(held)
     work.close()
     held.set()
     ended = await asyncio.gather(*logins, return_exceptions=True)

@@ -1,4 +1,4 @@
-"""Who is let in, for how long, what ends it, and what each role may do."""
+"""Who is let in, for how long, and what ends it."""
 
 import sqlite3
 from concurrent.futures import ThreadPoolExecutor
@@ -223,19 +223,6 @@ def test_who_may_come_in_does_so_also_while_nothing_can_be_noted(doors, access, 
     assert isinstance(doors.person(token, T0 + step), Identity)
     assert isinstance(doors.person(token, T0 + 2 * step), Identity)
     assert access.keys.get(key.id).used_ns is None  # type: ignore[union-attr]
-
-
-MATRIX = {
-    Role.VIEWER: {Permission.READ},
-    Role.OPERATOR: {Permission.READ, Permission.ACT_ON_ALARMS},
-    Role.ENGINEER: set(Permission) - {Permission.CHANGE_ACCESS},
-    Role.ADMIN: set(Permission),
-}
-
-
-@pytest.mark.parametrize("role", Role)
-def test_a_role_may_what_the_table_of_roles_says(role):
-    assert {permission for permission in Permission if role.may(permission)} == MATRIX[role]
 
 
 def test_a_key_for_one_unit_opens_no_other_and_changes_nothing_of_the_plant():

@@ -101,9 +101,7 @@ def test_alarms_are_those_that_core_decides(two_units, found):
     assert {alarm[1:4] for alarm in alarms} >= {("U2", "LJB", "x"), ("U2", "LJB", "y")}
 
 
-def test_the_damage_is_told_with_its_evidence_and_a_fault_that_was_learned_is_doubted(
-    two_units, found, histories
-):
+def test_damage_is_told_with_evidence_and_a_learned_fault_is_doubted(two_units, found, histories):
     alarm = next(a for a in found.alarms if (a.unit, a.bearing) == ("U2", "LJB"))
     begin = alarm.begin
     assert rfc3339(two_units.damaged_ns) < begin < rfc3339(two_units.damaged_ns + 3 * DAY_NS)

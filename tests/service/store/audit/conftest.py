@@ -34,12 +34,6 @@ def deed() -> Callable[..., AuditAction]:
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
-    """Where the database is."""
-    return tmp_path / "data" / "padwatch.sqlite3"
-
-
-@pytest.fixture
 def store(database_file: Path, path: Path) -> Iterator[SqliteStore]:
     """An open, empty store."""
     opened = SqliteStore(copy_database(database_file, path.parent))
