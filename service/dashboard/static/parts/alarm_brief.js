@@ -25,16 +25,16 @@ export const unitAlarms = (unit) => alarmBrief("Open alarms", (alarm) => isAbout
 /** Alarms of a bearing; nothing where there are none. */
 export const bearingAlarms = (unit, bearing) => alarmBrief("Open alarms", (alarm) => alarm.unit === unit && alarm.subject === bearing);
 
-/** Alarms of the plant that nobody has acknowledged; nothing where there are none. */
-export const alarmsToAcknowledge = () => alarmBrief("Not acknowledged", (alarm) => !alarm.is_acknowledged);
+/** Alarms of the plant that nobody has acknowledged, by name only; nothing where there are none. */
+export const alarmsToAcknowledge = () => alarmBrief("Not acknowledged", (alarm) => !alarm.is_acknowledged, null, true);
 
-function alarmBrief(title, isMine, sentenceOf = null) {
+function alarmBrief(title, isMine, sentenceOf = null, isShort = false) {
   const sentence = element("p", { class: "sentence", role: "status" }, "Asking the service.");
   const list = element("ul", { class: "brief-list" });
   const link = element("a", { class: "more", href: ALARMS_ADDRESS }, "Alarm list");
   const head = element("div", { class: "panel-head" }, element("h2", {}, title), link);
   const node = element("section", { class: "panel unit-alarms" }, head, list, sentence);
-  const drawRows = keyedRows(list, ({ id }) => id, () => alarmLine((done) => questions.again(done)));
+  const drawRows = keyedRows(list, ({ id }) => id, () => alarmLine((done) => questions.again(done), isShort));
   node.hidden = sentenceOf === null;
   const questions = poll(async (signal) => {
     const { alarms, unjudged } = await ask(["alarms"], [], signal);
@@ -43,7 +43,7 @@ function alarmBrief(title, isMine, sentenceOf = null) {
     const shown = sentenceOf ? open : open.slice(0, MOST);
     const n = { open: open.length, hidden: mine.length - open.length, unjudged: unjudged.filter(isMine).length };
     keepingFocus(link, () => drawRows(shown));
-    setText(link, shown.length < open.length ? `Alarm list (${open.length - shown.length} more)` : "Alarm list");
+    setText(link, shown.length < open.length ? `Alarm list (${open.length - shown.length} more)` : isShort ? "" : "Alarm list");
     setText(sentence, sentenceOf?.(n) ?? "");
     node.hidden = sentenceOf === null && open.length === 0;
   }, () => PERIOD_S, (failure) => {
@@ -61,7 +61,7 @@ function countSentence({ open, hidden, unjudged }) {
   return parts.join(" ");
 }
 
-function alarmLine(again) {
+function alarmLine(again, isShort) {
   const level = mark();
   const what = element("a");
   const about = element("span");
@@ -77,7 +77,7 @@ function alarmLine(again) {
       const since = alarm.raised ? `since ${formatTime(Date.parse(alarm.raised))}` : "";
       const why = alarm.condition === "unknown" ? `cannot be evaluated: ${alarmReasonWords(alarm.condition_reason)}` : "";
       const words = [valueWords(alarm), stateWords(alarm.state).toLowerCase(), why, waitWords(alarm), since, holdWords(alarm)];
-      setText(about, words.filter(Boolean).join(" · "));
+      setText(about, isShort ? "" : words.filter(Boolean).join(" · "));
       acknowledge.draw(alarm);
     },
   };
