@@ -1,6 +1,6 @@
 /** Open alarms in a few lines, with the button that acknowledges: of the plant, of a unit, of a bearing. */
 
-import { alarmReasonWords, holdWords, isHidden, levelMark, placeWords, stateWords, valueWords, waitWords, whatWords } from "../alarm_words.js";
+import { alarmReasonWords, holdWords, isHidden, kindWords, levelMark, placeWords, stateWords, valueWords, waitWords, whatWords } from "../alarm_words.js";
 import { alarmPlace } from "../alarm_place.js";
 import { ask } from "../api.js";
 import { element, keepingFocus, setAttribute, setText } from "../dom.js";
@@ -73,7 +73,7 @@ function alarmLine(again, isShort) {
       setAttribute(node, "data-alarm", alarm.id);
       level.draw(...levelMark(alarm));
       setAttribute(what, "href", alarmPlace(alarm));
-      setText(what, `${placeWords(alarm)}: ${whatWords(alarm)}`);
+      setText(what, `${placeWords(alarm)}: ${isShort ? kindWords(alarm.kind) : whatWords(alarm)}`);
       const since = alarm.raised ? `since ${formatTime(Date.parse(alarm.raised))}` : "";
       const why = alarm.condition === "unknown" ? `cannot be evaluated: ${alarmReasonWords(alarm.condition_reason)}` : "";
       const words = [valueWords(alarm), stateWords(alarm.state).toLowerCase(), why, waitWords(alarm), since, holdWords(alarm)];
