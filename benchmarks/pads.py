@@ -20,7 +20,7 @@ N_CELLS = 48
 """Cells along a pad. Twice as many change stiffness by less than 0.2 %."""
 
 ORDERS = np.arange(1, 16, 2)
-"""Orders of the cosines across a pad, of which the pressure is the sum."""
+"""Orders of the axial cosine series of the pressure on a pad."""
 
 ACROSS, SHARES = (half[12:] for half in np.polynomial.legendre.leggauss(24))
 """Places across half a pad, from 0 to 1, and their weights in the mean."""

@@ -1,4 +1,4 @@
-"""Counts of a device: told apart, numbered, and the holes that nobody saw between them."""
+"""Sample counts of a device: numbering, restarts, and gaps between counts."""
 
 from dataclasses import replace
 

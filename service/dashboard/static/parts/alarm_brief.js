@@ -25,7 +25,7 @@ export const unitAlarms = (unit) => alarmBrief("Open alarms", (alarm) => isAbout
 /** Alarms of a bearing; nothing where there are none. */
 export const bearingAlarms = (unit, bearing) => alarmBrief("Open alarms", (alarm) => alarm.unit === unit && alarm.subject === bearing);
 
-/** Alarms of the plant that nobody has acknowledged, by name only; nothing where there are none. */
+/** The unacknowledged alarms of the plant, by name only; hidden if there are none. */
 export const alarmsToAcknowledge = () => alarmBrief("Not acknowledged", (alarm) => !alarm.is_acknowledged, null, true);
 
 function alarmBrief(title, isMine, sentenceOf = null, isShort = false) {
