@@ -73,7 +73,7 @@ async def address(tmp_path: Path) -> AsyncIterator[str]:
         yield url
     finally:
         process.send_signal(signal.SIGTERM)
-        await process.wait()
+        await process.communicate()  # to the end of the pipe, else uvloop cannot close
 
 
 async def until_all_is_there(url: str) -> None:

@@ -107,9 +107,13 @@ class Program:
         finally:
             self.kill()
             await self.process.wait()
-            # a child that should not have survived would hold its end of the pipe open
-            await asyncio.wait([self._reading], timeout=5)
+            # To the end of both pipes, else uvloop cannot close. A child that should not have
+            # survived would hold them open.
+            assert self.process.stdout is not None
+            rest = asyncio.create_task(self.process.stdout.read())
+            await asyncio.wait([self._reading, rest], timeout=5)
             self._reading.cancel()
+            rest.cancel()
 
     def kill(self) -> None:
         """End it at once, if it has not ended."""

@@ -233,7 +233,7 @@ async def test_what_was_answered_but_not_noted_before_a_crash_comes_again_with_t
     assert program.stdout is not None
     said = await program.stdout.readline()
     program.send_signal(signal.SIGKILL)
-    await program.wait()
+    await program.communicate()
 
     store = room.open_store(prefix="later")
     store.append([], [], [room.news(2)])
