@@ -2,7 +2,8 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from functools import lru_cache
+
+import numpy as np
 
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.client import ModbusClient
@@ -142,6 +143,8 @@ class RingFollower:
     async def poll(self) -> list[SampleBlock]:
         """Read new slots, oldest first, up to 0.5 s of samples; return the accepted samples.
 
+        Each block is a run of consecutive slots, with one cell per slot; the list may be empty.
+
         Raises
         ------
         LinkError, ConfigError
@@ -222,14 +225,21 @@ class RingFollower:
         return slots
 
     def _placed(self, found: Sequence[tuple[int, Slot]], header: RingHeader) -> list[SampleBlock]:
-        blocks = []
+        """Return the accepted slots, with consecutive slots joined to one block."""
+        runs: list[tuple[int, int, Counter[Refusal], list[Slot]]] = []
+        n_samples, follows = header.layout.samples_per_slot, (-1, -1)
         for sequence, slot in found:
             index = self._judge(sequence, slot, header)
             if isinstance(index, Refusal):
-                self._rejected[index] += header.layout.samples_per_slot
+                self._rejected[index] += n_samples
             elif index is not None:
-                blocks.append(self._block(slot, index))
-        return blocks
+                epoch = self._epochs.number
+                if self._rejected or (epoch, index) != follows:
+                    runs.append((epoch, index, self._rejected, []))
+                    self._rejected = Counter()
+                runs[-1][-1].append(slot)
+                follows = (epoch, index + n_samples)
+        return [self._block(*run) for run in runs]
 
     def _judge(self, sequence: int, slot: Slot, header: RingHeader) -> int | Refusal | None:
         """Return the index of a slot's first sample, or the reason for refusing the slot.
@@ -248,23 +258,24 @@ class RingFollower:
             return Refusal.TORN
         return self._timeline.place(slot)
 
-    def _block(self, slot: Slot, index: int) -> SampleBlock:
-        rejected = tuple(Rejection(str(r), n) for r, n in self._rejected.items())
-        self._rejected.clear()
-        is_ok = _verdicts(slot.ok_bits, len(slot.counts))
+    def _block(
+        self, epoch: int, index: int, rejected: Counter[Refusal], slots: Sequence[Slot]
+    ) -> SampleBlock:
+        n_channels, n_samples = slots[0].counts.shape
+        ok_bits = np.array([slot.ok_bits for slot in slots])
         return SampleBlock(
             calibration=self._calibration,
-            epoch=self._epochs.number,
+            epoch=epoch,
             first_index=index,
-            counts=slot.counts,
-            side=SideValues.of(slot.start_ns, is_ok, slot.slow),
-            rejected=rejected,
+            counts=np.concatenate([slot.counts for slot in slots], axis=1),
+            side=SideValues(
+                starts=np.arange(0, len(slots) * n_samples, n_samples),
+                start_ns=np.array([slot.start_ns for slot in slots]),
+                ok=(ok_bits >> np.arange(n_channels)[:, np.newaxis] & 1).astype(np.bool_),
+                slow=np.array([slot.slow for slot in slots], dtype=np.float64).T,
+            ),
+            rejected=tuple(Rejection(str(reason), n) for reason, n in rejected.items()),
         )
-
-
-@lru_cache(maxsize=256)
-def _verdicts(ok_bits: int, n_channels: int) -> tuple[bool, ...]:
-    return tuple(bool(ok_bits >> channel & 1) for channel in range(n_channels))
 
 
 def _overwritten_or_old(slot: Slot, sequence: int, layout: RingLayout) -> bool:
