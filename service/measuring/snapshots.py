@@ -60,8 +60,7 @@ class SnapshotBuilder:
     def report(self, unit: str) -> UnitReport:
         """Return the present state of a unit, or of the alarms of `PLANT` or `SHARED`."""
         built = self._newest(unit)
-        link = replace(self._link(unit), said_s=self._clock.monotonic_s())
-        return UnitReport(unit, link, built.revision, built.snapshot)
+        return UnitReport(unit, self._link(unit), built.revision, built.snapshot)
 
     def _newest(self, unit: str) -> _Built:
         round_ = self._clock.monotonic_s() // REBUILT_EVERY_S
@@ -100,7 +99,7 @@ class SnapshotBuilder:
     def _link(self, unit: str) -> UnitLink:
         """Return a unit's link state and data ages, if measured here, and the process's faults."""
         live = self._live
-        faults = (live.n_unstored, live.store_error)
+        faults = (live.n_unstored, live.store_error, self._clock.monotonic_s())
         if unit not in self._units:
             return UnitLink(UnitStatus(), None, {}, *faults)
         bearings = [bearing.id for bearing in self._units[unit].bearing]
