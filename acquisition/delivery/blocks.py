@@ -142,7 +142,7 @@ class StampCheck:
         if block.epoch != self._epoch:  # the first stamp of an epoch has nothing to disagree with
             self._epoch, self._rate_hz = block.epoch, block.rate_hz
             self._good, self._doubted = (block.first_index, block.start_ns), None
-        if side.n_cells > 1 and self._all_fit(index, side.start_ns):
+        if side.n_cells > 16 and self._all_fit(index, side.start_ns):  # arrays pay for many cells
             return block, None
         stamps = zip(index.tolist(), side.start_ns.tolist(), strict=True)
         found = [self._checked(stamp) for stamp in stamps]
