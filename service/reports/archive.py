@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import islice
@@ -78,9 +78,16 @@ class Occurrence:
     state: EvidenceState
     place: Place | None = None
 
+    @property
+    def bundle(self) -> Place:
+        """Location of the bundle; raises `LookupError` unless the bundle is complete."""
+        if self.place is None:
+            raise LookupError(f"alarm {self.event.identity.id} has no evidence bundle")
+        return self.place
+
 
 class EvidenceArchive:
-    """Archive of evidence bundles. Its methods block: call them in a thread."""
+    """Archive of evidence bundles, read only. Its methods block: call them in a thread."""
 
     def __init__(self, folders: EvidenceFolders, store: Store) -> None:
         self.folders, self._store = folders, store
@@ -92,6 +99,8 @@ class EvidenceArchive:
 
     def occurrences(self, alarm: str, pending: Occurrences, most: int) -> list[Occurrence]:
         """Return the newest occurrences of an alarm, at most `most`, newest first.
+
+        The list is empty if the store has no event that raised or escalated the alarm.
 
         Parameters
         ----------
@@ -141,15 +150,13 @@ class EvidenceArchive:
             text = (place.folder / DOCUMENT).read_bytes()
             found = Evidence.model_validate_json(text)
         except (OSError, ValidationError) as error:
-            why = f"{place.folder.name}: the document cannot be read: {error}"
+            why = f"{place.folder.name}: {DOCUMENT} cannot be read: {error}; restore a copy"
             raise DamagedEvidenceError(why) from error
         content = json.loads(text)
         del content["sha256"]
         if hashlib.sha256(canonical(content)).hexdigest() != found.sha256:
-            name = place.folder.name
-            raise DamagedEvidenceError(
-                f"{name}: the document was changed since it was written; restore a copy"
-            )
+            why = "was changed since it was written: its SHA-256 is not the stored one"
+            raise DamagedEvidenceError(f"{place.folder.name}: {DOCUMENT} {why}; restore a copy")
         return found
 
     def samples(self, found: Occurrence, capturing: Occurrences) -> SamplesState:
@@ -165,22 +172,21 @@ class EvidenceArchive:
         DamagedEvidenceError
             If the document must be read and was changed or damaged.
         """
-        name = (found.event.identity.id, found.event.occurrence)
-        capture = None if found.place is None else linked(found.place.folder)
-        if capture is not None:
-            folder = None if found.place is None else capture_folder(found.place, capture)
+        event, place = found.event, found.place
+        if place is not None and (capture := linked(place.folder)) is not None:
             if capture.state == "lost":
                 return SamplesState.LOST
-            return SamplesState.COMPLETE if folder is not None else SamplesState.REMOVED
-        if name in capturing:
+            is_there = capture_folder(place, capture) is not None
+            return SamplesState.COMPLETE if is_there else SamplesState.REMOVED
+        if (event.identity.id, event.occurrence) in capturing:
             return SamplesState.BEING_MADE
-        was_kept = found.state is not EvidenceState.NOT_KEPT and is_captured(found.event)
-        if was_kept and found.place is not None:
-            was_kept = self.document(found.place).samples_expected
+        was_kept = found.state is not EvidenceState.NOT_KEPT and is_captured(event)
+        if was_kept and place is not None:
+            was_kept = self.document(place).samples_expected
         return SamplesState.LOST if was_kept else SamplesState.NONE
 
     def configuration(self, version: str) -> Path | None:
-        """Return the path of the file of a configuration; None if it does not exist."""
+        """Return the file of a configuration by its version (hash); None if it does not exist."""
         path = self.folders.configurations / f"{version}.json"
         return path if path.is_file() else None
 
@@ -201,8 +207,9 @@ class EvidenceArchive:
         since_ns = kept_since_ns(root)
 
         def state(event: AlarmEvent) -> Occurrence:
-            place = _of_event(event, kept.get(event.occurrence, ()))
-            if place is not None:
+            if own := kept.get(event.occurrence):  # of several, the one of this event
+                moment = compact(event.time_ns)
+                place = max(own, key=lambda each: (each.moment == moment, each.moment))
                 return Occurrence(event, EvidenceState.COMPLETE, place)
             if (alarm, event.occurrence) in pending:
                 return Occurrence(event, EvidenceState.WAITING)
@@ -215,16 +222,11 @@ class EvidenceArchive:
 
 
 def capture_folder(place: Place, capture: CapturePart) -> Path | None:
-    """Return the folder of the recording that a bundle links to; None if it no longer exists."""
+    """Return the folder of the recording that a bundle links to; None if lost or removed."""
     if capture.folder is None or capture.manifest is None:
         return None
     folder = place.folder / capture.folder
     return folder if (folder / MANIFEST).is_file() else None
-
-
-def _of_event(event: AlarmEvent, found: Sequence[Place]) -> Place | None:
-    moment = compact(event.time_ns)
-    return max(found, key=lambda each: (each.moment == moment, each.moment), default=None)
 
 
 README = """Evidence of an alarm, made by padwatch.
@@ -243,7 +245,9 @@ samples/                that recording: padwatch recording info|verify|export re
 def bundle_files(
     archive: EvidenceArchive, found: Occurrence, page: str, has_configuration: bool
 ) -> Mapping[str, Path | bytes]:
-    """Return the files of a bundle by their names in a ZIP file, as paths or content.
+    """Return the files of a bundle by their names in a ZIP file: paths, or content as bytes.
+
+    The recording of the samples is included under ``samples/`` if it still exists.
 
     Parameters
     ----------
@@ -257,16 +261,15 @@ def bundle_files(
     DamagedEvidenceError, LookupError
         If the bundle cannot be read, or does not exist.
     """
-    if found.place is None:
-        raise LookupError(f"alarm {found.event.identity.id} has no evidence bundle")
+    place = found.bundle
     files: dict[str, Path | bytes] = {"README.txt": README.encode(), "report.html": page.encode()}
-    files |= {path.name: path for path in sorted(found.place.folder.iterdir())}
+    files |= {path.name: path for path in sorted(place.folder.iterdir())}
     if has_configuration:
-        configuration = archive.configuration(archive.document(found.place).configuration)
+        configuration = archive.configuration(archive.document(place).configuration)
         if configuration is not None:
             files["configuration.json"] = configuration
-    capture = linked(found.place.folder)
-    samples = None if capture is None else capture_folder(found.place, capture)
+    capture = linked(place.folder)
+    samples = None if capture is None else capture_folder(place, capture)
     if samples is not None:
         files |= {f"samples/{path.name}": path for path in sorted(samples.iterdir())}
     return files

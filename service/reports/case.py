@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 from core.alarms.alarm import AlarmEvent
 from core.machine.unit import Estimator
@@ -19,10 +20,13 @@ class Case:
 
     Parameters
     ----------
+    evidence
+        Document of the bundle.
     spectra, orbits, before
         Tables of spectra, orbits and readings of the film in the bundle; empty if missing.
     after
-        Readings of the film after the alarm, from the store.
+        Readings of the film after the alarm, from the store, with the columns of `before`; empty
+        without readings.
     events
         Events of the occurrence, oldest first.
     samples
@@ -58,7 +62,9 @@ class Case:
 def read_case(
     archive: EvidenceArchive, found: Occurrence, samples: SamplesState, trend_days: float
 ) -> Case:
-    """Read the data of a report; readings of the film up to `trend_days` after the alarm.
+    """Read the data of a report, with readings of the film up to `trend_days` after the alarm.
+
+    Reads files and the store, and blocks meanwhile.
 
     Raises
     ------
@@ -69,32 +75,23 @@ def read_case(
     StoreError
         If the store cannot be read.
     """
-    if found.place is None:
-        raise LookupError(f"alarm {found.event.identity.id} has no evidence bundle")
-    evidence = archive.document(found.place)
+    folder, evidence = found.bundle.folder, archive.document(found.bundle)
     tables = {
-        name: read_table(found.place.folder / name) if name in evidence.files else {}
+        name: read_table(folder / name) if name in evidence.files else {}
         for name in (SPECTRA, ORBITS, TREND)
     }
+    later = archive.events(found.event.identity.id)  # newest first
+    own = takewhile(lambda event: event.occurrence >= found.event.occurrence, later)
+    events = [event for event in own if event.occurrence == found.event.occurrence]
     return Case(
         evidence=evidence,
         spectra=tables[SPECTRA],
         orbits=tables[ORBITS],
         before=tables[TREND],
         after=_after(archive, evidence, trend_days) if tables[TREND] else {},
-        events=_of_occurrence(archive, found)[::-1],
+        events=events[::-1],
         samples=samples,
     )
-
-
-def _of_occurrence(archive: EvidenceArchive, found: Occurrence) -> Sequence[AlarmEvent]:
-    events = []
-    for event in archive.events(found.event.identity.id):
-        if event.occurrence < found.event.occurrence:
-            break
-        if event.occurrence == found.event.occurrence:
-            events.append(event)
-    return events
 
 
 def _after(archive: EvidenceArchive, evidence: Evidence, trend_days: float) -> Columns:

@@ -30,6 +30,7 @@ from service.reports.snapshot import BearingSnapshot, Snapshot
 from service.reports.writer import EvidenceWriter
 from service.runtime.files import write_whole
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS
 from service.settings.configuration import Configuration
 from service.settings.units import UnitSettings
 from service.store.port import StoreError
@@ -37,6 +38,7 @@ from service.store.port import StoreError
 log = structlog.get_logger()
 
 RETRY_S = 10.0
+"""Delay in seconds before a failed write is repeated."""
 
 MAX_BUSY_S = 300.0
 """Maximum time in seconds to write a bundle, or to survey all bundles."""
@@ -57,44 +59,48 @@ class SnapshotTaker:
         self._units, self._live, self._films = units, live, films
 
     def take(self, event: AlarmEvent, now_ns: int, samples_expected: bool) -> Snapshot:
-        """Return a snapshot of the unit of an alarm event; without a unit, of the event alone."""
+        """Return a snapshot of the unit of an alarm event; of the event alone without a unit.
+
+        ``now_ns`` is the time of the snapshot, ns since 1970 UTC; ``samples_expected`` states
+        whether the samples around the alarm are to be recorded.
+        """
         id_, unit = event.identity.unit, self._units.get(event.identity.unit)
         bearing = None if unit is None else bearing_of(unit, event.identity.subject)
         ids = [] if unit is None else [each.id for each in unit.bearing]
         ids.sort(key=lambda each: each != bearing)  # stable: the others keep their order
+        live, films = self._live, self._films
         return Snapshot(
             event=event,
             taken_ns=now_ns,
-            status=None if unit is None else self._live.status(id_),
-            bearings={each: self._bearing(id_, each) for each in ids},
+            status=None if unit is None else live.status(id_),
+            bearings={
+                each: BearingSnapshot(
+                    live.assessment(id_, each), films.newest(id_, each), films.baseline(id_, each)
+                )
+                for each in ids
+            },
             bearing=bearing,
-            rules=self._films.rules(id_),
+            rules=films.rules(id_),
             samples_expected=samples_expected,
-        )
-
-    def _bearing(self, unit: str, bearing: str) -> BearingSnapshot:
-        return BearingSnapshot(
-            self._live.assessment(unit, bearing),
-            self._films.newest(unit, bearing),
-            self._films.baseline(unit, bearing),
         )
 
 
 def bearing_of(unit: UnitSettings, subject: str) -> str | None:
-    """Return the bearing of an alarm subject, a bearing or one of its channels; None if unknown."""
-    for bearing in unit.bearing:
-        channels = {bearing.shaft_x, bearing.shaft_y, bearing.bearing_x, bearing.bearing_y}
-        if subject == bearing.id or subject in channels:
-            return bearing.id
-    for bearing in unit.bearing:
-        others = (bearing.oil_temperature, bearing.gap_x, bearing.gap_y)
-        if subject in (*others, bearing.opposite_x, bearing.opposite_y):
-            return bearing.id
+    """Return the id of the bearing that is, or has the channel, ``subject``; None if none has.
+
+    A bearing with the subject as a required channel precedes one with it as an optional channel.
+    """
+    for keys in (("id", *CHANNEL_KEYS), ("oil_temperature", *GAP_KEYS[:2], *OPTIONAL_CHANNEL_KEYS)):
+        for bearing in unit.bearing:
+            if subject in [getattr(bearing, key) for key in keys]:
+                return bearing.id
     return None
 
 
 class EvidenceCollector:
     """Collector of evidence: takes snapshots on the event loop, and writes them in its thread.
+
+    ``captures`` reports which samples are recorded; ``room`` removes the oldest bundles.
 
     Attributes
     ----------
@@ -138,14 +144,14 @@ class EvidenceCollector:
         return len(self._pending)
 
     def see(self, news: Sequence[AlarmNews]) -> None:
-        """Take a snapshot for each alarm that is raised or escalated."""
+        """Queue a snapshot for each alarm raised or escalated; the oldest is lost if too many."""
         for each in news:
             for event in each.events:
                 if event.change in ANNOUNCED:
                     self._take(event)
 
     def captured(self, outcome: Outcome) -> None:
-        """Queue the outcome of a capture, to link bundles to it."""
+        """Queue the outcome of a capture, complete or lost, to write it into the bundles."""
         self._outcomes.append(outcome)
         self._news.set()
 
@@ -162,7 +168,10 @@ class EvidenceCollector:
         return self._captures.being_made | linking
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Write bundles until cancelled, and retry after errors; call `close` afterwards."""
+        """Write bundles until cancelled, and retry after errors of disk or store.
+
+        Beats ``pulse`` before each write; call `close` afterwards.
+        """
         pulse.beat(MAX_BUSY_S)
         await self._trying(self._begin)
         await self._trying(self._make_room)
@@ -183,9 +192,7 @@ class EvidenceCollector:
             if not await self._write_one():
                 break
         if self._pending:
-            log.error(
-                "evidence not written before the stop is lost", n_occurrences=len(self._pending)
-            )
+            log.error("evidence not written before the stop is lost", n_occurrences=self.n_pending)
         self._thread.shutdown(wait=False)
 
     def _take(self, event: AlarmEvent) -> None:
@@ -247,23 +254,17 @@ class EvidenceCollector:
         """Run a function in the thread; return whether it raised no error of disk or store."""
         try:
             await asyncio.get_running_loop().run_in_executor(self._thread, do)
-        except StoreError as error:
-            self._n_store_attempts += 1
-            self._failed(str(error))
-            return False
-        except OSError as error:
-            self._failed(str(error))
+        except (StoreError, OSError) as error:
+            self._n_store_attempts += isinstance(error, StoreError)
+            self.n_failed += 1
+            if str(error) != self.error:
+                log.error("evidence of alarms is not written", reason=str(error))
+            self.error = str(error)
             return False
         if self.error is not None:
             log.info("evidence of alarms is written again")
         self.error = None
         return True
-
-    def _failed(self, error: str) -> None:
-        self.n_failed += 1
-        if error != self.error:
-            log.error("evidence of alarms is not written", reason=error)
-        self.error = error
 
 
 def keep_configuration(folder: Path, configuration: Configuration) -> None:

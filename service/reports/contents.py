@@ -74,7 +74,10 @@ def bearing_part(found: Assessment, film: FilmNews | None, rules: FilmRules | No
 
 
 def reading_part(name: str, reading: Reading) -> ReadingPart:
-    """Return the part of the document about one reading of the catalogue."""
+    """Return the part about the reading of the quantity ``name`` of the catalogue.
+
+    Numbers that are not finite become None.
+    """
     return ReadingPart(
         value=finite(reading.value),
         unit=BY_NAME[name].unit,
@@ -87,7 +90,10 @@ def reading_part(name: str, reading: Reading) -> ReadingPart:
 
 
 def cell_bounds(cell: Cell | None, grid: CellGrid | None) -> list[tuple[float, float]] | None:
-    """Return the limits (low, high) of a cell along each axis; None without a cell or a grid."""
+    """Return the limits (low, high) of a cell along each axis of its grid; None without them.
+
+    The axes are eccentricity ratio, oil temperature in °C and, if used, attitude in degrees.
+    """
     if cell is None or grid is None:
         return None
     widths = (grid.eccentricity_width, grid.temperature_width_c, grid.attitude_width_deg)
@@ -171,6 +177,7 @@ def _cause(found: Attribution) -> CausePart:
 
 
 MAX_MEMBERS = 2000
+"""Maximum number of readings listed in a comparison."""
 
 
 @dataclass(frozen=True)
@@ -244,10 +251,12 @@ N_EXPECTED = 60
 def comparisons(
     news: FilmNews, baseline: BearingBaseline | None, rules: FilmRules, members: Members | None
 ) -> list[ComparisonPart]:
-    """Return the comparisons of the film of a bearing with its baseline, for both directions.
+    """Return the comparisons of the film of a bearing with its baseline, in x and in y.
 
     Parameters
     ----------
+    baseline
+        Baseline of the bearing; None leaves what is expected empty.
     members
         Readings of the cell; None if the store is unreadable or the cell is unknown.
     """

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from core.alarms.kinds import FILM_STIFFNESS
-from core.change.settings import FilmRules
 from service.reports.contents import bearing_part
 from service.reports.parts import (
     AXES,
@@ -21,7 +20,7 @@ from service.reports.parts import (
     Sha256,
     finite,
 )
-from service.reports.snapshot import BearingSnapshot, Snapshot
+from service.reports.snapshot import Snapshot
 from service.runtime.files import CHUNK
 from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import LEVEL_NAMES, value_unit
@@ -102,7 +101,7 @@ class UnitPart(EvidencePart):
 
 
 class FilePart(EvidencePart):
-    """Size and checksum of a file."""
+    """Size and checksum of one file of the bundle."""
 
     size: int
     """Size in bytes."""
@@ -170,7 +169,10 @@ class Evidence(EvidencePart):
 
 
 def file_part(path: Path) -> FilePart:
-    """Return size and checksum of a file. Raises `OSError` if the file cannot be read."""
+    """Read a file and return its size and checksum.
+
+    Raises `OSError` if the file cannot be read.
+    """
     hashed, size = hashlib.sha256(), 0
     with path.open("rb") as file:
         while chunk := file.read(CHUNK):
@@ -198,7 +200,7 @@ class Maker:
 
 
 def sealed(document: dict[str, Any]) -> bytes:
-    """Return the JSON text, UTF-8, of a document with the SHA-256 of its other keys added."""
+    """Return the fields of an `Evidence` as JSON (UTF-8), with their SHA-256 as key ``sha256``."""
     blank = Evidence(**document, sha256="0" * 64)
     content = blank.model_dump(mode="json", by_alias=True)
     content.pop("sha256")
@@ -225,7 +227,7 @@ def composed(snapshot: Snapshot, maker: Maker) -> dict[str, Any]:
             for each in snapshot.bearings.values()
             if each.assessment is not None
         ],
-        "limits": _limits(snapshot, maker.plant, snapshot.rules),
+        "limits": _limits(snapshot, maker.plant),
         "samples_expected": snapshot.samples_expected,
     }
 
@@ -274,7 +276,8 @@ def _direction(snapshot: Snapshot) -> Direction | None:
     return "y" if kind.endswith("_y") else None
 
 
-def _limits(snapshot: Snapshot, plant: PlantFile, rules: FilmRules | None) -> dict[str, Any]:
+def _limits(snapshot: Snapshot, plant: PlantFile) -> dict[str, Any]:
+    rules = snapshot.rules
     found: dict[str, Any] = {
         "alarms": plant.alarms.model_dump(mode="json"),
         "analysis": plant.analysis.model_dump(mode="json"),
@@ -282,18 +285,17 @@ def _limits(snapshot: Snapshot, plant: PlantFile, rules: FilmRules | None) -> di
     if rules is not None:
         found["films"] = plant.films.model_dump(mode="json")
         found["estimators"] = {each: name.value for each, name in rules.estimators.items()}
-    unit = next((each for each in plant.unit if each.id == snapshot.event.identity.unit), None)
-    bearings = () if unit is None else unit.bearing
-    found["bearing"] = next(
-        (each.model_dump(mode="json") for each in bearings if each.id == snapshot.bearing), None
-    )
+    id_ = snapshot.event.identity.unit
+    bearings = [bearing for unit in plant.unit if unit.id == id_ for bearing in unit.bearing]
+    own = (each.model_dump(mode="json") for each in bearings if each.id == snapshot.bearing)
+    found["bearing"] = next(own, None)
     shown: dict[str, Any] = without_secrets(found)
     return shown
 
 
 def not_known(snapshot: Snapshot) -> list[str]:
-    """Return sentences about data that were not available at the time of the alarm."""
-    own: BearingSnapshot | None = snapshot.bearings.get(snapshot.bearing or "")
+    """Return sentences about data that were missing at the time of the alarm; empty if none."""
+    own = snapshot.bearings.get(snapshot.bearing or "")
     found = [
         f"bearing {each} had no result yet"
         for each, known in snapshot.bearings.items()

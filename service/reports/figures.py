@@ -15,7 +15,7 @@ from service.reports.tables import Columns
 
 @dataclass(frozen=True)
 class Figure:
-    """Figure of a report: a plot with a caption."""
+    """Figure of a report: a plot and its caption, the text ``sentence``."""
 
     plot: Plot
     sentence: str
@@ -28,7 +28,10 @@ class Figure:
 
 
 def spectra_figure(case: Case) -> Figure | None:
-    """Return the figure of the spectra of shaft and bearing; None without spectra."""
+    """Return the figure of the spectra of shaft and bearing in the direction of the alarm.
+
+    None without a bearing, with fewer than three lines, or if all amplitudes are zero.
+    """
     bearing, axis = case.bearing, case.direction
     rows = _rows(case.spectra, case.evidence.bearing)
     if bearing is None or len(rows) < 3:
@@ -77,7 +80,7 @@ def _mark_orders(plot: Plot, bearing: BearingPart) -> None:
 
 
 def orbit_figure(case: Case) -> Figure | None:
-    """Return the figure of the newest shaft orbits; None without samples."""
+    """Return the figure of the newest shaft orbits; None with fewer than two samples."""
     rows = _rows(case.orbits, case.evidence.bearing)
     if len(rows) < 2:
         return None
@@ -115,7 +118,7 @@ LOOKS = {"none": "unknown", "borrowed": "borrowed", "own": "known"}
 
 
 def condition_figure(case: Case) -> Figure | None:
-    """Return the figure of stiffness against eccentricity; None without a comparison."""
+    """Return the figure of stiffness against eccentricity; None without a comparison or numbers."""
     found = case.comparison
     if found is None:
         return None
@@ -215,12 +218,14 @@ SHORTEST_S, MARGIN = 3600.0, 0.04
 
 
 def trend_figure(case: Case) -> Figure | None:
-    """Return the figure of stiffness against time, with its limits; None without readings."""
-    found = _trend(case)
-    room = None if found is None else around(_heights(case, found))
-    if found is None or room is None:
+    """Return the figure of stiffness against time, with its limits; None without stiffnesses."""
+    found, axis = _trend(case), case.direction
+    if found is None:
         return None
-    axis = case.direction
+    own = None if case.comparison is None else case.comparison.stiffness_n_per_m
+    room = around([own, *found.stiffness, *found.lows, *found.highs])
+    if room is None:
+        return None
     plot = Plot(
         *(720.0, 126.0),
         TimeScale(found.first_s, found.last_s),
@@ -228,8 +233,7 @@ def trend_figure(case: Case) -> Figure | None:
         *("Time, UTC", f"Stiffness {axis}, GN/m", "Stiffness over time", "trend"),
     )
     _draw(plot, found)
-    if case.comparison is not None:
-        plot.points([found.alarm_s], [case.comparison.stiffness_n_per_m], "alarm", 2.2)
+    plot.points([found.alarm_s], [own], "alarm", 2.2)
     days = (found.last_s - found.first_s) / DAY_S
     return Figure(
         plot,
@@ -275,15 +279,19 @@ class _Trend:
 
 
 def _trend(case: Case) -> _Trend | None:
-    table, axis = _joined(case.before, case.after), case.direction
+    table = {name: [*old, *case.after.get(name, ())] for name, old in case.before.items()}
     if not table.get("time_ns"):
         return None
-    stiffness = finite_of(table[f"stiffness_n_per_m_{axis}"])
+    stiffness = finite_of(table[f"stiffness_n_per_m_{case.direction}"])
+    deviation = table[f"deviation_{case.direction}"]
     return _Trend(
         alarm_s=case.evidence.alarm.time_ns / NS_PER_S,
         time=[time / NS_PER_S for time in table["time_ns"]],
         stiffness=stiffness,
-        expected=_expected(stiffness, table[f"deviation_{axis}"]),
+        expected=[
+            None if k is None or by is None else k * math.exp(-by)
+            for k, by in zip(stiffness, deviation, strict=True)
+        ],
         is_settled=[bool(each) for each in table["is_settled"]],
         limit=case.evidence.limits["films"]["change"]["alert_change"],
     )
@@ -298,22 +306,6 @@ def _draw(plot: Plot, found: _Trend) -> None:
     plot.dots(time, _where(k, before), "today")
     plot.dots(time, _where(k, after), "alarm")
     plot.upright(found.alarm_s, "at")
-
-
-def _heights(case: Case, found: _Trend) -> list[float | None]:
-    own = None if case.comparison is None else case.comparison.stiffness_n_per_m
-    return [own, *found.stiffness, *found.lows, *found.highs]
-
-
-def _joined(before: Columns, after: Columns) -> Columns:
-    return {name: [*column, *after.get(name, ())] for name, column in before.items()}
-
-
-def _expected(k: Values, deviation: Values) -> list[float | None]:
-    return [
-        None if value is None or by is None else value * math.exp(-by)
-        for value, by in zip(k, deviation, strict=True)
-    ]
 
 
 def _times(values: Values, factor: float) -> list[float | None]:

@@ -34,7 +34,10 @@ UNIT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 
 @dataclass(frozen=True)
 class Place:
-    """Location of a bundle, and its alarm; `moment` is the time in the name of the folder."""
+    """Location of a bundle, and its alarm.
+
+    `moment` is the UTC time of the event in the folder's name, as `compact` writes it.
+    """
 
     folder: Path
     unit: str
@@ -50,21 +53,24 @@ class Place:
 
 
 def place_of(root: Path, event: AlarmEvent) -> Place:
-    """Return the location of the bundle of an alarm event."""
+    """Return the location of the bundle of an alarm event, whether or not the bundle exists."""
     own, moment = event.identity, compact(event.time_ns)
     name = f"{moment}-{own.subject}-{own.kind}-{event.occurrence}"
     return Place(root / own.unit / name, own.unit, own.subject, own.kind, event.occurrence, moment)
 
 
 def places(root: Path, unit: str | None = None) -> list[Place]:
-    """Return the locations of all complete bundles, optionally of one unit, oldest first."""
+    """Return the locations of the complete bundles of a unit (None: of all), oldest first."""
     units = [root / unit] if unit else sorted(path for path in root.glob("*") if path.is_dir())
     found = (_place(path) for each in units if each.is_dir() for path in each.iterdir())
     return sorted((each for each in found if each), key=lambda each: (each.moment, each.folder))
 
 
 def note_beginning(root: Path, now_ns: int) -> None:
-    """Write the time since which evidence is kept, once. Raises `OSError` if this fails."""
+    """Write the time since which evidence is kept, ns since 1970 UTC, unless it is written.
+
+    Raises `OSError` if the file or its folder cannot be written.
+    """
     path = root / KEPT_SINCE
     if not path.exists():
         root.mkdir(parents=True, exist_ok=True)
@@ -89,7 +95,7 @@ def clear_leftovers(root: Path) -> list[Path]:
 
 
 def removed(root: Path, unit: str) -> list[str]:
-    """Return the folder names of a unit's bundles that were removed to free space, in order."""
+    """Return the folder names of a unit's bundles that were removed to free space, oldest first."""
     path = root / unit / REMOVED
     return path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
 
@@ -125,12 +131,12 @@ class CapturePart(EvidencePart):
 
 
 def link(folder: Path, capture: Path) -> None:
-    """Write the link from a bundle to the recording of its samples.
+    """Write the link from the bundle in `folder` to the recording of its samples in `capture`.
 
     Raises
     ------
     OSError
-        If the link cannot be written.
+        If the manifest cannot be read or the link cannot be written.
     """
     relative = Path("../../..") / capture.parent.name / capture.name
     manifest = file_part(capture / MANIFEST)
@@ -160,7 +166,7 @@ def linked(folder: Path) -> CapturePart | None:
 
 
 def captures_in_use(root: Path) -> frozenset[str]:
-    """Return the names of the recordings that bundles link to."""
+    """Return the folder names of the recordings that bundles link to."""
     parts = (linked(each.folder) for each in places(root))
     return frozenset(Path(part.folder).name for part in parts if part and part.folder)
 
@@ -208,7 +214,7 @@ def _write_link(folder: Path, part: CapturePart) -> None:
 
 @dataclass(frozen=True)
 class EvidenceFolders:
-    """Folders of bundles, captures and configurations, below the data folder."""
+    """Folders of bundles (`evidence`), captures and configurations, below the data folder."""
 
     evidence: Path
     captures: Path

@@ -121,7 +121,10 @@ def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
 
 
 def value_words(case: Case) -> str:
-    """Return value and limit of the alarm; for film alarms also the newest deviation."""
+    """Return value and limit of the alarm; for film alarms also the newest deviation.
+
+    Without a value the text is "no number".
+    """
     alarm, found = case.evidence.alarm, finding(case)
     if alarm.kind == FILM_STIFFNESS and found is not None and found.change_percent is not None:
         limit = "" if alarm.limit is None else f"; limit {percent(alarm.limit)}"
@@ -134,7 +137,10 @@ def value_words(case: Case) -> str:
 
 
 def change_words(found: FindingPart) -> str:
-    """Return the newest deviation and the confirmed mean change of a film, in percent."""
+    """Return the newest deviation and the confirmed mean change of a film, in percent.
+
+    A dash stands for both if neither is known.
+    """
     words = []
     if found.deviation_percent is not None:
         interval = found.deviation_95_percent
@@ -146,12 +152,12 @@ def change_words(found: FindingPart) -> str:
 
 
 def percent(number: float) -> str:
-    """Return a number of percent as text, with its sign."""
+    """Return a number of percent as text: one decimal, with its sign."""
     return f"{number:+.1f} %".replace("-", "−")
 
 
 def condition_words(bearing: BearingPart) -> str:
-    """Return the operating condition of the bearing as text."""
+    """Return operating state and condition of the bearing as text; unknown values are omitted."""
     words = []
     if bearing.condition is not None:
         settled = "" if bearing.condition.is_settled else ", not settled"
@@ -201,11 +207,8 @@ def story(case: Case) -> str:
     moved = [each for each in findings if each.level and each.change_percent is not None]
     if case.evidence.alarm.kind != FILM_STIFFNESS or found is None or not moved:
         return ""
-    hours = (
-        ""
-        if found.time_scale_h is None
-        else f", averaged over {found.time_scale_h:g} running hours"
-    )
+    scale_h = found.time_scale_h
+    hours = "" if scale_h is None else f", averaged over {scale_h:g} running hours"
     changes = "; ".join(f"in {each.direction} {change_words(each)}" for each in moved)
     sentence = f"Stiffness of the film against the baseline under this condition: {changes}{hours}."
     cause = found.attribution
@@ -233,7 +236,7 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def estimators_table(bearing: BearingPart) -> str:
-    """Return the HTML table of the stiffness estimates of all estimators."""
+    """Return the HTML table of all stiffness estimates; one without a value shows its reason."""
     heads = ["Estimator"]
     for axis in AXES:
         heads += [f"k {axis}, GN/m (± random ± systematic, std)", f"coherence {axis}"]
@@ -249,7 +252,7 @@ def estimators_table(bearing: BearingPart) -> str:
 
 
 def films_table(evidence: Evidence) -> str:
-    """Return the HTML table of the films of all bearings at the time of the alarm."""
+    """Return the HTML table of all films at the time of the alarm; empty if none was judged."""
     found = [each for each in evidence.bearings if each.film is not None]
     if not found:
         return ""
@@ -259,7 +262,7 @@ def films_table(evidence: Evidence) -> str:
 
 
 def events_table(case: Case) -> str:
-    """Return the HTML table of the newest events of the occurrence."""
+    """Return the HTML table of the newest `MAX_EVENTS` events of the occurrence."""
     shown = list(case.events)[-MAX_EVENTS:]
     n_more = len(case.events) - len(shown)
     title = "What has happened" + (f" ({n_more} earlier not shown)" if n_more else "")
@@ -305,17 +308,14 @@ def _said(found: FindingPart) -> str:
 
 def _estimate(found: EstimatorPart) -> tuple[str, str]:
     coherence = "–" if found.coherence is None else f"{found.coherence:.3f}"
-    return _stiffness(found.stiffness), coherence
-
-
-def _stiffness(reading: ReadingPart) -> str:
+    reading = found.stiffness
     if reading.value is None:
-        return plain(reading.reason)
+        return plain(reading.reason), coherence
     parts = [f"{reading.value / GN_PER_M:.4f}"]
     for u in (reading.u_random, reading.u_systematic):
         parts.append("±?" if u is None else f"±{u / GN_PER_M:.4f}")
     doubt = "" if reading.level == "good" else f" ({plain(reading.reason)})"
-    return " ".join(parts) + doubt
+    return " ".join(parts) + doubt, coherence
 
 
 def _event(event: AlarmEvent) -> tuple[str, str, str, str]:
@@ -333,13 +333,17 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-a
 
 
 def report_page(case: Case, now_ns: int) -> str:
-    """Return the report of an occurrence, made at the time `now_ns`, as an HTML page."""
+    """Return the report of an occurrence as an HTML page, made at `now_ns`, ns since 1970 UTC."""
     evidence, bearing = case.evidence, case.bearing
     alarm, level = evidence.alarm, evidence.alarm.level or "alert"
     title = escape(f"{alarm.unit} {alarm.subject}: {kind_words(alarm.kind, alarm.directions)}")
+    pairs = "".join(
+        f"<dt>{escape(name)}</dt><dd>{escape(shortened(words))}</dd>"
+        for name, words in facts(case, day_and_time(now_ns))
+    )
     body = [
         f'<header><h1>{title}</h1><span class="badge {level}">{level.upper()}</span></header>',
-        _facts(case, now_ns),
+        f"<dl>{pairs}</dl>",
         f'<p class="story">{escape(story(case))}</p>',
         *figures(case),
         estimators_table(bearing) if bearing is not None else "",
@@ -354,11 +358,3 @@ def report_page(case: Case, now_ns: int) -> str:
         f"<title>{title}, {escape(evidence.alarm.time)}</title><style>{STYLE}</style></head>"
         f"<body>{''.join(body)}</body></html>\n"
     )
-
-
-def _facts(case: Case, now_ns: int) -> str:
-    pairs = "".join(
-        f"<dt>{escape(name)}</dt><dd>{escape(shortened(words))}</dd>"
-        for name, words in facts(case, day_and_time(now_ns))
-    )
-    return f"<dl>{pairs}</dl>"

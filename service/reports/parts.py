@@ -109,7 +109,7 @@ class BudgetLinePart(EvidencePart):
     """Change of the result per unit of the contribution."""
 
     contribution: float
-    """Standard uncertainty of the result due to this contribution alone."""
+    """Standard uncertainty of the result due to this alone, in the unit of the result."""
 
 
 class WindowPart(EvidencePart):
@@ -154,7 +154,7 @@ class ConditionPart(EvidencePart):
 
 
 class CausePart(EvidencePart):
-    """Cause to which a change is attributed."""
+    """Cause of a stiffness change, as attributed by comparing shaft and bearing motion."""
 
     cause: Annotated[str, Field(examples=["film"])]
     """Cause: film, oil, bracket_or_transducer or unknown."""
@@ -376,16 +376,16 @@ class ComparisonPart(EvidencePart):
     """Measured stiffness, in N/m; null if missing."""
 
     u_random: float | None
-    """Random standard uncertainty of ln stiffness."""
+    """Random standard uncertainty of ln stiffness; null if unknown."""
 
     eccentricity_ratio: float | None
-    """Eccentricity ratio of the reading."""
+    """Eccentricity ratio of the reading; null if unknown."""
 
     oil_temperature_c: float | None
-    """Oil temperature of the reading, in °C."""
+    """Oil temperature of the reading, in °C; null if unknown."""
 
     attitude_deg: float | None
-    """Attitude angle of the reading, in degrees."""
+    """Attitude angle of the reading, in degrees; null if unknown."""
 
     expected_n_per_m: float | None
     """Expected stiffness by the baseline, in N/m; null if unknown for this condition."""
@@ -397,10 +397,11 @@ class ComparisonPart(EvidencePart):
     """Cell of the reading; null if the baseline has no readings in this cell."""
 
     bounds: list[tuple[float, float]] | None
-    """Limits of the cell in eccentricity, oil temperature and, if used, attitude."""
+    """Limits [low, high] of the cell in eccentricity ratio, oil temperature in °C and, if used,
+    attitude in degrees; null if the cell is unknown."""
 
     time_scales: list[TimeScalePart]
-    """Mean deviations over all time scales."""
+    """Mean deviations over all time scales; empty without a baseline with these time scales."""
 
     members: MembersPart | None
     """Readings in the cell; null if the store was unreadable or the cell is unknown."""
@@ -409,4 +410,4 @@ class ComparisonPart(EvidencePart):
     """Expected stiffness; null without a baseline."""
 
     map: list[CellPart]
-    """All cells of the baseline."""
+    """All cells of the baseline; empty without a baseline."""

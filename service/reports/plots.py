@@ -30,7 +30,7 @@ class Scale:
     divisor: float = 1.0
 
     def at(self, value: float) -> float:
-        """Return the position of a value, 0 to 1 within the axis."""
+        """Return the position of a value on the axis: 0 at `low`, 1 at `high`; it may be beyond."""
         if self.is_log:
             value = max(value, 1e-300)
             return math.log(value / self.low) / math.log(self.high / self.low)
@@ -75,7 +75,10 @@ class TimeScale:
 
 
 def around(values: Iterable[float | None], margin: float = 0.06) -> tuple[float, float] | None:
-    """Return the range of finite values, extended by `margin` of it at both ends; None if none."""
+    """Return the range (low, high) of finite values, wider by the share `margin` at both ends.
+
+    A range of zero width is widened by 5 % of its value. None if no value is finite.
+    """
     found = [value for value in values if value is not None and math.isfinite(value)]
     if not found:
         return None
@@ -187,10 +190,6 @@ class Plot:
         self._marks.append(
             f'<text class="note" x="{place}" y="{y:g}" dx="2">{escape(words)}</text>'
         )
-
-    def level(self, y: float, look: str) -> None:
-        """Add a horizontal line across the plot."""
-        self._marks.append(f'<path class="{look}" d="M{LEFT:g} {self._y(y)}H{self._right:g}"/>')
 
     def svg(self) -> str:
         """Return the plot as SVG."""

@@ -69,7 +69,10 @@ class EvidenceRetention:
         self._surveyed_s: float | None = None
 
     def note(self, place: Place) -> None:
-        """Update the cached size of a bundle after it was written or a file was added to it."""
+        """Update the cached size of a bundle after it was written or a file was added to it.
+
+        Raises `OSError` if the folder cannot be read.
+        """
         own = self._sizes.setdefault(place.alarm, {})
         held = _Held(place.folder.name, place.unit)
         size = sum(file.stat().st_size for file in place.folder.iterdir())

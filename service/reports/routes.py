@@ -94,8 +94,9 @@ class Found:
 class EvidenceService:
     """Service of the evidence routes: lists evidence, and creates reports and bundles.
 
-    `status` returns the state of the collector, or None if no evidence is collected. All methods
-    raise StoreError if the store cannot be read.
+    `status` returns the state of the collector, or None if no evidence is collected; a report shows
+    readings up to `trend_days` after the alarm. All methods raise StoreError if the store cannot be
+    read.
     """
 
     def __init__(
@@ -107,8 +108,7 @@ class EvidenceService:
         downloads: Downloads,
     ) -> None:
         self.archive, self._status, self._clock = archive, status, clock
-        self._downloads = downloads
-        self._trend_days = trend_days
+        self._downloads, self._trend_days = downloads, trend_days
 
     async def occurrences(self, alarm: str, most: int) -> list[Found]:
         """Return the newest occurrences of an alarm, at most `most`, newest first."""
@@ -172,11 +172,6 @@ class EvidenceService:
 BACK = '<nav><a href="/#/alarms">Alarm list</a></nav>'
 
 
-def is_there(found: Occurrence) -> bool:
-    """Return whether an occurrence has a complete bundle."""
-    return found.state is EvidenceState.COMPLETE
-
-
 ID = re.compile(r"([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([a-z0-9_]+)")
 
 Number = Annotated[int, Path(ge=1, le=10**12, description="Occurrence number.", examples=[3])]
@@ -228,11 +223,8 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
         """Return the evidence document: the state of the unit when the alarm was raised."""
         held = _there(desk)
         found = await _complete(context, held, alarm, occurrence)
-        place = found.place
-        if place is None:  # never: complete evidence has a place
-            raise ProblemError(404, "No evidence", "the bundle does not exist")
         try:
-            return await asyncio.to_thread(held.archive.document, place)
+            return await asyncio.to_thread(held.archive.document, found.bundle)
         except DamagedEvidenceError as error:
             raise _damaged(error) from error
 

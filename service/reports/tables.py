@@ -36,31 +36,37 @@ class TableError(Exception):
 
 
 def spectra_table(found: Iterable[Assessment]) -> bytes:
-    """Return the Parquet table of spectra, amplitudes and coherence of one or more bearings."""
+    """Return the spectra of one or more bearings as a Parquet table, one row per spectral line.
+
+    The columns are bearing, frequency in Hz, amplitudes in µm zero-to-peak, real and imaginary
+    parts of the cross-spectra in µm², and the squared coherence of shaft and bearing in x and y.
+    """
     tables = [_spectrum(each.bearing, each.spectrum) for each in found]
     return _written(pa.concat_tables(tables))
 
 
 def orbits_table(found: Iterable[Assessment]) -> bytes | None:
-    """Return the Parquet table of the newest shaft orbits of bearings; None without samples."""
-    tables = []
-    for each in found:
-        orbit = each.orbit
-        if orbit is None:
-            continue
-        n = orbit.shaft_x_um.size
-        columns = {
-            "bearing": pa.array([each.bearing] * n).dictionary_encode(),
-            "time_s": np.arange(n) / orbit.rate_hz,
-            "shaft_x_um": orbit.shaft_x_um,
-            "shaft_y_um": orbit.shaft_y_um,
-        }
-        tables.append(pa.table(columns))
+    """Return the newest shaft orbits of bearings as a Parquet table; None without samples.
+
+    The columns are bearing, time in s from the first sample, and shaft motion in x and y in µm.
+    """
+    tables = [
+        pa.table(
+            {
+                "bearing": pa.array([each.bearing] * orbit.shaft_x_um.size).dictionary_encode(),
+                "time_s": np.arange(orbit.shaft_x_um.size) / orbit.rate_hz,
+                "shaft_x_um": orbit.shaft_x_um,
+                "shaft_y_um": orbit.shaft_y_um,
+            }
+        )
+        for each in found
+        if (orbit := each.orbit) is not None
+    ]
     return _written(pa.concat_tables(tables)) if tables else None
 
 
 def trend_table(found: FilmHistory) -> bytes:
-    """Return the Parquet table of readings of a film, oldest first."""
+    """Return readings of a film, oldest first, as a Parquet table; NaN becomes null."""
     return _written(_trend(found))
 
 
@@ -98,13 +104,16 @@ def _trend(found: FilmHistory) -> "pa.Table":
 
 
 def trend_columns(found: FilmHistory) -> Columns:
-    """Return readings of a film as lists by column."""
+    """Return the columns of `trend_table` as lists; NaN becomes None."""
     columns: Columns = _trend(found).to_pydict()
     return columns
 
 
 def read_table(path: Path) -> Columns:
-    """Return a Parquet table of a bundle; raise `TableError` if it cannot be read."""
+    """Read a Parquet table of a bundle; null becomes None.
+
+    Raises `TableError` if the file is missing or cannot be read.
+    """
     try:
         columns: Columns = pq.read_table(path, memory_map=False).to_pydict()
     except (OSError, pa.ArrowException) as error:

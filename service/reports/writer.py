@@ -4,7 +4,6 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
-from core.monitor.assessment import Assessment
 from core.units import DAY_NS
 from service.reports.contents import cell_of, comparisons, members_of
 from service.reports.document import Maker, composed, file_part, not_known, sealed
@@ -56,16 +55,15 @@ class EvidenceWriter:
         return place
 
     def _fill(self, folder: Path, snapshot: Snapshot, with_history: bool) -> None:
-        missing = (
-            [] if with_history else ["the store could not be read: no readings of cell and trend"]
-        )
+        missing = ["the store could not be read: no readings of cell and trend"]
         compared = self._compared(snapshot, with_history)
         for name, content in self._tables(snapshot, with_history).items():
             write_synced(folder / name, content)
-        files = {path.name: file_part(path) for path in sorted(folder.iterdir())}
-        document = composed(snapshot, self._maker)
-        document["comparisons"], document["missing"] = compared, [*missing, *not_known(snapshot)]
-        document["files"] = files
+        document = composed(snapshot, self._maker) | {
+            "comparisons": compared,
+            "missing": [*([] if with_history else missing), *not_known(snapshot)],
+            "files": {path.name: file_part(path) for path in sorted(folder.iterdir())},
+        }
         write_synced(folder / DOCUMENT, sealed(document))
 
     def _compared(self, snapshot: Snapshot, with_history: bool) -> list[ComparisonPart]:
@@ -78,7 +76,7 @@ class EvidenceWriter:
         return comparisons(found.film, found.baseline, snapshot.rules, members)
 
     def _tables(self, snapshot: Snapshot, with_history: bool) -> dict[str, bytes]:
-        found = _assessments(snapshot)
+        found = [b.assessment for b in snapshot.bearings.values() if b.assessment is not None]
         tables = {SPECTRA: spectra_table(found), ORBITS: orbits_table(found)} if found else {}
         query = self._trend_query(snapshot)
         if with_history and query is not None:
@@ -89,11 +87,6 @@ class EvidenceWriter:
         bearing, rules = snapshot.bearing, snapshot.rules
         if bearing is None or rules is None or bearing not in rules.estimators:
             return None
-        event, days = snapshot.event, self._limits.trend_days
-        start_ns = event.time_ns - round(days * DAY_NS)
-        unit = event.identity.unit
-        return FilmQuery(unit, bearing, rules.estimators[bearing], start_ns, event.time_ns + 1)
-
-
-def _assessments(snapshot: Snapshot) -> list[Assessment]:
-    return [each.assessment for each in snapshot.bearings.values() if each.assessment is not None]
+        end_ns, unit = snapshot.event.time_ns, snapshot.event.identity.unit
+        start_ns = end_ns - round(self._limits.trend_days * DAY_NS)
+        return FilmQuery(unit, bearing, rules.estimators[bearing], start_ns, end_ns + 1)

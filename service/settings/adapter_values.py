@@ -55,19 +55,17 @@ Link = TypeVar("Link", bound=LinkSettings)
 
 
 def link_settings(kind: type[Link], source: ModbusLinkSettings) -> Link:
-    """Return the settings of a Modbus device as the `LinkSettings` of one kind of adapter."""
+    """Return the settings of a Modbus device as ``kind``, the link settings of its adapter.
+
+    Unless set, `requests_in_flight` is `RING_REQUESTS_IN_FLIGHT` for a block ring on TCP, else 1.
+    """
     is_per_reply = isinstance(source, MappedDeviceSettings) and source.connection == "per_reply"
+    is_ring = isinstance(source, ModbusRingSettings) and source.host is not None
     own = {
         "transport": transport_of(source),
         "identity": identity_of(source.identity),
         "keeps_connection": not is_per_reply,
-        "requests_in_flight": _requests_in_flight(source),
+        "requests_in_flight": source.requests_in_flight
+        or (RING_REQUESTS_IN_FLIGHT if is_ring else 1),
     }
     return kind(**source.values_for(kind) | own)
-
-
-def _requests_in_flight(source: ModbusLinkSettings) -> int:
-    if source.requests_in_flight is not None:
-        return source.requests_in_flight
-    is_ring = isinstance(source, ModbusRingSettings) and source.host is not None
-    return RING_REQUESTS_IN_FLIGHT if is_ring else 1

@@ -101,7 +101,8 @@ else:
 def kind_words(kind: str, directions: str = "") -> str:
     """Return the label of an alarm kind in lower case: "film stiffness changed, x and y".
 
-    The label of an unknown kind is its name without underscores.
+    ``directions`` are the letters of the directions ("xy"), or empty. The label of an unknown kind
+    is its name without underscores.
     """
     found = ALARM_KINDS.get(kind)
     name = kind.replace("_", " ") if found is None else found.label
@@ -110,7 +111,7 @@ def kind_words(kind: str, directions: str = "") -> str:
 
 
 def value_unit(kind: str) -> str | None:
-    """Return the unit of the values of an alarm kind; None if the kind has no value."""
+    """Return the unit of the values of an alarm kind; None without a value or if unknown."""
     found = ALARM_KINDS.get(kind)
     return None if found is None else found.unit
 

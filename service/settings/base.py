@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import fields
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, StringConstraints, field_validator
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, field_validator
 
 CONTROL = re.compile(r"[\x00-\x08\x0a-\x1f\x7f-\x9f]")
 """Control characters except the tab, which is a valid column delimiter of an imported file."""
@@ -16,6 +16,8 @@ class MisfitError(ValueError):
 
     Parameters
     ----------
+    message
+        Predicate of the value, such as "must be above 0", without the value and its key.
     at
         Location of the value relative to the model that raises the error: keys and array indices.
     """
@@ -26,7 +28,7 @@ class MisfitError(ValueError):
 
 
 class MissingError(MisfitError):
-    """Validation error: a key is missing that other keys of the file require."""
+    """Validation error: a key is missing that other keys require; ``at`` ends with the key."""
 
 
 class SecretMisfitError(MisfitError):
@@ -35,6 +37,10 @@ class SecretMisfitError(MisfitError):
 
 Identifier = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}$")]
 """Identifier of letters, digits, dot, dash and underscore; at most 32 characters."""
+
+
+Share = Annotated[float, Field(gt=0.0, lt=1.0)]
+"""Fraction between 0 and 1, both excluded."""
 
 
 class Settings(BaseModel):
@@ -53,7 +59,7 @@ class Settings(BaseModel):
         return value
 
     def values_for(self, kind: type[Any]) -> dict[str, Any]:
-        """Return the values of the settings that have the names of fields of a dataclass."""
+        """Return the values of the keys that are fields of the dataclass ``kind``, by key."""
         return self.model_dump(include={field.name for field in fields(kind)})
 
 

@@ -62,11 +62,11 @@ class BearingSettings(Settings):
     shaft_x. Example: "ujb_gap_x"."""
 
     gap_y: Identifier | None = None
-    """Slow channel (mm) of the gap in y; example: "ujb_gap_y"."""
+    """Slow channel (mm) of the gap in y, as gap_x; example: "ujb_gap_y"."""
 
     opposite_x: Identifier | None = None
     """Channel of the proximity probe opposite to shaft_x. The two probes together separate shaft
-    position from thermal growth. Example: "ujb_shaft_minus_x"."""
+    position from thermal growth; none by default. Example: "ujb_shaft_minus_x"."""
 
     opposite_y: Identifier | None = None
     """Channel of the proximity probe opposite to shaft_y; example: "ujb_shaft_minus_y"."""
@@ -76,7 +76,8 @@ class BearingSettings(Settings):
     Example: "ujb_gap_minus_x"."""
 
     opposite_gap_y: Identifier | None = None
-    """Slow channel (mm) of the gap opposite to y; example: "ujb_gap_minus_y"."""
+    """Slow channel (mm) of the gap opposite to y, as opposite_gap_x; example:
+    "ujb_gap_minus_y"."""
 
     opposite_reference_um: MicrometrePair | None = None
     """Gaps [x, y] in µm of the opposite probes with the shaft centred; example:
@@ -144,7 +145,7 @@ class BearingSettings(Settings):
         probes = (self.opposite_x, self.opposite_y)
         if any(probes) != (self.opposite_reference_um is not None):
             raise MisfitError(
-                "must be given if and only if opposite_x or opposite_y is given",
+                "must be given if opposite_x or opposite_y is given, and only then",
                 "opposite_reference_um",
             )
         if self.alarms.oil_temperature_c is not None and self.oil_temperature is None:

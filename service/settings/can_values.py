@@ -28,8 +28,11 @@ def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSett
     if source.profile is not None:
         return daq_settings(can_shape_of(unit, source), link, units, **others)
     channels = tuple(
-        CanChannel(channel.id, engineering_unit, _listed(source.signals[channel.id]))
+        CanChannel(
+            channel.id, engineering_unit, signals if isinstance(signals, tuple) else (signals,)
+        )
         for channel, engineering_unit in zip(unit.channel, units, strict=True)
+        for signals in [source.signals[channel.id]]
     )
     slow = tuple(CanSlowChannel(s.id, s.unit, source.slow[s.id]) for s in unit.slow_channel)
     own = {"link": link, "dbc": source.dbc_path, "channels": channels, "slow": slow}
@@ -107,10 +110,6 @@ def can_daq_of(
             ' "socket://127.0.0.1:0", "pty" or the path of a link to a pty'
         )
     return SlcanTcpServer(device, clock, host=host, port=int(port), **waiting)
-
-
-def _listed(signals: str | tuple[str, ...]) -> tuple[str, ...]:
-    return (signals,) if isinstance(signals, str) else signals
 
 
 def require_dbc_fits(unit: UnitSettings) -> None:

@@ -222,8 +222,8 @@ class ChannelSettings(Settings):
         for key in keys:
             if getattr(self, key) is None:
                 raise MissingError("is missing", key)
-        if self.unit_per_count == 0.0 or not math.isfinite(self.unit_per_count or 0.0):
-            raise MisfitError("must be a number other than 0", "unit_per_count")
+        if self.unit_per_count == 0.0:
+            raise MisfitError("must not be 0", "unit_per_count")
         low, high = keys[1:]
         if not getattr(self, low) < getattr(self, high):
             raise MisfitError(f"must be below {high} = {getattr(self, high):g}", low)
@@ -287,7 +287,7 @@ class ChannelSettings(Settings):
 
     @property
     def floor(self) -> float:
-        """Value of `line_floor`; by default the noise of a spectral line of the transducer."""
+        """Value of `line_floor` or the transducer's default, 0-pk in the unit of `measurand`."""
         return LINE_FLOORS[self.transducer] if self.line_floor is None else self.line_floor
 
     @property
@@ -299,7 +299,10 @@ class ChannelSettings(Settings):
 
 
 class SlowChannelSettings(Settings):
-    """Settings of a slow channel (no waveform); slow channels are in the order of the device."""
+    """Settings of a slow channel, which has single values instead of a waveform.
+
+    Slow channels are listed in the order of the device.
+    """
 
     id: Identifier
     """Id of the slow channel, unique within the unit; example: "ujb_oil_temperature"."""
@@ -308,10 +311,12 @@ class SlowChannelSettings(Settings):
     """Unit of the values that the device sends: "r/min", "MW", "degC" or "mm"."""
 
     minimum: float
-    """Lower limit of valid values; lower values are rejected as out of range. Example: -10.0."""
+    """Lower limit of valid values, in `unit`; lower values are rejected as out of range. Example:
+    -10.0."""
 
     maximum: float
-    """Upper limit of valid values; higher values are rejected as out of range. Example: 120.0."""
+    """Upper limit of valid values, in `unit`; higher values are rejected as out of range. Example:
+    120.0."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

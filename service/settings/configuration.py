@@ -19,7 +19,7 @@ SECRETS = ("secret", "authorization", "password", "username")
 
 @dataclass(frozen=True)
 class Configuration:
-    """Configuration document; its version is the SHA-256 hash of its text."""
+    """Configuration document; ``text`` is canonical JSON (UTF-8) without secrets."""
 
     text: bytes
 
@@ -51,7 +51,7 @@ def canonical(document: object) -> bytes:
 
 
 def without_secrets(value: Any) -> Any:
-    """Return a copy of the settings in which secrets are replaced by `LEFT_OUT`."""
+    """Return a copy of JSON values with secrets, and the paths of URLs, replaced by `LEFT_OUT`."""
     if isinstance(value, dict):
         return {key: _shown(key, each) for key, each in value.items()}
     if isinstance(value, list | tuple):

@@ -1,7 +1,5 @@
 """Conversion of settings to the objects of the analysis: machine, calibration, alarm rules."""
 
-from collections.abc import Mapping
-
 from core.alarms.judgements import OrderVector, VectorReference
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.statistics import ChatterRule
@@ -19,6 +17,7 @@ from service.settings.bearings import BearingSettings
 from service.settings.channels import ChannelSettings
 from service.settings.films import FilmAlarmSettings
 from service.settings.limits import (
+    LIMITS,
     GapLimitSettings,
     LimitSettings,
     ZoneSettings,
@@ -61,32 +60,25 @@ def _channel(settings: ChannelSettings) -> Channel:
 
 def _bearing(settings: BearingSettings, unit: UnitSettings) -> Bearing:
     gain = {channel.id: channel.gain_uncertainty for channel in unit.channel}
+    shaft_gain = max(gain[settings.shaft_x], gain[settings.shaft_y])
     return Bearing(
         **settings.values_for(Bearing),
-        accuracy=_accuracy(settings, gain),
-        gap_accuracy=_gap_accuracy(settings, gain),
-    )
-
-
-def _gap_accuracy(settings: BearingSettings, gain: Mapping[str, float]) -> GapAccuracy:
-    return GapAccuracy(
-        gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
-        reference_um=settings.gap_reference_uncertainty_um,
-        growth_um=settings.thermal_growth_um,
-        growth_change_um=settings.thermal_growth_change_um,
-        clearance=settings.clearance_uncertainty,
-    )
-
-
-def _accuracy(settings: BearingSettings, gain: Mapping[str, float]) -> BearingAccuracy:
-    return BearingAccuracy(
-        shaft_gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
-        bearing_gain=max(gain[settings.bearing_x], gain[settings.bearing_y]),
-        bracket_stiffness=settings.bracket_stiffness_uncertainty,
-        bracket_mass=settings.bracket_mass_uncertainty,
-        bracket_damping=settings.bracket_damping_uncertainty,
-        delay_s=settings.delay_uncertainty_s,
-        cross_coupling=settings.cross_coupling_uncertainty,
+        accuracy=BearingAccuracy(
+            shaft_gain=shaft_gain,
+            bearing_gain=max(gain[settings.bearing_x], gain[settings.bearing_y]),
+            bracket_stiffness=settings.bracket_stiffness_uncertainty,
+            bracket_mass=settings.bracket_mass_uncertainty,
+            bracket_damping=settings.bracket_damping_uncertainty,
+            delay_s=settings.delay_uncertainty_s,
+            cross_coupling=settings.cross_coupling_uncertainty,
+        ),
+        gap_accuracy=GapAccuracy(
+            gain=shaft_gain,
+            reference_um=settings.gap_reference_uncertainty_um,
+            growth_um=settings.thermal_growth_um,
+            growth_change_um=settings.thermal_growth_change_um,
+            clearance=settings.clearance_uncertainty,
+        ),
     )
 
 
@@ -122,7 +114,10 @@ ZONE_DEADBAND = 0.05
 
 
 def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitRules:
-    """Return the alarm rules of a unit; a replay has no rules for link and clock."""
+    """Return the alarm rules of a unit.
+
+    A replay has no rules for link and clock, nor has a unit whose clock is "ignored" one for it.
+    """
     is_live = origin is Origin.LIVE
     is_judged = is_live and alarms.clock == "judged"
     return UnitRules(
@@ -142,7 +137,10 @@ def chatter_rule_of(alarms: AlarmSettings) -> ChatterRule:
 
 
 def references_of(unit: UnitSettings) -> list[VectorReference]:
-    """Return the 1× reference vectors of a unit, one entry for each bearing and operating state."""
+    """Return the 1× reference vectors of a unit, one entry for each bearing and operating state.
+
+    The list is empty if the plant file has none.
+    """
     return [
         VectorReference(unit.id, bearing.id, state, vectors)
         for bearing in unit.bearing
@@ -180,12 +178,9 @@ def _limits(found: LimitSettings | None) -> LimitRule | None:
 
 
 def _values(found: LimitSettings) -> Limits:
-    below = (
-        (found.alert_below, found.danger_below)
-        if isinstance(found, GapLimitSettings)
-        else (None, None)
-    )
-    return Limits(found.alert, found.danger, found.deadband, *below)
+    if isinstance(found, GapLimitSettings):
+        return Limits(**found.model_dump(include=set(LIMITS)))
+    return Limits(found.alert, found.danger, found.deadband)
 
 
 def _zones(found: ZoneSettings | None) -> LimitRule | None:
@@ -241,7 +236,7 @@ STALE_HOPS = 2.5
 
 
 def refresh_s(plant: PlantFile) -> float:
-    """Return the result period of the slowest unit of a plant, s."""
+    """Return the time between two results of the unit with the slowest results, s."""
     hop_samples = analysis_of(plant.analysis).hop_samples
     return max(
         (unit.source.hop_polls if isinstance(unit.source, ModbusVectorSettings) else hop_samples)

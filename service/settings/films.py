@@ -8,10 +8,7 @@ from core.baseline.settings import BaselineSettings
 from core.change.settings import ChangeLimits
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingLimits
-from service.settings.base import MisfitError, Settings
-
-Share = Annotated[float, Field(gt=0.0, lt=1.0)]
-"""Fraction between 0 and 1, both excluded."""
+from service.settings.base import MisfitError, Settings, Share
 
 
 class ChangeLimitSettings(Settings):
@@ -99,7 +96,7 @@ class BaselineModel(Settings):
         return self
 
     def settings(self, reading_h: float = BaselineSettings.reading_h) -> BaselineSettings:
-        """Return the settings as `BaselineSettings`; ``reading_h`` is the interval of readings."""
+        """Return the settings as `BaselineSettings`, for a reading every ``reading_h`` hours."""
         rest = self.model_dump(exclude=set(GRID_KEYS))
         grid = CellGrid(*(getattr(self, key) for key in GRID_KEYS))
         return BaselineSettings(grid=grid, reading_h=reading_h, **rest)

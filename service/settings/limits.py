@@ -23,7 +23,7 @@ StateNames = Annotated[tuple[StateName, ...], Field(min_length=1, max_length=6)]
 
 
 def states_of(names: tuple[StateName, ...]) -> States:
-    """Return the operating states with these names."""
+    """Return the operating states with these names, which are `OperatingState` in lower case."""
     return frozenset(OperatingState[name.upper()] for name in names)
 
 
@@ -34,6 +34,7 @@ class RegionSettings(Settings):
     """Region of operating conditions, such as a condition cell; ranges exclude the upper end."""
 
     states: StateNames | None = None
+    """Operating states in which these limits apply; by default `states` of the main table."""
 
     eccentricity_ratio: Annotated[Bounds, Field(examples=[[0.6, 0.7]])] | None = None
     """Range of the eccentricity ratio, within 0 to 5; not limited by default; example:
@@ -76,7 +77,8 @@ def refuse_overlap(tables: Sequence[RegionSettings], states: StateNames) -> None
     regions = [table.region(states) for table in tables]
     for n, m in combinations(range(len(tables)), 2):
         if regions[n].overlaps(regions[m]):
-            raise MisfitError(f"overlaps the conditions of table[{n + 1}]", "table", m)
+            words = f"overlaps the conditions of table[{n + 1}]; change the states or a range"
+            raise MisfitError(words, "table", m)
 
 
 class WatchSettings(Settings):
@@ -96,9 +98,6 @@ class WatchSettings(Settings):
 class LimitTableSettings(RegionSettings):
     """Limits in one region of operating conditions; keys not given are those of the main table."""
 
-    states: StateNames | None = None
-    """Operating states in which these limits apply; by default `states` of the main table."""
-
     alert: float | None = None
     """Alert limit in this region; by default `alert` of the main table."""
 
@@ -117,10 +116,14 @@ class LimitTableSettings(RegionSettings):
 
 
 LIMITS = ("alert", "danger", "alert_below", "danger_below", "deadband")
+"""Keys of the limits of a table; all but gaps lack the keys of lower limits."""
 
 
 class LimitSettings(WatchSettings):
-    """Main table of alarm limits of a measured value; alert, danger or both must be given."""
+    """Main table of alarm limits of a measured value; alert, danger or both must be given.
+
+    Subclasses give the unit of alert, danger and deadband; None is no limit of this level.
+    """
 
     alert: float | None
     danger: float | None
@@ -145,9 +148,9 @@ class LimitSettings(WatchSettings):
                 self.within(table)
             except ValidationError as error:
                 found = error.errors()[0]
-                misfit = found.get("ctx", {}).get("error")
-                at = misfit.at if isinstance(misfit, MisfitError) else found["loc"]
-                fault = str(misfit) if isinstance(misfit, MisfitError) else found["msg"]
+                at, fault = found["loc"], found["msg"]
+                if isinstance(misfit := found.get("ctx", {}).get("error"), MisfitError):
+                    at, fault = misfit.at, str(misfit)
                 raise MisfitError(fault, "table", n, *at) from None
         return self
 

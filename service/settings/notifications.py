@@ -11,12 +11,7 @@ from pydantic import Field, StringConstraints, model_validator
 from core.alarms.alarm import AlarmChange
 from core.units import NS_PER_S
 from service.settings.alarm_kinds import AlarmKindName
-from service.settings.base import (
-    Identifier,
-    MisfitError,
-    Settings,
-    refuse_twice,
-)
+from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
 
 TimeOfDay = Annotated[str, StringConstraints(pattern=r"^([01][0-9]|2[0-3]):[0-5][0-9]$")]
 """Time of day in hours and minutes, such as "22:00"."""
@@ -36,10 +31,7 @@ TimeoutS = Annotated[float, Field(gt=0.0, le=600.0)]
 PRINTABLE_URL = re.compile(r"^[!-~]+$")
 
 DEFAULT_CHANGES = (
-    AlarmChange.RAISED,
-    AlarmChange.ESCALATED,
-    AlarmChange.EASED,
-    AlarmChange.RETURNED,
+    *(AlarmChange.RAISED, AlarmChange.ESCALATED, AlarmChange.EASED, AlarmChange.RETURNED),
 )
 
 
@@ -240,7 +232,7 @@ class DeliverySettings(Settings):
 
 
 def url_fault(url: str) -> str | None:
-    """Return the reason why a URL is invalid; None if it is valid."""
+    """Return why a URL is not a valid HTTP(S) URL without credentials; None if it is valid."""
     try:
         parts = urlsplit(url)
         port = parts.port

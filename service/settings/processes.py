@@ -132,7 +132,8 @@ def why_closed(
 ) -> str | None:
     """Return the reason why the service must not listen on an address; None if it may listen.
 
-    A Unix socket is reachable only by a proxy on the same host.
+    Any host but loopback requires TLS (``has_tls``) and a stored account (``has_account``). A Unix
+    socket requires neither, because it is reachable only by a proxy on the same host.
     """
     if is_unix_socket or is_loopback(host):
         return None

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.settings.base import Identifier, MisfitError, SecretMisfitError, Settings
+from service.settings.base import Identifier, MisfitError, SecretMisfitError, Settings, Share
 from service.settings.processes import FilePath
 
 Conninfo = Annotated[str, StringConstraints(min_length=1, max_length=4096)]
@@ -28,7 +28,7 @@ class StoreSettings(Settings):
     def _check(self) -> Self:
         if self.postgresql is None:
             if self.password_file is not None:
-                raise MisfitError("requires postgresql", "password_file")
+                raise MisfitError("applies only with postgresql; remove it", "password_file")
             return self
         keywords = _keywords(self.postgresql)
         if "password" in keywords or "sslpassword" in keywords:
@@ -37,7 +37,8 @@ class StoreSettings(Settings):
                 "postgresql",
             )
         if "passfile" in keywords and self.password_file is not None:
-            raise MisfitError("must not be given with passfile in postgresql", "password_file")
+            words = "must not be given with passfile in postgresql; remove one of them"
+            raise MisfitError(words, "password_file")
         return self
 
     @property
@@ -166,7 +167,6 @@ class EvidenceSettings(Settings):
         return self
 
 
-Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 Gigabytes = Annotated[float, Field(gt=0.0, le=1_000_000.0)]
 
 

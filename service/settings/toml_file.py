@@ -217,7 +217,7 @@ def load_toml(path: Path, model: type[Model]) -> Model:
 
     Raises `TomlFileError` if the file is unreadable or invalid; the message lists every mistake.
     """
-    text = _read(path)
+    text = read_text(path, MAX_FILE_BYTES, TomlFileError)
     data = _parsed(path, text)
     try:
         # strict mode (no text or boolean for a number) accepts a list as a tuple only in JSON
@@ -237,15 +237,16 @@ def load_toml(path: Path, model: type[Model]) -> Model:
         raise TomlFileError("\n".join(lines)) from error
 
 
-def _read(path: Path) -> str:
+def read_text(path: Path, max_bytes: int, fault: type[Exception], encoding: str = "utf-8") -> str:
+    """Return the text of a small file; raise ``fault`` if it is unreadable or not UTF-8."""
     try:
-        content = read_small_file(path, MAX_FILE_BYTES)
-        return content.decode()
+        content = read_small_file(path, max_bytes)
+        return content.decode(encoding)
     except OSError as error:
-        raise TomlFileError(f"{path}: {error.strerror}") from error
+        raise fault(f"{path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise TomlFileError(f"{path}:{line}: byte {error.start} is not valid UTF-8") from error
+        raise fault(f"{path}:{line}: byte {error.start} is not valid UTF-8") from error
 
 
 UNQUOTED = re.compile(r"\s*[\w.-]+\s*=\s*[^\W\d]")

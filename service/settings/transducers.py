@@ -8,7 +8,6 @@ from typing import Annotated, Literal, Self, TypeAlias
 
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
-from acquisition.delivery.small_file import read_small_file
 from core.machine.response import (
     BUTTERWORTH_DAMPING,
     HighPass,
@@ -18,7 +17,7 @@ from core.machine.response import (
     ResponseTable,
 )
 from service.settings.base import MisfitError, Settings
-from service.settings.toml_file import FOLDER
+from service.settings.toml_file import FOLDER, read_text
 
 COLUMNS = ("frequency_hz", "magnitude", "phase_deg")
 MAX_SHEET_BYTES = 1_000_000
@@ -31,12 +30,14 @@ class SheetError(Exception):
 def read_calibration_sheet(path: Path) -> ResponseTable:
     """Read a CSV calibration sheet: a header line with the column names, then one line per point.
 
-    Lines that begin with # and empty lines at the end are ignored.
+    The columns `COLUMNS` may be in any order. Lines that begin with # and empty lines at the end
+    are ignored.
 
     Raises `SheetError` if the file is unreadable, a column or value is missing, a value is not a
     finite number, a frequency or magnitude is not above zero, or frequencies do not increase.
     """
-    rows = _rows(path, _read(path))
+    text = read_text(path, MAX_SHEET_BYTES, SheetError, "utf-8-sig")
+    rows = _rows(path, text.rstrip())
     number, header = next(rows, (1, []))
     if sorted(header) != sorted(COLUMNS):
         wanted = ", ".join(COLUMNS)
@@ -54,17 +55,6 @@ def read_calibration_sheet(path: Path) -> ResponseTable:
         raise SheetError(f"{path}:{number}: expected at least two points, got {len(points)}")
     frequency_hz, magnitude, phase_deg = zip(*points, strict=True)
     return ResponseTable(frequency_hz, magnitude, phase_deg)
-
-
-def _read(path: Path) -> str:
-    try:
-        content = read_small_file(path, MAX_SHEET_BYTES)
-        return content.decode("utf-8-sig").rstrip()
-    except OSError as error:
-        raise SheetError(f"{path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise SheetError(f"{path}:{line}: byte {error.start} is not valid UTF-8") from error
 
 
 def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
@@ -171,7 +161,7 @@ ResponseSettings: TypeAlias = Annotated[
 
 
 def response_of(parts: Sequence[ResponseSettings]) -> Response | None:
-    """Return the combined frequency response of a chain of elements; None without elements."""
+    """Return the product of the responses of all elements; None (flat) without elements."""
     if not parts:
         return None
     return ResponseChain(tuple(part.response() for part in parts))

@@ -1,12 +1,13 @@
 """Settings of a generating unit; checks that source, channels and alarms are consistent."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
 from core.alarms.alarm import PLANT
 from core.samples.calibration import BLOCK_SAMPLES
+from service.settings.alarms import BearingAlarmSettings
 from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
 from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS, BearingSettings
 from service.settings.channels import ChannelSettings, SlowChannelSettings, Transducer
@@ -21,29 +22,6 @@ from service.settings.sources.devices import (
 )
 from service.settings.sources.modbus import ModbusLinkSettings
 from service.settings.sources.simulated import SimulationSettings
-
-
-def require_source_fit(
-    source: SourceSettings,
-    beside: SlowDeviceSettings | None,
-    channels: Sequence[str],
-    slow: Sequence[str],
-) -> None:
-    """Check that the devices of a unit provide its channels; raise `MisfitError` otherwise.
-
-    ``beside`` is the second device of the unit, for slow channels, or None; ``channels`` and
-    ``slow`` are the ids of all waveform and slow channels.
-    """
-    if beside is not None:
-        beside.require_fit(slow)
-    own = [id_ for id_ in slow if beside is None or id_ not in beside.mapped_channels]
-    match source:
-        case ModbusVectorSettings() | ModbusPolledSettings():
-            source.require_fit(channels, own)
-        case ModbusFifoSettings():
-            source.fifo_layout(len(channels))
-        case CanSettings():
-            source.check_channels(channels, own)
 
 
 def require_lines_apart(readers: Iterable[tuple[tuple[int | str, ...], object]]) -> None:
@@ -73,60 +51,12 @@ FROM_WAVEFORMS = ("shaft_overall_um_pp", "bearing_overall_mm_s_rms")
 ZONES = ("shaft_um_pp", "shaft_max_um_pk", "bearing_mm_s_rms")
 
 
-def require_alarm_fit(
-    unit: str,
-    source: SourceSettings,
-    key_phase: str | None,
-    channels: Iterable[ChannelSettings],
-    bearings: Sequence[BearingSettings],
-) -> None:
-    """Raise `MisfitError` if there are alarm limits of a quantity that the unit does not measure.
-
-    The id `plant` is also refused, since it is reserved for alarms of the whole plant, and so are
-    phases of reference vectors if `key_phase` is None.
-    """
-    if unit == PLANT:
-        raise MisfitError("is reserved for alarms of the whole plant; choose another id", "id")
-    is_rack = isinstance(source, ModbusVectorSettings)
-    probes = {c.id for c in channels if c.transducer is Transducer.PROXIMITY_PROBE}
-    for number, bearing in enumerate(bearings):
-        at = ("bearing", number, "alarms")
-        if is_rack:
-            _require_no_waveforms(bearing, at)
-        else:
-            _require_gaps(bearing, probes, at)
-            _require_phase(bearing, key_phase, at)
-
-
-def _require_no_waveforms(bearing: BearingSettings, at: tuple[str | int, ...]) -> None:
+def _require_no_waveforms(alarms: BearingAlarmSettings, at: tuple[str | int, ...]) -> None:
     words = 'requires waveforms, which a source of kind "modbus_vector" does not provide'
-    for key in FROM_WAVEFORMS:
-        if getattr(bearing.alarms, key) is not None:
-            raise MisfitError(words, *at, key)
-    for key in ZONES:
-        if getattr(bearing.alarms.zones, key) is not None:
-            raise MisfitError(words, *at, "zones", key)
-
-
-def _require_gaps(bearing: BearingSettings, probes: set[str], at: tuple[str | int, ...]) -> None:
-    in_x = bearing.gap_x is not None or bearing.shaft_x in probes
-    in_y = bearing.gap_y is not None or bearing.shaft_y in probes
-    if bearing.alarms.gap_um is not None and not (in_x or in_y):
-        words = "requires a proximity probe or a slow channel gap_x or gap_y"
-        raise MisfitError(words, *at, "gap_um")
-    if bearing.alarms.eccentricity_ratio is not None and not (in_x and in_y):
-        words = "requires gaps in x and y, from proximity probes or slow channels gap_x and gap_y"
-        raise MisfitError(words, *at, "eccentricity_ratio")
-
-
-def _require_phase(
-    bearing: BearingSettings, key_phase: str | None, at: tuple[str | int, ...]
-) -> None:
-    for number, reference in enumerate(bearing.alarms.order1_reference):
-        for place, vector in reference.vectors().items():
-            if len(vector) == 2 and key_phase is None:
-                words = "phase requires key_phase of the unit; without it give the amplitude only"
-                raise MisfitError(words, *at, "order1_reference", number, place)
+    for table, keys, place in ((alarms, FROM_WAVEFORMS, at), (alarms.zones, ZONES, (*at, "zones"))):
+        for key in keys:
+            if getattr(table, key) is not None:
+                raise MisfitError(words, *place, key)
 
 
 class UnitSettings(Settings):
@@ -220,8 +150,17 @@ class UnitSettings(Settings):
         self._check_simulation()
         slow_ids = [channel.id for channel in self.slow_channel]
         channel_ids = [channel.id for channel in self.channel]
-        require_source_fit(self.source, self.slow_source, channel_ids, slow_ids)
-        require_alarm_fit(self.id, self.source, self.key_phase, self.channel, self.bearing)
+        if self.slow_source is not None:
+            self.slow_source.require_fit(slow_ids)
+            slow_ids = [id_ for id_ in slow_ids if id_ not in self.slow_source.mapped_channels]
+        match self.source:
+            case ModbusVectorSettings() | ModbusPolledSettings():
+                self.source.require_fit(channel_ids, slow_ids)
+            case ModbusFifoSettings():
+                self.source.fifo_layout(len(channel_ids))
+            case CanSettings():
+                self.source.check_channels(channel_ids, slow_ids)
+        self._check_alarms()
         return self
 
     def _check_channels(self, number: int, bearing: BearingSettings) -> None:
@@ -252,6 +191,32 @@ class UnitSettings(Settings):
             raise MisfitError(_not_among(units), *at)
         if id_ is not None and units[id_] != unit:
             raise MisfitError(f"must be a slow channel in {unit}, not {units[id_]}", *at)
+
+    def _check_alarms(self) -> None:
+        if self.id == PLANT:
+            raise MisfitError("is reserved for alarms of the whole plant; choose another id", "id")
+        for number, bearing in enumerate(self.bearing):
+            at = ("bearing", number, "alarms")
+            if isinstance(self.source, ModbusVectorSettings):
+                _require_no_waveforms(bearing.alarms, at)
+                continue
+            self._check_gaps(bearing, at)
+            for n, reference in enumerate(bearing.alarms.order1_reference):
+                for place, vector in reference.vectors().items():
+                    if len(vector) == 2 and self.key_phase is None:
+                        words = "phase requires key_phase of the unit; else give only the amplitude"
+                        raise MisfitError(words, *at, "order1_reference", n, place)
+
+    def _check_gaps(self, bearing: BearingSettings, at: tuple[str | int, ...]) -> None:
+        probes = {c.id for c in self.channel if c.transducer is Transducer.PROXIMITY_PROBE}
+        in_x = bearing.gap_x is not None or bearing.shaft_x in probes
+        in_y = bearing.gap_y is not None or bearing.shaft_y in probes
+        if bearing.alarms.gap_um is not None and not (in_x or in_y):
+            words = "requires a proximity probe or a slow channel gap_x or gap_y"
+            raise MisfitError(words, *at, "gap_um")
+        if bearing.alarms.eccentricity_ratio is not None and not (in_x and in_y):
+            words = "requires gaps in x and y, from proximity probes or slow channels gap_x, gap_y"
+            raise MisfitError(words, *at, "eccentricity_ratio")
 
     def _check_simulation(self) -> None:
         simulation = self.simulation

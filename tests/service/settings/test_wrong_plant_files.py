@@ -103,7 +103,7 @@ BOTH = f'postgresql = "{ADDRESS} passfile=x"\npassword_file = "y"'
         ("alarms", "max_waiting_share = 1.0", "max_waiting_share = 1.0", "less than 1"),
         ("alarms", "max_samples_lost_share = 0.0", "max_samples_lost_share = 0.0", "than 0"),
         ("alarms", "store_failing_after_s = -1.0", "store_failing_after_s = -1.0", "equal to 0"),
-        ("store", 'password_file = "x"', "password_file = 'x'", "requires postgresql"),
+        ("store", 'password_file = "x"', "password_file = 'x'", "applies only with postgresql"),
         ("store", f'postgresql = "{ADDRESS} password=x"', "postgresql", "not contain a password"),
         ("store", 'postgresql = "postgresql://a:x@b.c/d"', "postgresql", "not contain a password"),
         ("store", 'postgresql = "no address"', "postgresql", "is not a libpq connection string"),
