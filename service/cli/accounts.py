@@ -31,13 +31,17 @@ from service.store.access.tables import AccessStore
 
 @contextmanager
 def access_of(plant: PlantFile, creates: bool = False) -> Iterator[AccessStore]:
-    """Open the plant's accounts and keys, and yield their store; `creates` as in `plant_store`."""
+    """Open the plant's accounts and keys, yield their store, and close it.
+
+    Entries of the audit trail in the block have the command line as their source. `creates` and the
+    error are those of `plant_store`.
+    """
     with acting_as(Acting(Source.COMMAND_LINE, made_by())), plant_access(plant, creates) as store:
         yield store
 
 
 def time_text(time_ns: int) -> str:
-    """Return a time as UTC text, to the second."""
+    """Return a time in ns since 1970 UTC as RFC 3339 text, truncated to the second."""
     return datetime.fromtimestamp(time_ns // NS_PER_S, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
@@ -127,7 +131,7 @@ def add(
     role: Annotated[Role, typer.Option(help="Role of the account.")] = Role.VIEWER,
     password_fd: PasswordFd = None,
 ) -> None:
-    """Add an account."""
+    """Add an account, with a password from the prompt or from --password-fd."""
     plant, password = load_plant_file(plant_file), password_from(password_fd)
     with access_of(plant, creates=True) as access:
         added = AccessService(access).add(name, role, password, SystemClock().now_ns())

@@ -42,11 +42,7 @@ def verify(
         numbers = verdict.contradictions
         unknown = [n for n in numbers if f"{trail.chain}:{n}" not in (known or ())]
         is_whole = verdict.is_whole and not unknown
-        chains[trail.chain] = {
-            "is_whole": is_whole,
-            **asdict(verdict),
-            "contradictions": unknown,
-        }
+        chains[trail.chain] = {"is_whole": is_whole} | asdict(verdict) | {"contradictions": unknown}
         lines += [f"{trail.chain}: {line}" for line in _lines(trail.chain, verdict, unknown)]
     are_whole = all(chain["is_whole"] for chain in chains.values())
     print_result({"is_whole": are_whole, "chains": chains}, lines, json_output)
@@ -62,7 +58,7 @@ def export(
     """Write the whole audit trail, oldest first, as a CSV file that spreadsheets read as text."""
     trails = open_trails(load_plant_file(plant_file))
     if out.suffix != ".csv":
-        fail(f"{out}: must end in .csv", code=2)
+        fail(f"{out}: the name of the file must end in .csv", code=2)
     try:
         with ExitStack() as stack:
             chains = [(trail.chain, stack.enter_context(trail.entries())) for trail in trails]

@@ -13,7 +13,7 @@ from service.cli.offline.backtest import (
     run_back_test,
     time_ns_of,
 )
-from service.cli.offline.backtest_bearing import UNSPECIFIED, Learning, places_of, rules_of
+from service.cli.offline.backtest_bearing import UNSPECIFIED, Learning, rules_of
 from service.cli.offline.backtest_files import read_histories
 from service.cli.options import JsonOutput, argument, fail, option, print_result, progress
 from service.runtime.process import made_by
@@ -58,7 +58,10 @@ def backtest(
     export: Annotated[Path | None, option("New folder for the learned baselines, as JSON.")] = None,
     json_output: JsonOutput = False,
 ) -> None:
-    """Learn baselines from past readings, and list the alarms that would have followed."""
+    """Learn baselines from past readings, and list the alarms that would have followed.
+
+    Changes no database; only --export writes files.
+    """
     clock = SystemClock()
     begin_s = clock.monotonic_s()
     plant_file = load_plant_file(plant) if plant else None
@@ -74,11 +77,12 @@ def backtest(
     except ValueError as error:
         fail(str(error), code=2)
     if export is not None and export.exists():
-        fail(f"{export}: the file or folder exists already", code=2)
+        fail(f"{export}: the file or folder exists already; choose a new one", code=2)
     rules = rules_of(film, plant_file, learning, events, made_by(), clock.now_ns(), estimator)
     with progress("Reading", readings.stat().st_size if readings.is_file() else 1) as bar:
-        places = places_of(plant_file) if plant_file else None
-        histories = read_histories(readings, places, bar.update)
+        units = plant_file.unit if plant_file else ()
+        places = [(unit.id, bearing.id) for unit in units for bearing in unit.bearing]
+        histories = read_histories(readings, places if plant_file else None, bar.update)
     n_rows = sum(sum(rows.n_rows) for rows in histories.values())
     with progress("Deciding", n_rows) as bar:
         found = run_back_test(histories, rules, bar.update)

@@ -93,7 +93,7 @@ class Commands(Mapping[str, Any]):
     """Mapping of the commands by name; a command is imported when it is looked up."""
 
     def __getitem__(self, name: str) -> Any:
-        """Return a command, imported from its module."""
+        """Import the module of a command and return it; raises `KeyError` for an unknown name."""
         module, attribute = COMMANDS[name][0].split(".")
         gc.disable()  # a hundred collections take a fifth of the loading time
         found = getattr(import_module(f"service.cli.{module}"), attribute)

@@ -125,6 +125,8 @@ def _simulated_feeds(plant: PlantFile) -> dict[str, SampleFeed]:
 
 
 STOP_S = 3.0
+"""Time for which a child may stop by itself before it is killed, s."""
+
 TERMINALS = "/dev/pts/"
 
 Endpoints = dict[str, dict[str, str | int]]
@@ -155,11 +157,10 @@ class RunningDaq:
 
     def attached(self, plant: PlantFile) -> PlantFile:
         """Return a copy of the plant file whose sources have the addresses of this DAQ."""
-        units = []
-        for unit in plant.unit:
-            source = unit.source.model_copy(update=self.endpoints.get(unit.id, {}))
-            units.append(unit.model_copy(update={"source": source}))
-        return plant.model_copy(update={"unit": tuple(units)})
+        sources = [u.source.model_copy(update=self.endpoints.get(u.id, {})) for u in plant.unit]
+        pairs = zip(plant.unit, sources, strict=True)
+        units = tuple(unit.model_copy(update={"source": source}) for unit, source in pairs)
+        return plant.model_copy(update={"unit": units})
 
 
 @contextmanager
@@ -180,7 +181,10 @@ def held_lines(endpoints: Endpoints) -> Iterator[None]:
 
 @contextmanager
 def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
-    """Run ``padwatch daq`` as a child process, and yield it; stop the child at the end."""
+    """Run ``padwatch daq`` as a child process, and yield it once it serves; stop it at the end.
+
+    Raises `CommandError` if the child ends before it serves; it has printed the reason.
+    """
     with subprocess.Popen(  # noqa: S603  our own program
         [sys.executable, "-m", "service.cli.main", "daq", *arguments, "--control"],
         stdin=subprocess.PIPE,
@@ -191,7 +195,7 @@ def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
         try:
             line = process.stdout.readline() if process.stdout else b""
             if not line or process.stdout is None:
-                fail("the simulated DAQ did not start; see its message above")
+                fail("the simulated DAQ did not start; its message above gives the reason")
             endpoints: Endpoints = json.loads(line)
             daq = RunningDaq(endpoints, {unit: threading.Event() for unit in endpoints})
             news = threading.Thread(target=_listen, args=(process.stdout, daq), daemon=True)

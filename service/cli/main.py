@@ -17,7 +17,10 @@ PRIVATE = 0o077
 
 
 def main() -> NoReturn:
-    """Run the command line; an internal error ends it with one line and a report file."""
+    """Run the command line and end the process with its exit code.
+
+    An internal error is printed as one line, and its traceback is written to a temporary file.
+    """
     os.umask(PRIVATE)
     leave(_exit_code())
 

@@ -59,9 +59,7 @@ def send_again(
     with plant_store(plant) as store:
         now_ns = SystemClock().now_ns()
         found = {name: store.outbox.revive(name, now_ns) for name in names}
-    lines = [
-        f"{name}: {n_messages} messages are queued again" for name, n_messages in found.items()
-    ]
+    lines = [f"{name}: {n} messages are queued again" for name, n in found.items()]
     print_result(found, lines, json_output, indent=None)
 
 
@@ -72,15 +70,11 @@ async def _send_to(plant: PlantFile, chosen: Sequence[Receiver]) -> list[Outcome
 
 
 def _result(receiver: Receiver, outcome: Outcome) -> dict[str, str]:
-    word = "not delivered"
-    if isinstance(outcome, Delivered):
-        word = "delivered"
-    elif isinstance(outcome, Refused):
-        word = "refused"
+    words = {Delivered: "delivered", Refused: "refused"}
     return {
         "receiver": receiver.name,
         "address": receiver.channel.address,
-        "outcome": word,
+        "outcome": words.get(type(outcome), "not delivered"),
         "answer": outcome.answer,
     }
 

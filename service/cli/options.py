@@ -71,7 +71,7 @@ class CommandGroup(TyperGroup):
     """Group of commands; an expected error ends its command with a message and an exit code."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the chosen command; print the message of an expected error."""
+        """Run the chosen command; an expected error (`EXIT_CODES`) is printed and ends it."""
         try:
             return super().invoke(ctx)
         except CommandError as error:
@@ -122,7 +122,10 @@ def print_result(
 
 
 def progress(label: str, length: int) -> Any:
-    """Return a progress bar on standard error, shown only on a terminal."""
+    """Return a progress bar of `length` steps on standard error, shown only on a terminal.
+
+    The bar is a context manager; its `update` adds steps.
+    """
     return typer.progressbar(
         length=length, label=label, file=sys.stderr, hidden=not sys.stderr.isatty()
     )
@@ -130,12 +133,17 @@ def progress(label: str, length: int) -> Any:
 
 @contextmanager
 def plant_store(plant: "PlantFile", creates: bool = False) -> Iterator["Store"]:
-    """Open the plant's database, and yield its store.
+    """Open the plant's database, yield its store, and close it.
 
     Parameters
     ----------
     creates
-        Whether a missing database is created; otherwise the command fails.
+        Whether a missing database is created; this is reported on standard error.
+
+    Raises
+    ------
+    CommandError
+        If the database does not exist and is not created.
     """
     from service.app.storage import has_store, open_store, store_name
 
@@ -146,7 +154,7 @@ def plant_store(plant: "PlantFile", creates: bool = False) -> Iterator["Store"]:
 
 @contextmanager
 def plant_access(plant: "PlantFile", creates: bool = False) -> Iterator["AccessStore"]:
-    """Open the plant's accounts and keys; the parameters are as in `plant_store`."""
+    """Open the plant's accounts and keys, as `plant_store` opens the database."""
     from service.app.storage import access_name, has_access, open_access
 
     _require(has_access(plant), access_name(plant), creates)
@@ -159,12 +167,15 @@ def _require(is_there: bool, name: str, creates: bool) -> None:
     if is_there:
         return
     if not creates:
-        fail(f"{name}: the database does not exist")
+        fail(f"{name}: the database does not exist; check data_folder and the working directory")
     typer.echo(f"{name}: created a new database; check that the service uses it", err=True)
 
 
 def one_unit(plant: "PlantFile", id_: str | None, path: Path) -> "UnitSettings":
-    """Return the unit `id_`, or the only unit for None; otherwise end with exit code 2."""
+    """Return the unit `id_`, or for None the only unit of the plant file at `path`.
+
+    Raises `CommandError` with exit code 2 for an unknown unit, or for None with several units.
+    """
     known = ", ".join(unit.id for unit in plant.unit)
     if id_ is None and len(plant.unit) > 1:
         fail(f"{path}: choose one of the units {known} with --unit", code=2)
@@ -204,9 +215,10 @@ PasswordFd = Annotated[
 
 
 def password_from(descriptor: int | None) -> str:
-    """Return a new password from a file descriptor, or for None from the terminal.
+    """Read a new password from a file descriptor, or for None ask for it on the terminal.
 
-    Ends with exit code 2 if there is no terminal or no valid password.
+    One line end at the end is removed. Raises `CommandError` with exit code 2 if there is no
+    terminal, or if the descriptor is unreadable, not UTF-8 or has more than `MAX_BYTES` bytes.
     """
     if descriptor is None:
         if not sys.stdin.isatty():
@@ -221,9 +233,9 @@ def password_from(descriptor: int | None) -> str:
             fail(f"the password from descriptor {descriptor} is longer than {MAX_BYTES} bytes", 2)
         return found.decode().removesuffix("\n").removesuffix("\r")
     except OSError as error:
-        fail(f"file descriptor {descriptor}: {error.strerror}", 2)
+        fail(f"cannot read the password from descriptor {descriptor}: {error.strerror}", 2)
     except UnicodeDecodeError:
-        fail(f"file descriptor {descriptor} does not contain UTF-8 text", 2)
+        fail(f"the password from descriptor {descriptor} is not UTF-8 text", 2)
 
 
 DEMO = "demo.toml"
@@ -238,5 +250,5 @@ CHECKOUT = Path(__file__).parent.parent.parent / "deploy"
 
 
 def example_path(name: str) -> Path:
-    """Return the path of an example plant file."""
+    """Return the path of an example plant file, of the checkout or else of the package."""
     return next(path for path in (CHECKOUT / name, PACKAGED / name) if path.exists())

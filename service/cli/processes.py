@@ -42,7 +42,7 @@ HealthPort = Annotated[
 def run_plant(
     plant: PlantFile, listener: socket, is_demo: bool = False, child: Child | None = None
 ) -> None:
-    """Run the service of a plant on a listening socket until Ctrl-C or SIGTERM.
+    """Run the service of a plant on a listening socket, and block until Ctrl-C or SIGTERM.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def run_plant(
 
 
 def announce(url: str) -> None:
-    """Print the URL of the dashboard."""
+    """Print the URL of the dashboard on standard output."""
     typer.echo(f"padwatch: {url}")
 
 
@@ -152,7 +152,10 @@ def _announcer(command: str) -> Callable[[str], None]:
 
 
 def stream_settings(plant: PlantFile) -> StreamSettings:
-    """Return the settings [stream] of a plant file; without them, the command fails."""
+    """Return the settings [stream] of a plant file.
+
+    Raises `CommandError` with exit code 2 if the plant file has none.
+    """
     if plant.stream is None:
         fail(
             "the plant file has no [stream]: add one with the servers of NATS, or use `padwatch"

@@ -55,7 +55,8 @@ def record(
     """
     settings = one_unit(load_plant_file(plant_file), unit, plant_file)
     if isinstance(settings.source, ModbusVectorSettings):
-        fail(f"unit {settings.id} has no samples to record: its rack reports vectors", code=2)
+        words = 'a source of kind "modbus_vector" reports vectors instead of samples'
+        fail(f"unit {settings.id} cannot be recorded: {words}", code=2)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -76,14 +77,20 @@ def record(
 
 
 class ReconnectPolicy:
-    """Delay before each attempt to reopen a lost link; no attempts after the planned end."""
+    """Delay before each attempt to reopen a lost link; no attempts after the planned end.
+
+    Parameters
+    ----------
+    seconds
+        Planned length of the recording, s, from now on.
+    """
 
     def __init__(self, seconds: float, clock: Clock) -> None:
         self._clock = clock
         self._deadline_s = clock.monotonic_s() + seconds
 
     async def wait(self, error: LinkError) -> None:
-        """Wait up to `RETRY_S`, or raise the error after the planned end of the recording."""
+        """Wait for half of `RETRY_S` to all of it, or raise `error` after the planned end."""
         if self._clock.monotonic_s() >= self._deadline_s:
             raise error
         # a random share, as in the service, so that many recorders do not connect at once
@@ -98,8 +105,12 @@ async def record_blocks(
 ) -> str | None:
     """Record until the length has passed, SIGINT or SIGTERM arrives, or the link is lost.
 
+    Handles both signals of the process from then on, and closes the writer.
+
     Parameters
     ----------
+    seconds
+        Length of the recording, s.
     policy
         Delay before a lost link is reopened; None ends the recording when the link is lost.
 

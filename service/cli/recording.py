@@ -111,7 +111,7 @@ DESCRIBED = {
 
 
 def json_of(recording: Recording, summary: RecordingSummary) -> dict[str, Any]:
-    """Return the description of a recording as a JSON object."""
+    """Return the description of a recording as a JSON object; times are RFC 3339 text in UTC."""
     manifest = recording.manifest
     return {
         "folder": str(recording.folder),
@@ -142,7 +142,7 @@ def json_of(recording: Recording, summary: RecordingSummary) -> dict[str, Any]:
 
 
 def lines_of(recording: Recording, summary: RecordingSummary) -> Iterator[str]:
-    """Yield the description of a recording as text."""
+    """Yield the lines of the description of a recording, with the first `GAPS_PRINTED` gaps."""
     manifest = recording.manifest
     yield f"{recording.folder}: unit {manifest.unit}, {manifest.sample_type}, {manifest.made_by}"
     yield f"  from         {rfc3339(summary.start_ns)}"
@@ -176,10 +176,6 @@ def _losses(summary: RecordingSummary) -> Iterator[str]:
 @app.command()
 def info(folder: RecordingFolder, json_output: JsonOutput = False) -> None:
     """Describe a recording: channels, length, gaps, restarts, rejections, checksums."""
-    _print_recording(folder, json_output)
-
-
-def _print_recording(folder: Path, json_output: bool) -> None:
     recording = open_recording(folder)
     summary = summary_of(recording)
     print_result(json_of(recording, summary), lines_of(recording, summary), json_output)
@@ -232,4 +228,4 @@ def import_(
             bar.update(round(100 * share) - bar.pos)
 
         import_recording(file, mapped, settings, out, made_by(), advanced=advanced)
-    _print_recording(out, json_output)
+    info(out, json_output)

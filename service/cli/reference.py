@@ -49,8 +49,9 @@ def bearing_references(
 
     Returns
     -------
-    Gaps in force as [x, y] in µm, of the probes and of those across the shaft; their source and
-    the history in models of the API.
+    dict
+        Gaps in force as [x, y] in µm, of the probes and of those across the shaft (None without
+        such probes); their source and the history as models of the API.
     """
     newest = history[0] if history else None
     watched = bearing if newest is None else with_reference(bearing, newest)
@@ -65,7 +66,7 @@ def bearing_references(
 
 
 def text_lines(found: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a line for the reference in force, and one for each earlier reference."""
+    """Yield a line for the reference in force of `bearing_references`, then the earlier ones."""
     gaps = _gaps(found["gap_reference_um"], found["opposite_reference_um"])
     yield f"{found['unit']} {found['bearing']}: {gaps}, {_source(found['reference'])}"
     for before in found["history"][1:]:

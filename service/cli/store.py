@@ -49,7 +49,6 @@ def backup(
     """Copy both databases, also while padwatch runs; verify the copies, remove the oldest ones.
 
     The copy of the results begins with `padwatch-`, that of the accounts with `access-`.
-
     Samples, evidence and the plant file are plain files that any tool can copy.
     """
     plant, now_ns = load_plant_file(plant_file), SystemClock().now_ns()
@@ -143,11 +142,6 @@ MAX_LINES = 50
 STEPS = 1000
 
 
-@store_app.callback()
-def store() -> None:
-    """Do nothing; without a callback, typer would drop the name of the only command `check`."""
-
-
 @store_app.command()
 def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
     """Read both databases from end to end; exit code 1 if anything is damaged or missing.
@@ -192,11 +186,6 @@ readings_app = command_group("Export the stored readings of the films.")
 Time = Annotated[str | None, option("Time such as 2025-01-01T00:00:00Z.")]
 
 
-@readings_app.callback()
-def readings() -> None:
-    """Export the stored readings of the films."""
-
-
 @readings_app.command()
 def export(
     plant_file: PlantPath,
@@ -207,7 +196,7 @@ def export(
     """Write the stored readings of all films to a file that `padwatch backtest` reads."""
     plant = load_plant_file(plant_file)
     if out.suffix not in SUFFIXES:
-        fail(f"{out}: must end in {' or '.join(SUFFIXES)}", code=2)
+        fail(f"{out}: the name of the file must end in {' or '.join(SUFFIXES)}", code=2)
     try:
         start_ns = time_ns_of(start) if start else 0
         end_ns = time_ns_of(end) if end else SystemClock().now_ns()

@@ -43,7 +43,7 @@ class Asset:
 
     @cached_property
     def digest(self) -> str:
-        """Hash of the content."""
+        """Hash of the content: the first 32 hexadecimal digits of its SHA-256."""
         return hashlib.sha256(self.body).hexdigest()[:32]
 
     def compress(self) -> None:
@@ -126,7 +126,10 @@ IMPORT = re.compile(rb'(?:from|import) "(\.{1,2}/[^"]+)"')
 
 
 def imported(module: str, found: dict[str, None] | None = None) -> list[str]:
-    """Return the paths of a module and all its imports, direct or not; `found` has known paths."""
+    """Return the paths of a module and of all its imports, direct or not, importers first.
+
+    `found` are paths that are known already, for the recursion; it is changed.
+    """
     found = {} if found is None else found
     if module not in found:
         found[module] = None
@@ -172,7 +175,7 @@ def served() -> Mapping[str, Asset]:
 
 
 def compress_all() -> None:
-    """Compress all static files, which takes 0.4 s; until then they are sent as they are."""
+    """Compress all static files in place, for 0.4 s; until then they are sent uncompressed."""
     for asset in served().values():
         asset.compress()
 
@@ -198,7 +201,7 @@ class StaticFiles:
         self._app, self._served = app, served()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer or forward a request."""
+        """Answer a GET request for a static file, an unknown one with 404; forward others."""
         path = scope["path"] if scope["type"] == "http" and scope["method"] == "GET" else ""
         app = self._app
         if path in self._served:

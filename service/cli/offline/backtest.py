@@ -43,7 +43,11 @@ MAX_PERIOD_RATIO = 2.0
 
 @dataclass
 class BackTestResult:
-    """Films, alarms, baselines, shaft responses and warnings that a back-test has found."""
+    """Films, alarms, baselines, shaft responses and warnings that a back-test has found.
+
+    `responses` are triples of unit, number of the period (from 1) and response; `unit_years` is the
+    compared time of all units together.
+    """
 
     films: list[FilmReport] = field(default_factory=list)
     alarms: list[AlarmReport] = field(default_factory=list)
@@ -53,7 +57,7 @@ class BackTestResult:
     unit_years: float = 0.0
 
     def report(self, file: str, n_rows: int, duration_s: float) -> BackTestReport:
-        """Return the report of the back-test of `file`, whose run took `duration_s`."""
+        """Return the report of the back-test of `n_rows` rows of `file` that took `duration_s`."""
         n_alarms, n_danger = len(self.alarms), sum(a.level == "danger" for a in self.alarms)
         per_year = n_alarms / self.unit_years if self.unit_years else None
         return BackTestReport(
@@ -207,7 +211,7 @@ VERDICTS = {
 
 
 def lines_of(report: BackTestReport) -> Iterator[str]:
-    """Yield the report as lines of text."""
+    """Yield the lines of a report: doubts, readings by verdict, baselines, alarms and rates."""
     yield f"{report.file}: {report.rows} rows"
     yield from (f"  doubtful: {doubt}" for doubt in report.doubts)
     yield "\nReadings by verdict"
@@ -284,7 +288,7 @@ MAX_TEXT = 200
 
 
 def time_ns_of(text: str) -> int:
-    """Return an ISO 8601 time as ns since 1970 UTC.
+    """Return an ISO 8601 time with an offset as ns since 1970 UTC, truncated to microseconds.
 
     Raises
     ------
@@ -303,10 +307,12 @@ def time_ns_of(text: str) -> int:
 def event_of(text: str) -> MachineEvent:
     """Return the machine event in a text of the form ``UNIT[/BEARING] TIME [TEXT]``.
 
+    ``TEXT`` is "machine event" by default, and is cut to `MAX_TEXT` characters.
+
     Raises
     ------
     ValueError
-        If the text has another form.
+        If the text has another form, or as in `time_ns_of`.
     """
     found = _EVENT.fullmatch(text.strip())
     names = [found["unit"], found["bearing"]] if found else []

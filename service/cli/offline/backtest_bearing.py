@@ -38,7 +38,11 @@ class MachineEvent:
     Parameters
     ----------
     bearing
-        None for all bearings of the unit.
+        Id of the bearing; None for all bearings of the unit.
+    time_ns
+        Time of the event, ns since 1970 UTC.
+    text
+        Description of the event, stored with the new baseline.
     """
 
     unit: str
@@ -47,7 +51,7 @@ class MachineEvent:
     text: str
 
     def is_about(self, unit: str, bearing: str) -> bool:
-        """Return whether the event invalidates the baseline of a bearing."""
+        """Return whether the event invalidates the baseline of the bearing of the unit."""
         return self.unit == unit and self.bearing in (None, bearing)
 
 
@@ -60,14 +64,14 @@ class Learning:
     days
         Days from the first reading, and from the first reading after each event.
     until_ns
-        End of the first learning period, in place of `days`; None for `days`.
+        End of the first learning period, ns since 1970 UTC, in place of `days`; None for `days`.
     """
 
     days: float
     until_ns: int | None = None
 
     def end_ns(self, begin_ns: int, is_first: bool) -> int:
-        """Return the end, ns, of the learning period that begins at `begin_ns`."""
+        """Return the end of the learning period that begins at `begin_ns`, ns since 1970 UTC."""
         if is_first and self.until_ns is not None:
             return self.until_ns
         return begin_ns + round(self.days * DAY_NS)
@@ -125,9 +129,9 @@ class BackTestRules:
     rated
         Speed in r/min and power in MW by unit; needed for files without operating states.
     bracket_n_per_m
-        Stiffness of each bracket, if known.
+        Stiffness of each known bracket in N/m, by unit and bearing.
     author, created_ns, estimator
-        Author, time and estimator that are stored with the baselines.
+        Author, time (ns since 1970 UTC) and estimator that are stored with the baselines.
     """
 
     learning: Learning
@@ -149,7 +153,7 @@ class PeriodRun:
     Parameters
     ----------
     baseline
-        None without readings to learn from.
+        Baseline of both directions; None without readings to learn from.
     doubt
         Reason why the service would not accept the baseline by itself; empty if it would.
     far
@@ -171,7 +175,7 @@ class PeriodRun:
 
 @dataclass(frozen=True, eq=False)
 class BearingRun:
-    """Result of the back-test of one bearing."""
+    """Result of the back-test of one bearing: its readings, operating states and periods."""
 
     place: Place
     rows: BearingRows
@@ -241,11 +245,6 @@ def _run(
     return replace(run, decided=decided)
 
 
-def places_of(plant: PlantFile) -> list[Place]:
-    """Return the unit and bearing ids of all bearings of a plant."""
-    return [(unit.id, bearing.id) for unit in plant.unit for bearing in unit.bearing]
-
-
 def rules_of(
     settings: FilmAlarmSettings,
     plant: PlantFile | None,
@@ -255,7 +254,10 @@ def rules_of(
     created_ns: int,
     estimator: str,
 ) -> BackTestRules:
-    """Return the rules of a back-test; without `plant`, no rated figures and bracket stiffness."""
+    """Return the rules of a back-test with the limits of `settings`.
+
+    Rated figures and bracket stiffness are those of `plant`; None for a back-test without them.
+    """
     units = plant.unit if plant else ()
     return BackTestRules(
         learning=learning,

@@ -22,6 +22,11 @@ class UnitCauses:
     ----------
     runs
         Runs of all bearings of the unit. Only times with a reading of every bearing are used.
+
+    Attributes
+    ----------
+    responses
+        Shaft response of each period; None if it could not be learned.
     """
 
     def __init__(self, unit: str, runs: Sequence[BearingRun], rules: BackTestRules) -> None:
@@ -41,7 +46,10 @@ class UnitCauses:
         self.responses = [self._learned(period) for period in self._periods]
 
     def of(self, bearing: str, direction: str, time_ns: int) -> Attribution:
-        """Return the cause of an alarm by the readings up to a time, unknown without data."""
+        """Return the cause of an alarm of a film by the readings up to a time, ns since 1970 UTC.
+
+        The cause is unknown without shaft amplitudes, or in a learning period.
+        """
         if not self._has_amplitudes:
             return NO_AMPLITUDES
         last = int(np.searchsorted(self._time_ns, time_ns, side="right"))

@@ -51,7 +51,7 @@ class RowProblems:
             self._found.append((int(lines[n]), words))
 
     def refuse(self) -> None:
-        """Raise `ReadingsError` with the problems and their lines, if there are any."""
+        """Raise `ReadingsError` with the first problems and their lines, if there are any."""
         if not self._found:
             return
         found = sorted(self._found)[:MAX_NAMED]
@@ -94,7 +94,7 @@ MAX_ROWS = 40_000_000
 
 
 class ReadingsError(ValueError):
-    """Invalid file of readings; the message names the lines or rows."""
+    """Error raised for an invalid file of readings; the message names the lines or rows."""
 
 
 def check_headings(headings: Sequence[str]) -> None:
@@ -133,7 +133,9 @@ _TIMES = "use 2026-03-01T08:00:00Z or timestamps with a zone; name a column of n
 
 
 def converted(table: Any, line: Any, word: str) -> Any:
-    """Return a table as a record batch with the required types, times in ns and line numbers.
+    """Return an Arrow table as a record batch with the required types and a column of line numbers.
+
+    Times are ns since 1970 UTC; missing numbers are NaN, missing reasons `NO_REASON`.
 
     Parameters
     ----------

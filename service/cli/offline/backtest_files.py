@@ -144,7 +144,11 @@ QUALITY = {
 def stored_histories(
     films: FilmStore, place: Place, estimator: Estimator, start_ns: int, end_ns: int
 ) -> Iterator[FilmHistory]:
-    """Yield the stored readings of one film before `end_ns`, oldest first, in parts of 90 days."""
+    """Yield the stored readings of a bearing in parts of 90 days, oldest first.
+
+    The readings are those from `start_ns` on, before `end_ns`, both ns since 1970 UTC. Raises
+    `StoreError` if the store cannot be read.
+    """
     first_ns = films.first_ns(*place, estimator)
     if first_ns is None:
         return
@@ -157,7 +161,10 @@ def stored_histories(
 
 
 def table_of(place: Place, found: FilmHistory) -> Any:
-    """Return film readings as an Arrow table with the rows of direction x, then of y."""
+    """Return film readings as an Arrow table with the rows of direction x, then of y.
+
+    The columns are those of a file of readings; NaN becomes null.
+    """
     return pa.concat_tables(_side(place, found, side) for side in range(len(DIRECTIONS)))
 
 

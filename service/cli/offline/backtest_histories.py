@@ -53,7 +53,7 @@ class BearingRows:
     state : (n,)
         Members of `OperatingState`; None without a column of states.
     n_rows
-        Number of rows of each direction.
+        Numbers of rows of x and of y.
     """
 
     history: StiffnessHistory

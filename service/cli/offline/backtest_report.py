@@ -39,7 +39,7 @@ class ChangeReport(_Part):
 
 
 class ConditionReport(_Part):
-    """Operating condition of a bearing; null for unknown values."""
+    """Operating condition of a bearing: °C, degrees; null for unknown values."""
 
     state: str
     eccentricity_ratio: float | None
@@ -50,7 +50,10 @@ class ConditionReport(_Part):
 
 
 class CauseReport(_Part):
-    """Probable cause of an alarm, with the film's share of the change; null if unknown."""
+    """Probable cause of an alarm, with the film's fraction of the change.
+
+    The fraction and its standard uncertainty are null if unknown.
+    """
 
     cause: str
     reason: str
@@ -59,7 +62,7 @@ class CauseReport(_Part):
 
 
 class AlarmReport(_Part):
-    """Alarm of the back-test, with its largest change and its probable cause."""
+    """Alarm of the back-test, with its largest change and its probable cause; times are UTC."""
 
     unit: str
     bearing: str
@@ -69,7 +72,7 @@ class AlarmReport(_Part):
 
     begin: str
     danger: str | None
-    """Time of the first danger."""
+    """Time of the first danger; null if the alarm stayed at alert."""
 
     end: str | None
     """Time of return; null if the alarm lasted to the next machine event or the last reading."""
@@ -105,10 +108,10 @@ class SupportReport(_Part):
     cells_borrowed: int
     cells_without_support: int
     scatter_percent: float | None
-    """Scatter of single readings about the baseline."""
+    """Scatter of single readings about the baseline; null if not learned."""
 
     rejected_percent: float | None
-    """Share of readings rejected as outliers while learning."""
+    """Share of readings rejected as outliers while learning; null if not learned."""
 
 
 class FilmReport(_Part):
@@ -125,14 +128,15 @@ class FilmReport(_Part):
 
     verdicts: dict[str, int]
     judged_percent: float | None
-    """Share of normal, alert and danger among the settled readings after learning."""
+    """Share of normal, alert and danger among the settled readings after learning; null without
+    such readings."""
 
     n_alarms: int
     baselines: list[SupportReport]
 
 
 class RateReport(_Part):
-    """Rate of alarms, null for no time; on a healthy plant, the rate of false alarms."""
+    """Rate of alarms (null if nothing was compared); on a healthy plant, that of false alarms."""
 
     unit_years: float
     """From the end of learning to the end of readings, all units together."""
@@ -143,7 +147,10 @@ class RateReport(_Part):
 
 
 class BackTestReport(_Part):
-    """Report of the back-test of a file, as printed with ``--json``."""
+    """Report of the back-test of a file, as printed with ``--json``.
+
+    `doubts` are sentences, empty without doubts; `duration_s` is the time of the run.
+    """
 
     file: str
     rows: int
@@ -161,6 +168,8 @@ class AlarmStretch:
 
     Parameters
     ----------
+    begin
+        First row with the alarm.
     end
         First row without the alarm; None if it lasts.
     level
@@ -250,7 +259,7 @@ def _alarm(
 
 
 def change_report(decided: DecisionHistory, row: int) -> ChangeReport:
-    """Return the change at a row, in percent of the baseline, with its uncertainty."""
+    """Return the change at a row with an alarm, in percent of the baseline."""
     change = float(decided.change[row])
     share, std = float(np.exp(change)), abs(change) / float(decided.significance[row])
     return ChangeReport(

@@ -80,7 +80,8 @@ def csv_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
 
     Yields
     ------
-    Rows, and the number of bytes read.
+    tuple of pyarrow.RecordBatch and int
+        Rows as from `converted`, and the number of bytes read.
 
     Raises
     ------
@@ -159,7 +160,8 @@ def parquet_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
 
     Yields
     ------
-    Rows, and the approximate number of bytes read.
+    tuple of pyarrow.RecordBatch and int
+        Rows as from `converted`, and the approximate number of bytes read.
 
     Raises
     ------
@@ -200,7 +202,10 @@ WRONG_FILE = 3
 
 
 def main() -> None:
-    """Read the file named by the first argument; write its rows to standard output."""
+    """Write the rows of the file named by the first argument to standard output (Arrow stream).
+
+    Confines the process first. A wrong file ends it with `WRONG_FILE` and a message.
+    """
     confine(MEMORY_BYTES)
     try:
         with Path(sys.argv[1]).open("rb") as stream:

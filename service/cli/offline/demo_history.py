@@ -27,7 +27,7 @@ EVENT = "learned from a simulated year"
 
 
 def without_past(store: FilmStore, plant: PlantFile) -> list[UnitSettings]:
-    """Return the units with watched films that have no readings in the store."""
+    """Return the units with monitored films of which the store has no readings yet."""
     return [unit for unit, _ in _new_units(store, plant)]
 
 
@@ -53,6 +53,13 @@ def fill(
     ----------
     pasts
         Readings until now, by unit and bearing; a unit without readings is not changed.
+    now_ns
+        Time of the baseline and of its acceptance, ns since 1970 UTC.
+
+    Raises
+    ------
+    StoreError
+        If the store cannot be read or written.
     """
     for unit, rules in list(_new_units(store, plant)):
         if past := pasts.get(unit.id):
@@ -76,9 +83,8 @@ def _fill_unit(
         )
         settled.append(operation.is_settled)
         origin = Origin(unit.id, bearing, estimator, 1, AUTHOR, now_ns, EVENT)
-        learned = learn(
-            history, operation.is_settled, origin, settings.baseline.settings(1.0 / 6.0)
-        )
+        every_ten_minutes = settings.baseline.settings(1.0 / 6.0)
+        learned = learn(history, operation.is_settled, origin, every_ten_minutes)
         films = judged(history, operation, learned, rules)
         store.add_past(unit.id, bearing, estimator, films, _trends(history, estimator))
         steps = [
@@ -104,7 +110,7 @@ def judged(
     found = [learned.of(direction) for direction in DIRECTIONS]
     quantities = [quantity for quantity in found if quantity is not None]
     if len(quantities) < len(DIRECTIONS):
-        raise ValueError(f"no baseline of {learned.origin.bearing}: too few readings")
+        raise ValueError(f"bearing {learned.origin.bearing}: too few readings for a baseline")
     decided = [
         decide_all(history, operation.is_settled, q.direction, q, rules.change) for q in quantities
     ]

@@ -62,7 +62,7 @@ class CanLogDecoder:
         self._gate = FrameGate(plan, self._assembler.refused)
 
     def take(self, frames: Frames) -> list[SampleBlock]:
-        """Decode the next frames of a log, and return the completed blocks.
+        """Decode the next frames of a log, and return the completed blocks, perhaps none.
 
         Raises
         ------
@@ -77,19 +77,6 @@ class CanLogDecoder:
         if self._assembler.trouble:
             raise ConfigError(self._assembler.trouble)
         return blocks
-
-
-def log_decoder_of(unit: UnitSettings) -> CanLogDecoder | None:
-    """Return the decoder of CAN logs of a unit; None if the unit does not read CAN.
-
-    Raises
-    ------
-    ConfigError
-        If DBC, settings and calibration are inconsistent.
-    """
-    if not isinstance(unit.source, CanSourceSettings):
-        return None
-    return CanLogDecoder(can_settings_of(unit, unit.source), calibration_of(unit))
 
 
 def _messages(frames: Frames) -> Iterator[can.Message]:
@@ -148,12 +135,14 @@ def import_recording(
     *,
     advanced: Callable[[float], None] = lambda _: None,
 ) -> Manifest:
-    """Import a foreign file as a recording of a unit; return the manifest of the recording.
+    """Write the samples of a foreign file as a recording of a unit into the new `folder`.
+
+    Returns the manifest of the recording.
 
     Parameters
     ----------
     advanced
-        Called with the share of the file that has been read.
+        Called with the share of the file that has been read, 0 to 1.
 
     Raises
     ------
@@ -161,12 +150,15 @@ def import_recording(
         If file, mapping and unit are inconsistent, or the file is damaged; no files remain.
     """
     job = import_job(mapping, unit)
-    decoder = None if job.channels else log_decoder_of(unit)
-    if not job.channels and decoder is None:
+    if job.channels:
+        read = imported_blocks(path, job)
+    elif isinstance(unit.source, CanSourceSettings):
+        settings, calibration = can_settings_of(unit, unit.source), calibration_of(unit)
+        read = _decoded(path, job, CanLogDecoder(settings, calibration))
+    else:
         raise ConfigError(
             f'unit {unit.id} has no source of kind "can"; a CAN log is decoded by its DBC file'
         )
-    read = _decoded(path, job, decoder) if decoder else imported_blocks(path, job)
     recorded = recorded_unit(unit)
     joiner = BlockJoiner(job.block_samples)
     with closing(read) as found:

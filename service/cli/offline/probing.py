@@ -44,7 +44,8 @@ class RegisterLook:
     singles
         Values as int16 and uint16 in both byte orders, by name.
     pairs
-        Values of types of two registers in each byte order; empty for the last register.
+        Values of types of two registers in each byte order, None unless finite; empty for the last
+        register.
     plausible
         Byte orders in which this register and the next are a float of 1e-3 to 1e6.
     """
@@ -62,6 +63,8 @@ class ValueLook:
 
     Parameters
     ----------
+    state
+        "ok", or what is wrong: "clipped", "invalid" (by its number) or "flagged" (by a flag).
     registers
         Raw words of the value; a bit of functions 1 and 2 is 0 or 1.
     flags
@@ -79,7 +82,10 @@ class ValueLook:
 
 @dataclass(frozen=True)
 class RingChannelLook:
-    """Counts of a channel in the newest slot of a block ring, and its state by the device."""
+    """Counts of a channel in the newest slot of a block ring, and its state by the device.
+
+    `channel` counts from 0; `ok` is the bit by which the device reports a healthy transducer.
+    """
 
     channel: int
     ok: bool
@@ -232,7 +238,7 @@ async def read_map_once(
 async def read_ring_once(
     device: ModbusLinkSettings, base_address: int, function: int
 ) -> tuple[RingHeader, Slot]:
-    """Return the header and the newest slot of a block ring."""
+    """Read the header and the newest slot of a block ring."""
     client = ModbusClient(link_settings(LinkSettings, device))
     reader = RingReader(client, base_address, function)
     async with client.connected():
@@ -242,7 +248,7 @@ async def read_ring_once(
 
 
 async def identify_once(device: ModbusLinkSettings) -> Identification:
-    """Return the vendor, product code and revision of a device (function 43/14)."""
+    """Read the vendor, product code and revision of a device (function 43/14)."""
     client = ModbusClient(link_settings(LinkSettings, device))
     async with client.connected():
         return await client.identify()

@@ -15,7 +15,7 @@ from service.runtime.times import rfc3339
 
 
 def assessment_document(assessment: Assessment) -> dict[str, Any]:
-    """Return an assessment as a JSON document, in the models of the API's ``latest``."""
+    """Return an assessment as a document for JSON, with the models of the API's ``latest``."""
     return {
         "unit": assessment.unit,
         "bearing": assessment.bearing,
@@ -33,7 +33,10 @@ N_PER_GN = 1e9
 
 
 def stiffness_lines(assessment: Assessment) -> Iterator[str]:
-    """Yield the film stiffness of a bearing in x and y as text, in GN/m with its 95 % interval."""
+    """Yield the film stiffness of a bearing in x and y as text, in GN/m with its 95 % interval.
+
+    A stiffness without a value is shown with its reason, an uncertain one with its doubt.
+    """
     for axis in ("xx", "yy"):
         reading = assessment.readings[f"stiffness_{axis}_n_per_m"]
         words = f"{assessment.unit} {assessment.bearing} film stiffness {axis}: "

@@ -61,7 +61,10 @@ class SimulatedRow:
 
 @dataclass(frozen=True)
 class MeasuredRow:
-    """Measurement in X direction and the stiffness that the paper derives from it, as printed."""
+    """Measurement in X direction and the stiffness that the paper derives from it, as printed.
+
+    `table` is the number of the table, or of the section; `condition` is the time or load.
+    """
 
     table: int | str
     condition: str
@@ -170,33 +173,23 @@ class Errors:
 
 def simulated_rows() -> list[Row]:
     """Return Tables 4 to 7: 80 amplitudes from the frequency response of the 10-DOF model."""
-    rows: list[Row] = []
-    for condition in range(N_CONDITIONS):
-        rows += _condition_rows(condition)
+    rows = [row for condition in range(N_CONDITIONS) for row in _condition_rows(condition)]
     return sorted(rows, key=lambda row: int(row.table))
 
 
 def measured_rows() -> list[Row]:
-    """Return Tables 8 and 9 (X direction) and section 3.2, by equation (5)."""
+    """Return the stiffnesses of Tables 8 and 9 (X direction) and section 3.2, by equation (5)."""
     return [_measured_row(measured) for measured in MEASURED]
 
 
 def errors(rows: Sequence[Row]) -> Errors:
-    """Return the largest and the root-mean-square error.
-
-    Raises
-    ------
-    ValueError
-        If there are no rows.
-    """
+    """Return the largest and the root-mean-square error of one or more rows."""
     percent = [abs(row.error_percent) for row in rows]
-    if not percent:
-        raise ValueError("no rows to summarize")
     return Errors(max(percent), math.sqrt(sum(p * p for p in percent) / len(percent)))
 
 
 def rounding_limits_gn_per_m(measured: MeasuredRow) -> tuple[float, float]:
-    """Return the lowest and highest stiffness by equation (5) that the printed digits allow.
+    """Return the lowest and highest stiffness by equation (5) that the printed digits allow, GN/m.
 
     Each printed figure has an error of up to half a unit of its last digit.
     """
@@ -246,15 +239,9 @@ def _amplitudes_um_pk(films: dict[str, Film]) -> dict[str, list[float]]:
 
 
 def _measured_row(measured: MeasuredRow) -> Row:
-    printed = float(measured.k_eff_gn_per_m)
-    padwatch = (
-        effective_stiffness_n_per_m(
-            float(measured.bearing_um_pk),
-            float(measured.shaft_um_pk),
-            BRACKET_STIFFNESS_N_PER_M[measured.bearing],
-        )
-        / 1e9
-    )
+    printed, bracket = float(measured.k_eff_gn_per_m), BRACKET_STIFFNESS_N_PER_M[measured.bearing]
+    amplitudes_um_pk = float(measured.bearing_um_pk), float(measured.shaft_um_pk)
+    padwatch = effective_stiffness_n_per_m(*amplitudes_um_pk, bracket) / 1e9
     return Row(
         table=measured.table,
         condition=measured.condition,

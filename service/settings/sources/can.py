@@ -18,14 +18,8 @@ SampleSignals = SignalPath | Annotated[tuple[SignalPath, ...], Field(min_length=
 """Signal of a channel, or one signal for each sample in a frame, the oldest sample first."""
 
 OF_A_DBC = (
-    "signals",
-    "slow",
-    "counters",
-    "frame_samples",
-    "epoch",
-    "ok_bits",
-    "seconds",
-    "microseconds",
+    *("signals", "slow", "counters", "frame_samples", "epoch", "ok_bits"),
+    *("seconds", "microseconds"),
 )
 """Keys that refer to signals of a DBC file; not allowed with a profile."""
 
@@ -138,13 +132,14 @@ class CanSettings(Settings):
 
     @property
     def dbc_path(self) -> Path:
-        """Path of the DBC file."""
+        """Path of the DBC file; without `dbc`, the folder of the plant file."""
         return self._folder / (self.dbc or "")
 
     def check_channels(self, channels: Iterable[str], slow_channels: Iterable[str]) -> None:
         """Check that signals and channels of the unit correspond one to one.
 
-        Raises `MisfitError` if a channel is unknown or has no signal.
+        With a profile nothing is checked. Raises `MisfitError` if a channel is unknown or has no
+        signal.
         """
         if self.profile is not None:
             return
@@ -158,7 +153,8 @@ class CanSettings(Settings):
                     raise MisfitError(f"unknown channel; known channels: {words}", key, id_)
             missing = [id_ for id_ in known if id_ not in named]
             if missing:
-                raise MisfitError(f"names no signal for {', '.join(missing)}", key)
+                words = f"names no signal for {', '.join(missing)}; add a signal for each"
+                raise MisfitError(words, key)
 
     def _check_signals(self) -> None:
         if self.profile is not None:

@@ -98,7 +98,10 @@ class MappedDeviceSettings(ModbusLinkSettings):
         )
 
     def require_known(self, known: Sequence[str], *at: int | str) -> None:
-        """Raise `MisfitError` if the map has a value of a channel that is not in ``known``."""
+        """Raise `MisfitError` if the map has a value of a channel that is not in ``known``.
+
+        ``at`` is the key of this device in the unit, for the location of the error.
+        """
         for n, value in enumerate(self._map.value):
             if value.channel not in known:
                 place = (*at, "map", "value", n, "channel") if self.map else (*at, "map_file")
@@ -232,7 +235,7 @@ class ModbusFifoSettings(ModbusLinkSettings):
                 "has_counter",
             )
         if len(set(self.addresses)) < len(self.addresses):
-            raise MisfitError("must not contain an address twice", "addresses")
+            raise MisfitError("must not contain an address twice: queues are distinct", "addresses")
         return self
 
     def fifo_layout(self, n_channels: int) -> FifoLayout:
@@ -307,3 +310,4 @@ ModbusSettings = (
 SourceSettings = Annotated[
     ModbusSettings | CanSettings | SimulatedSettings, Field(discriminator="kind")
 ]
+"""Settings of a source of samples, of any kind."""

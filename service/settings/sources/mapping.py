@@ -178,8 +178,10 @@ class ImportMapping(Settings):
 
     def _check_channels(self) -> None:
         if (self.format in CAN_LOGS) == bool(self.channel):
-            words = "comes from the DBC file" if self.channel else "is required"
-            raise MisfitError(f"{words} for {self.format}", "channel")
+            words = f"comes from the DBC file for {self.format}; remove it"
+            raise MisfitError(
+                words if self.channel else f"is required for {self.format}", "channel"
+            )
         refuse_twice(("channel", n, "id", c.id) for n, c in enumerate(self.channel))
         refuse_twice(("slow_channel", n, "id", c.id) for n, c in enumerate(self.slow_channel))
         if self.format not in WITH_GROUPS:

@@ -148,7 +148,10 @@ class RegisterMapSettings(Settings):
         return self
 
     def register_map(self) -> RegisterMap:
-        """Return the settings as a `RegisterMap`; raise `MisfitError` if they are invalid."""
+        """Return the settings as a `RegisterMap`, with the defaults of the map in its cells.
+
+        Raises `MisfitError` if they are invalid.
+        """
         default = MapDefaults(self.base, self.function, self.byte_order)
         register = 4 if self.function == 4 else 3
         for n, block in enumerate(self.together):
@@ -183,6 +186,6 @@ def _optional(default: MapDefaults, cell: CellSettings | None, *at: int | str) -
 def load_map_file(path: Path) -> RegisterMapSettings:
     """Read and validate the file of a register map.
 
-    Raises `TomlFileError` if the file is unreadable or invalid.
+    Raises `TomlFileError` if the file is unreadable or invalid; the message lists every mistake.
     """
     return load_toml(path, RegisterMapSettings)

@@ -188,7 +188,8 @@ class ValueSettings(CellSettings):
             words = 'must be "lag" or "lead" for a phase, and not given otherwise'
             raise MisfitError(words, "phase")
         if self.scale_register is not None and self.full_scale is not None:
-            raise MisfitError("cannot be combined with full_scale", "scale_register")
+            words = "cannot be combined with full_scale; remove one of them"
+            raise MisfitError(words, "scale_register")
         low, high = self.invalid_below, self.invalid_above
         if low is not None and high is not None and not low < high:
             raise MisfitError(f"must be below invalid_above = {high:g}", "invalid_below")
@@ -208,7 +209,7 @@ class ValueSettings(CellSettings):
 
     @property
     def rim_factor(self) -> float:
-        """Factor from the reading to zero-to-peak amplitude or phase lead; 1 otherwise."""
+        """Factor from the reading to zero-to-peak amplitude or phase lead; 1 for other values."""
         factor = PK_PER[self.detector] if self.detector else 1.0
         return factor * (SIGN_OF[self.phase] if self.phase else 1.0)
 
@@ -232,9 +233,9 @@ class MapDefaults:
             raise MisfitError(words, *at, "address")
 
     def cell(self, settings: CellSettings, *at: int | str) -> Cell:
-        """Return the settings, completed by the defaults; raise `MisfitError` if they misfit.
+        """Return the settings, completed by the defaults, as a `Cell` of the Modbus adapter.
 
-        `at` is the place of the settings in the register map, for the error.
+        `at` is the location of the settings in the register map, for the error.
         """
         cell = Cell(
             address=settings.address,
