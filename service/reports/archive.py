@@ -27,7 +27,6 @@ from service.reports.folders import (
 )
 from service.runtime.times import compact
 from service.settings.configuration import canonical
-from service.store.films import FilmStore
 from service.store.port import AlarmQuery
 from service.store.store import Store
 
@@ -87,15 +86,13 @@ class Occurrence:
 
 
 class EvidenceArchive:
-    """Archive of evidence bundles, read only. Its methods block: call them in a thread."""
+    """Archive of evidence bundles, read only. Its methods block: call them in a thread.
+
+    `films` is the store of the readings of films.
+    """
 
     def __init__(self, folders: EvidenceFolders, store: Store) -> None:
-        self.folders, self._store = folders, store
-
-    @property
-    def films(self) -> FilmStore:
-        """Store of the readings of films."""
-        return self._store.films
+        self.folders, self._store, self.films = folders, store, store.films
 
     def occurrences(self, alarm: str, pending: Occurrences, most: int) -> list[Occurrence]:
         """Return the newest occurrences of an alarm, at most `most`, newest first.

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -180,40 +179,27 @@ MAX_MEMBERS = 2000
 """Maximum number of readings listed in a comparison."""
 
 
-@dataclass(frozen=True)
-class Members:
-    """Settled readings of a cell in the learning period of the baseline, in both directions."""
-
-    history: StiffnessHistory
-
-    def part(self, direction: Direction) -> MembersPart:
-        """Return the readings of one direction, evenly thinned to at most `MAX_MEMBERS`."""
-        row, found = AXES.index(direction), self.history
-        measured = np.flatnonzero(np.isfinite(found.ln_k[row]))
-        step = max(1, -(-measured.size // MAX_MEMBERS))
-        rows = measured[::step]
-        columns = (
-            found.time_ns[rows] / NS_PER_S,
-            np.exp(found.ln_k[row, rows]),
-            found.u_random[row, rows],
-            found.eccentricity_ratio[rows],
-            found.oil_temperature_c[rows],
-        )
-        time, *others = (column.tolist() for column in columns)
-        stiffness, u_random, e, oil_c = ([rounded(each) for each in column] for column in others)
-        return MembersPart(
-            n_in_all=int(measured.size),
-            time=time,
-            stiffness_n_per_m=stiffness,
-            u_random=u_random,
-            eccentricity_ratio=e,
-            oil_temperature_c=oil_c,
-        )
+def _members_part(found: StiffnessHistory, direction: Direction) -> MembersPart:
+    """Return the readings of one direction, evenly thinned to at most `MAX_MEMBERS`."""
+    row = AXES.index(direction)
+    measured = np.flatnonzero(np.isfinite(found.ln_k[row]))
+    rows = measured[:: max(1, -(-measured.size // MAX_MEMBERS))]
+    columns = {
+        "stiffness_n_per_m": np.exp(found.ln_k[row, rows]),
+        "u_random": found.u_random[row, rows],
+        "eccentricity_ratio": found.eccentricity_ratio[rows],
+        "oil_temperature_c": found.oil_temperature_c[rows],
+    }
+    return MembersPart(
+        n_in_all=int(measured.size),
+        time=(found.time_ns[rows] / NS_PER_S).tolist(),
+        **{name: [rounded(each) for each in column.tolist()] for name, column in columns.items()},
+    )
 
 
 def members_of(
     store: FilmStore, cell: Cell, baseline: BearingBaseline, rules: FilmRules
-) -> Members:
+) -> StiffnessHistory:
     """Return the settled readings of a cell in the learning period, except those with an alarm.
 
     Raises
@@ -241,26 +227,11 @@ def members_of(
         in_cell = rules.grid.is_known(conditions)
         in_cell &= np.all(rules.grid.cells(conditions) == wanted, axis=0)
     is_healthy = found.is_settled & ~np.any(found.level > 0, axis=0)
-    return Members(history.where(in_cell & is_healthy))
+    return history.where(in_cell & is_healthy)
 
 
 N_EXPECTED = 60
 """Number of points of the curve of expected stiffness."""
-
-
-def comparisons(
-    news: FilmNews, baseline: BearingBaseline | None, rules: FilmRules, members: Members | None
-) -> list[ComparisonPart]:
-    """Return the comparisons of the film of a bearing with its baseline, in x and in y.
-
-    Parameters
-    ----------
-    baseline
-        Baseline of the bearing; None leaves what is expected empty.
-    members
-        Readings of the cell; None if the store is unreadable or the cell is unknown.
-    """
-    return [_comparison(news, axis, baseline, rules, members) for axis in AXES]
 
 
 def cell_of(news: FilmNews, rules: FilmRules) -> Cell | None:
@@ -271,13 +242,22 @@ def cell_of(news: FilmNews, rules: FilmRules) -> Cell | None:
     return tuple(rules.grid.cells(here)[:, 0].tolist())
 
 
-def _comparison(
+def comparison(
     news: FilmNews,
     direction: Direction,
     baseline: BearingBaseline | None,
     rules: FilmRules,
-    members: Members | None,
+    members: StiffnessHistory | None,
 ) -> ComparisonPart:
+    """Return the comparison of a film in one direction with its baseline.
+
+    Parameters
+    ----------
+    baseline
+        Baseline of the bearing; None leaves what is expected empty.
+    members
+        Readings of the cell; None if the store is unreadable or the cell is unknown.
+    """
     reading, row = news.reading, AXES.index(direction)
     value, cell = reading.values[row], cell_of(news, rules)
     learned = baseline.of(direction) if baseline else None
@@ -299,7 +279,7 @@ def _comparison(
         cell=None if own is None else _cell_part(own),
         bounds=cell_bounds(cell, rules.grid),
         time_scales=list(_time_scales(news.decisions[row], learned, rules)) if learned else [],
-        members=None if members is None or cell is None else members.part(direction),
+        members=None if members is None else _members_part(members, direction),
         expected=None if learned is None else _line(learned, news),
         map=[_cell_part(each) for each in cells],
     )

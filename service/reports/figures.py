@@ -8,7 +8,7 @@ from html import escape
 from core.quality import Reason
 from core.units import NS_PER_S
 from service.reports.case import Case
-from service.reports.parts import BearingPart, CellPart, ComparisonPart
+from service.reports.parts import CellPart, ComparisonPart
 from service.reports.plots import Plot, Scale, TimeScale, Values, around
 from service.reports.tables import Columns
 
@@ -48,7 +48,11 @@ def spectra_figure(case: Case) -> Figure | None:
         *(Scale(0.0, f[-1]), heights),
         *("Frequency, Hz", f"Amplitude {axis}, µm 0-pk", "Spectra", "spectra"),
     )
-    _mark_orders(plot, bearing)
+    lines = (("order1_frequency_hz", "1×"), ("vortex_frequency_hz", "vortex"))
+    for row, (name, words) in enumerate(lines):
+        reading = bearing.readings.get(name)
+        if reading and reading.reason != Reason.OUTSIDE_BAND and reading.value is not None:
+            plot.upright(reading.value, "marked", words, row)
     plot.line(f, shaft, "shaft")
     plot.line(f, frame, "bearing")
     return Figure(
@@ -68,15 +72,6 @@ def _decades(amplitudes: Sequence[float]) -> Scale | None:
     floor = max(min(seen), top * 1e-5)
     low, high = math.floor(math.log10(floor)), math.ceil(math.log10(top))
     return Scale(10.0**low, 10.0 ** max(high, low + 1), True)
-
-
-def _mark_orders(plot: Plot, bearing: BearingPart) -> None:
-    lines = (("order1_frequency_hz", "1×"), ("vortex_frequency_hz", "vortex"))
-    for row, (name, words) in enumerate(lines):
-        reading = bearing.readings.get(name)
-        is_there = reading is not None and reading.reason != Reason.OUTSIDE_BAND
-        if reading is not None and is_there and reading.value is not None:
-            plot.upright(reading.value, "marked", words, row)
 
 
 def orbit_figure(case: Case) -> Figure | None:
@@ -110,9 +105,6 @@ def finite_of(values: Values) -> list[float | None]:
     return [v if v is not None and math.isfinite(v) else None for v in values]
 
 
-EccentricityStiffness = tuple[list[float | None], list[float | None]]
-"""Columns of eccentricity ratio and stiffness."""
-
 LOOKS = {"none": "unknown", "borrowed": "borrowed", "own": "known"}
 """CSS classes of cells by support."""
 
@@ -134,7 +126,17 @@ def condition_figure(case: Case) -> Figure | None:
         *("Eccentricity ratio, 1", f"Stiffness {case.direction}, GN/m"),
         *("Stiffness against condition", "condition"),
     )
-    _draw_films(plot, found, recent, y)
+    expected = found.expected
+    if found.bounds:
+        plot.cell(found.bounds[0], y, "strip")
+    if members is not None:
+        plot.dots(members.eccentricity_ratio, members.stiffness_n_per_m, "member")
+    if expected is not None:
+        plot.line(expected.eccentricity_ratio, expected.stiffness_n_per_m, "expected")
+    plot.dots(*recent, "today")
+    k_alarm, u = found.stiffness_n_per_m, found.u_random
+    error = None if k_alarm is None or u is None else 1.96 * u * k_alarm
+    plot.points([found.eccentricity_ratio], [k_alarm], "alarm", 2.4, [error])
     return Figure(
         plot,
         f"Grey: the {members.n_in_all if members else 0} readings of the cell (pink) of the"
@@ -169,22 +171,6 @@ def map_figure(case: Case) -> Figure | None:
     )
 
 
-def _draw_films(
-    plot: Plot, found: ComparisonPart, recent: EccentricityStiffness, height: tuple[float, float]
-) -> None:
-    members, expected = found.members, found.expected
-    if found.bounds:
-        plot.cell(found.bounds[0], height, "strip")
-    if members is not None:
-        plot.dots(members.eccentricity_ratio, members.stiffness_n_per_m, "member")
-    if expected is not None:
-        plot.line(expected.eccentricity_ratio, expected.stiffness_n_per_m, "expected")
-    plot.dots(*recent, "today")
-    k, u = found.stiffness_n_per_m, found.u_random
-    error = None if k is None or u is None else 1.96 * u * k
-    plot.points([found.eccentricity_ratio], [k], "alarm", 2.4, [error])
-
-
 def _bounds(found: ComparisonPart, cell: CellPart) -> list[tuple[float, float]]:
     """Return the limits of a cell along both axes; all cells have the widths of the alarm's."""
     widths = [high - low for low, high in (found.bounds or ())[:2]]
@@ -197,7 +183,7 @@ def _darkness(cell: CellPart, low: float, high: float) -> float:
     return 0.12 + 0.78 * math.log(cell.location_n_per_m / low) / math.log(high / low)
 
 
-def _recent(case: Case) -> EccentricityStiffness:
+def _recent(case: Case) -> tuple[list[float | None], list[float | None]]:
     """Return eccentricity and stiffness of the settled readings within a day before the alarm."""
     table = case.before
     since_ns = case.evidence.alarm.time_ns - DAY_S * NS_PER_S
@@ -232,7 +218,14 @@ def trend_figure(case: Case) -> Figure | None:
         Scale(*room, divisor=GN_PER_M),
         *("Time, UTC", f"Stiffness {axis}, GN/m", "Stiffness over time", "trend"),
     )
-    _draw(plot, found)
+    time, k, after = found.time, found.stiffness, found.after
+    before = [s and not a for s, a in zip(found.is_settled, after, strict=True)]
+    plot.band(time, found.lows, found.highs, "band", HOLE_S)
+    plot.line(time, found.expected, "expected", HOLE_S)
+    plot.dots(time, _where(k, [not settled for settled in found.is_settled]), "unsettled")
+    plot.dots(time, _where(k, before), "today")
+    plot.dots(time, _where(k, after), "alarm")
+    plot.upright(found.alarm_s, "at")
     plot.points([found.alarm_s], [own], "alarm", 2.2)
     days = (found.last_s - found.first_s) / DAY_S
     return Figure(
@@ -295,17 +288,6 @@ def _trend(case: Case) -> _Trend | None:
         is_settled=[bool(each) for each in table["is_settled"]],
         limit=case.evidence.limits["films"]["change"]["alert_change"],
     )
-
-
-def _draw(plot: Plot, found: _Trend) -> None:
-    time, k, after = found.time, found.stiffness, found.after
-    before = [s and not a for s, a in zip(found.is_settled, after, strict=True)]
-    plot.band(time, found.lows, found.highs, "band", HOLE_S)
-    plot.line(time, found.expected, "expected", HOLE_S)
-    plot.dots(time, _where(k, [not settled for settled in found.is_settled]), "unsettled")
-    plot.dots(time, _where(k, before), "today")
-    plot.dots(time, _where(k, after), "alarm")
-    plot.upright(found.alarm_s, "at")
 
 
 def _times(values: Values, factor: float) -> list[float | None]:

@@ -9,7 +9,7 @@ from core.stiffness.estimators import ESTIMATORS
 from service.reports.case import Case
 from service.reports.document import Evidence
 from service.reports.figures import figures
-from service.reports.parts import AXES, BearingPart, EstimatorPart, FindingPart, ReadingPart
+from service.reports.parts import AXES, BearingPart, EstimatorPart, FindingPart
 from service.runtime.times import day_and_time
 from service.settings.alarm_kinds import kind_words
 
@@ -116,7 +116,8 @@ def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
     if case.bearing is not None:
         yield "Condition", condition_words(case.bearing)
     yield "Samples", SAMPLES[case.samples.value]
-    yield "State now", f"{state_words(case)}; as of {now}"
+    newest = case.events[-1].state_after.value if case.events else "its events are not in the store"
+    yield "State now", f"{plain(newest)}; as of {now}"
     yield "Seen by", seen_words(case)
 
 
@@ -166,21 +167,9 @@ def condition_words(bearing: BearingPart) -> str:
         reading = bearing.readings.get(name)
         if reading is not None and reading.value is not None:
             label = "e = " if name == "eccentricity_ratio" else ""
-            words.append(f"{label}{number_words(reading)}")
+            unit = "" if reading.unit == "1" else f" {reading.unit}"
+            words.append(f"{label}{reading.value:.4g}{unit}")
     return ", ".join(words)
-
-
-def number_words(reading: ReadingPart) -> str:
-    """Return the value of a reading with its unit, in four digits; a dash if unknown."""
-    unit = "" if reading.unit == "1" else f" {reading.unit}"
-    return "–" if reading.value is None else f"{reading.value:.4g}{unit}"
-
-
-def state_words(case: Case) -> str:
-    """Return the state of the alarm after the newest event; a sentence if none is stored."""
-    if not case.events:
-        return "its events are not in the store"
-    return plain(case.events[-1].state_after.value)
 
 
 def seen_words(case: Case) -> str:

@@ -407,7 +407,7 @@ class ComparisonPart(EvidencePart):
     """Readings in the cell; null if the store was unreadable or the cell is unknown."""
 
     expected: ExpectedPart | None
-    """Expected stiffness; null without a baseline."""
+    """Expected stiffness; null without a baseline or without an oil temperature."""
 
     map: list[CellPart]
     """All cells of the baseline; empty without a baseline."""

@@ -54,18 +54,11 @@ class Scale:
 
 
 @dataclass(frozen=True)
-class TimeScale:
-    """Scale of a time axis, in seconds since 1970 UTC."""
-
-    low: float
-    high: float
-
-    def at(self, value: float) -> float:
-        """Return the position of a value, 0 to 1 within the axis."""
-        return (value - self.low) / (self.high - self.low)
+class TimeScale(Scale):
+    """Linear scale of a time axis, in seconds since 1970 UTC."""
 
     def ticks(self, most: int = 8) -> Sequence[Tick]:
-        """Return the ticks at round hours or days, about `most` of them."""
+        """Return about `most` ticks at round hours or days of UTC."""
         span_h = (self.high - self.low) / 3600.0
         step_s = 3600.0 * next((s for s in TIME_STEPS_H if span_h / s <= most), TIME_STEPS_H[-1])
         first = math.ceil(self.low / step_s)
@@ -116,7 +109,7 @@ class Plot:
 
     width: float
     height: float
-    x: Scale | TimeScale
+    x: Scale
     y: Scale
     x_label: str
     y_label: str
@@ -141,12 +134,14 @@ class Plot:
         """Add the area between two lines, interrupted where `line` interrupts a line."""
         piece: list[tuple[float, float, float]] = []
         for x, low, high in zip(xs, lows, highs, strict=True):
-            is_known = x is not None and low is not None and high is not None
-            if piece and (x is None or not is_known or x - piece[-1][0] > longest_step):
+            if x is None or low is None or high is None:
                 self._area(piece, look)
                 piece = []
-            if x is not None and low is not None and high is not None:
-                piece.append((x, low, high))
+                continue
+            if piece and x - piece[-1][0] > longest_step:
+                self._area(piece, look)
+                piece = []
+            piece.append((x, low, high))
         self._area(piece, look)
 
     def points(

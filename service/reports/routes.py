@@ -3,7 +3,6 @@
 import asyncio
 import re
 from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass
 from typing import Annotated, Literal
 from urllib.parse import quote
 
@@ -83,14 +82,6 @@ class OccurrencesModel(ApiModel):
     """Occurrences of the alarm, newest first."""
 
 
-@dataclass(frozen=True)
-class Found:
-    """Occurrence with the state of its samples."""
-
-    occurrence: Occurrence
-    samples: SamplesState
-
-
 class EvidenceService:
     """Service of the evidence routes: lists evidence, and creates reports and bundles.
 
@@ -110,13 +101,16 @@ class EvidenceService:
         self.archive, self._status, self._clock = archive, status, clock
         self._downloads, self._trend_days = downloads, trend_days
 
-    async def occurrences(self, alarm: str, most: int) -> list[Found]:
-        """Return the newest occurrences of an alarm, at most `most`, newest first."""
+    async def occurrences(self, alarm: str, most: int) -> list[tuple[Occurrence, SamplesState]]:
+        """Return the newest occurrences of an alarm with their samples' states, newest first.
+
+        At most `most` are returned.
+        """
         pending, capturing = self._unfinished()
 
-        def look() -> list[Found]:
+        def look() -> list[tuple[Occurrence, SamplesState]]:
             found = self.archive.occurrences(alarm, pending, most)
-            return [Found(each, self.archive.samples(each, capturing)) for each in found]
+            return [(each, self.archive.samples(each, capturing)) for each in found]
 
         return await self._downloads.worked(look)
 
@@ -134,7 +128,13 @@ class EvidenceService:
             If the bundle cannot be read, or does not exist.
         """
         _, capturing = self._unfinished()
-        return await self._downloads.worked(lambda: self._report(found, capturing))
+
+        def made() -> str:
+            samples = self.archive.samples(found, capturing)
+            case = read_case(self.archive, found, samples, self._trend_days)
+            return report_page(case, self._clock.now_ns())
+
+        return await self._downloads.worked(made)
 
     async def bundle(self, found: Occurrence, has_configuration: bool) -> AsyncIterator[bytes]:
         """Return the bundle of an occurrence as the chunks of a ZIP file.
@@ -162,11 +162,6 @@ class EvidenceService:
         """Return which bundles are to be written, and which recordings are to be linked."""
         status = self._status()
         return (frozenset(), frozenset()) if status is None else (status.pending, status.capturing)
-
-    def _report(self, found: Occurrence, capturing: frozenset[tuple[str, int]]) -> str:
-        samples = self.archive.samples(found, capturing)
-        case = read_case(self.archive, found, samples, self._trend_days)
-        return report_page(case, self._clock.now_ns())
 
 
 BACK = '<nav><a href="/#/alarms">Alarm list</a></nav>'
@@ -215,7 +210,7 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
         return OccurrencesModel(
             alarm=alarm,
             origin=context.origin.value,
-            occurrences=[_occurrence_model(each) for each in found],
+            occurrences=[_occurrence_model(*each) for each in found],
         )
 
     @router.get("/{occurrence}", summary="Evidence document", responses=PROBLEMS)
@@ -302,8 +297,8 @@ async def _complete(
     return found
 
 
-def _occurrence_model(found: Found) -> OccurrenceModel:
-    occurrence, event = found.occurrence, found.occurrence.event
+def _occurrence_model(occurrence: Occurrence, samples: SamplesState) -> OccurrenceModel:
+    event = occurrence.event
     path = f"/api/v1/alarms/{quote(event.identity.id, safe=':')}/evidence/{event.occurrence}"
     return OccurrenceModel(
         occurrence=event.occurrence,
@@ -311,7 +306,7 @@ def _occurrence_model(found: Found) -> OccurrenceModel:
         level=None if event.level is None else LEVEL_NAMES[event.level],
         time=rfc3339(event.time_ns),
         state=occurrence.state.value,
-        samples=found.samples.value,
+        samples=samples.value,
         evidence=path if occurrence.state is EvidenceState.COMPLETE else None,
     )
 

@@ -5,10 +5,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from core.units import DAY_NS
-from service.reports.contents import cell_of, comparisons, members_of
+from service.reports.contents import cell_of, comparison, members_of
 from service.reports.document import Maker, composed, file_part, not_known, sealed
 from service.reports.folders import DOCUMENT, INCOMPLETE, Place, place_of
-from service.reports.parts import ComparisonPart
+from service.reports.parts import AXES, ComparisonPart
 from service.reports.retention import EvidenceLimits
 from service.reports.snapshot import Snapshot
 from service.reports.tables import ORBITS, SPECTRA, TREND, orbits_table, spectra_table, trend_table
@@ -73,7 +73,8 @@ class EvidenceWriter:
         cell, members = cell_of(found.film, snapshot.rules), None
         if with_history and cell is not None and found.baseline is not None:
             members = members_of(self._store, cell, found.baseline, snapshot.rules)
-        return comparisons(found.film, found.baseline, snapshot.rules, members)
+        rest = (found.baseline, snapshot.rules, members)
+        return [comparison(found.film, axis, *rest) for axis in AXES]
 
     def _tables(self, snapshot: Snapshot, with_history: bool) -> dict[str, bytes]:
         found = [b.assessment for b in snapshot.bearings.values() if b.assessment is not None]

@@ -116,14 +116,6 @@ MAX_SHOWN = 60
 UNION_ERRORS = ("union_tag_invalid", "union_tag_not_found")
 
 
-def is_echo(error: ErrorDetails) -> bool:
-    """Return whether a list is too short only because its invalid elements were removed.
-
-    Errors about these elements are reported separately.
-    """
-    return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
-
-
 def located(error: ErrorDetails, data: Mapping[str, Any]) -> Location:
     """Return the location of a validation error in ``data``, the content of the file."""
     location = _without_tags(error["loc"], data)
@@ -230,7 +222,12 @@ def load_toml(path: Path, model: type[Model]) -> Model:
         if error.errors()[0]["type"] == "json_invalid":
             raise TomlFileError(f"{path}: {TOO_DEEP}") from error
         schema = schema_of(model)
-        mistakes = [(located(e, data), e) for e in error.errors() if not is_echo(e)]
+        mistakes = [
+            (located(e, data), e)
+            for e in error.errors()
+            # pydantic removes invalid elements, and then also reports that the list is too short
+            if e["type"] != "too_short" or len(e["input"]) < e["ctx"]["min_length"]
+        ]
         lines = (
             f"{path}:{line_of(at, text)}: {sentence(schema, e, at, data)}" for at, e in mistakes
         )

@@ -44,7 +44,7 @@ def read_histories(
     places: Collection[Place] | None = None,
     advanced: Callable[[int], object] = lambda _: None,
 ) -> dict[Place, BearingRows]:
-    """Read the readings of all bearings from a CSV or Parquet file.
+    """Read the readings of all bearings from a CSV or Parquet file, by unit and bearing.
 
     Parameters
     ----------

@@ -133,7 +133,7 @@ def _table(text: bytes, numbers: TimeArray, headings: list[str]) -> Any:
     except pa.ArrowInvalid as error:
         raise ReadingsError(_misfit(misfits, numbers, headings, error)) from error
     if len(table) != numbers.size:
-        raise ReadingsError(f"line {numbers[0]} or a later line: invalid row")
+        raise ReadingsError(f"line {numbers[0]} or later: a row cannot be read; check its quotes")
     if b" " not in text:
         return table
     columns = [pc.utf8_trim_whitespace(column) for column in table.columns]

@@ -1,6 +1,6 @@
 """Import of foreign files and CAN logs into recordings."""
 
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -154,7 +154,8 @@ def import_recording(
         read = imported_blocks(path, job)
     elif isinstance(unit.source, CanSourceSettings):
         settings, calibration = can_settings_of(unit, unit.source), calibration_of(unit)
-        read = _decoded(path, job, CanLogDecoder(settings, calibration))
+        decoder, logged = CanLogDecoder(settings, calibration), imported_frames(path, job)
+        read = ((block, done) for frames, done in logged for block in decoder.take(frames))
     else:
         raise ConfigError(
             f'unit {unit.id} has no source of kind "can"; a CAN log is decoded by its DBC file'
@@ -174,13 +175,6 @@ def import_recording(
             for block in joiner.flush():
                 writer.write(block)
     return read_manifest(folder)
-
-
-def _decoded(
-    path: Path, job: ImportJob, decoder: CanLogDecoder
-) -> Generator[tuple[SampleBlock, float]]:
-    for frames, done in imported_frames(path, job):
-        yield from ((block, done) for block in decoder.take(frames))
 
 
 def _with_all_slow(block: SampleBlock, calibration: UnitCalibration) -> SampleBlock:

@@ -259,25 +259,21 @@ class MapDefaults:
     def value(self, settings: ValueSettings, *at: int | str) -> MapValue:
         """Return the settings of a value as a `MapValue`, scaled to zero-to-peak and phase lead."""
         low, high = settings.invalid_below, settings.invalid_above
+        scale = settings.scale_register
         return MapValue(
             id=settings.id,
             cell=self.cell(settings, *at),
             scale=settings.scale * settings.rim_factor,
             offset=settings.offset * settings.rim_factor,
-            scale_register=self._scale_register(settings.scale_register, *at, "scale_register"),
+            scale_register=None
+            if scale is None
+            else ScaleRegister(cell=self.cell(scale, *at, "scale_register"), divisor=scale.divisor),
             full_scale=self._full_scale(settings.full_scale, *at, "full_scale"),
             flags=tuple(self._flag(f, *at, "flag", n) for n, f in enumerate(settings.flag)),
             invalid_values=settings.invalid_values,
             invalid_below=-math.inf if low is None else low,
             invalid_above=math.inf if high is None else high,
         )
-
-    def _scale_register(
-        self, scale: ScaleRegisterSettings | None, *at: int | str
-    ) -> ScaleRegister | None:
-        if scale is None:
-            return None
-        return ScaleRegister(cell=self.cell(scale, *at), divisor=scale.divisor)
 
     def _full_scale(self, span: FullScaleSettings | None, *at: int | str) -> FullScale | None:
         if span is None:
