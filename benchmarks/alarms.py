@@ -22,7 +22,7 @@ from core.samples.blocks import DeviceClock, SampleBlock
 from service.app.kept_files import captures_of
 from service.measuring.simulated_sources import simulated_feed
 from service.settings.core_values import machine_of
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.settings.storage import Origin
 
 DEMO = Path(__file__).parents[1] / "deploy" / "demo.toml"

@@ -14,7 +14,7 @@ from pathlib import Path
 from service.app.storage import open_store
 from service.cli.offline.demo_history import fill
 from service.measuring.simulated_sources import simulated_history
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 
 DEMO = Path(__file__).parents[1] / "deploy" / "demo-life.toml"
 PADWATCH = (sys.executable, "-m", "service.cli.main")

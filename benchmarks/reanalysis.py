@@ -23,7 +23,7 @@ from core.units import ns_from_s
 from service.measuring.simulated_sources import simulated_feed
 from service.settings.adapter_values import recorded_unit
 from service.settings.core_values import calibration_of
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 
 PLANT = Path(__file__).parents[1] / "deploy" / "demo.toml"
 SECONDS = 3600.0

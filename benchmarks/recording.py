@@ -18,7 +18,7 @@ from service.recordings.continuous_recorder import UnitRecorder
 from service.recordings.segment import SegmentSettings, join
 from service.settings.adapter_values import recorded_unit
 from service.settings.core_values import calibration_of
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.settings.units import UnitSettings
 
 PLANT = Path(__file__).parents[1] / "deploy" / "demo.toml"

@@ -22,8 +22,7 @@ from service.cli.options import (
     print_result,
 )
 from service.runtime.process import made_by
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.store.access.audit_entries import Acting, Source, acting_as
 from service.store.access.identities import MAX_DAYS, ApiKey, Role, account_name
 from service.store.access.tables import AccessStore

@@ -11,7 +11,7 @@ import typer
 from service.api.audit_csv import write_csv
 from service.app.storage import open_trails
 from service.cli.options import JsonOutput, PlantPath, argument, command_group, fail, print_result
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.store.access.audit_verification import Verdict
 from service.store.audit import by_time
 

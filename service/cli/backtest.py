@@ -18,7 +18,7 @@ from service.cli.offline.backtest_files import read_histories
 from service.cli.options import JsonOutput, argument, fail, option, print_result, progress
 from service.runtime.process import made_by
 from service.settings.films import FilmAlarmSettings
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.settings.toml_file import load_toml
 
 

@@ -15,7 +15,7 @@ from service.cli.options import (
     print_result,
 )
 from service.settings.can_values import require_dbc_fits
-from service.settings.loading import load_plant_file, plant_file_schema
+from service.settings.plant import load_plant_file, plant_file_schema
 
 app = command_group("Check a plant file, print its schema or an example.")
 

@@ -24,8 +24,7 @@ from service.app.recordings import recordings_by_unit, selection_of
 from service.app.simulated_daq import Wire, daq_of, over_wire, run_daq
 from service.cli.options import PlantPath, fail, option
 from service.measuring.simulated_sources import simulated_feed
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.settings.units import UnitSettings
 
 SpeedOption = Annotated[

@@ -21,8 +21,7 @@ from service.cli.options import (
 from service.notifications.channel import Delivered, Outcome, Refused
 from service.notifications.message import AlarmContext, dumps
 from service.notifications.sender import Receiver
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.settings.storage import Origin
 
 app = command_group("Test receivers of alarms, and resend messages.")

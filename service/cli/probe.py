@@ -33,7 +33,7 @@ from service.cli.options import (
     print_result,
 )
 from service.runtime.times import rfc3339
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.settings.sources.devices import MappedDeviceSettings
 from service.settings.sources.modbus import ModbusLinkSettings
 from service.settings.sources.register_map import load_map_file

@@ -28,8 +28,7 @@ from service.runtime.child import Child
 from service.runtime.listening import PortInUseError, listen
 from service.runtime.process import leave, run_to_its_end
 from service.runtime.service_manager import ServiceManager
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.settings.processes import StreamSettings
 from service.store.port import StoreError
 

@@ -37,7 +37,7 @@ from service.cli.options import (
 from service.runtime.process import return_large_pieces
 from service.runtime.times import rfc3339
 from service.settings.core_values import analysis_of, calibration_of, machine_of
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 
 BLOCK_S = 10.0
 """Length of the blocks of a recording; without alarms to raise, long ones cost least."""

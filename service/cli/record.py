@@ -27,7 +27,7 @@ from service.cli.options import (
 )
 from service.measuring.sources import source_of
 from service.runtime.process import made_by
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.settings.sources.devices import ModbusVectorSettings
 
 MAX_SECONDS = 7 * 86_400.0

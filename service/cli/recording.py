@@ -35,8 +35,7 @@ from service.recordings.folders import place_of
 from service.recordings.index import CheckResult, RecordingCheck, RecordingState
 from service.runtime.process import made_by
 from service.runtime.times import rfc3339
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.settings.sources.mapping import ImportMapping
 from service.settings.toml_file import load_toml
 from service.store.waveforms import WaveformFile, WaveformKind
@@ -82,20 +81,17 @@ def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
 
 
 def _verdicts(plant: PlantFile, roots: Mapping[WaveformKind, Path]) -> list[CheckResult]:
-    checking = RecordingCheck(roots, _index(plant), SystemClock().now_ns())
+    index: Sequence[WaveformFile] = []
+    if has_store(plant):
+        with plant_store(plant) as store:
+            index = store.waveforms.files(place_of(Path(plant.service.data_folder)))
+    checking = RecordingCheck(roots, index, SystemClock().now_ns())
     found = []
     with progress("Checking", checking.n_to_read) as bar:
         for verdict in checking.results():
             found.append(verdict)
             bar.update(1)
     return found
-
-
-def _index(plant: PlantFile) -> Sequence[WaveformFile]:
-    if not has_store(plant):
-        return []
-    with plant_store(plant) as store:
-        return store.waveforms.files(place_of(Path(plant.service.data_folder)))
 
 
 def _words(found: RecordingState) -> str:

@@ -31,8 +31,7 @@ from service.measuring.references import (
 )
 from service.runtime.process import person
 from service.settings.core_values import machine_of
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.store.access.audit_entries import Acting, Source, acting_as
 from service.store.references import GapReference, ReferenceSource
 

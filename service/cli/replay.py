@@ -30,8 +30,7 @@ from service.cli.processes import announce
 from service.measuring.live_view import LiveView
 from service.measuring.sources import source_of, watched_units
 from service.runtime.process import run_to_its_end
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.settings.storage import Origin
 
 

@@ -13,7 +13,7 @@ def run(plant_file: PlantPath, port: PortOption = None) -> None:
         from service.app.listener import listener_of
         from service.cli.processes import run_plant
         from service.runtime.process import leave
-        from service.settings.loading import load_plant_file
+        from service.settings.plant import load_plant_file
 
         plant = load_plant_file(plant_file)
         with listener_of(plant, plant.service.port if port is None else port) as listener:

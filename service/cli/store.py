@@ -24,8 +24,7 @@ from service.cli.options import (
     progress,
 )
 from service.settings.core_values import watched_estimator
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.store.backup import (
     AccessAfter,
     access_before,

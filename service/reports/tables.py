@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from io import BytesIO
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,6 @@ SPECTRA, ORBITS, TREND = "spectra.parquet", "orbits.parquet", "trend.parquet"
 
 CHANNELS = ("shaft_x", "shaft_y", "bearing_x", "bearing_y")
 """Names of the channels of a cross-spectrum, in order."""
-
-PAIRS = [(i, j) for i in range(len(CHANNELS)) for j in range(i + 1, len(CHANNELS))]
 
 WORDS = np.array([verdict.name.lower() for verdict in Verdict])
 
@@ -132,7 +131,7 @@ def _spectrum(bearing: str, found: CrossSpectrum) -> "pa.Table":
     }
     columns |= {
         f"{part}_{CHANNELS[i]}_{CHANNELS[j]}_um2": column
-        for i, j in PAIRS
+        for i, j in combinations(range(len(CHANNELS)), 2)
         for part, column in (
             ("re", np.ascontiguousarray(found.matrix[:, i, j].real)),
             ("im", np.ascontiguousarray(found.matrix[:, i, j].imag)),

@@ -79,12 +79,15 @@ MEASURANDS = {
 }
 
 LENGTH_UNITS = (SensitivityUnit.V_PER_MM, SensitivityUnit.MV_PER_UM)
-ALLOWED_UNITS = {
-    Transducer.PROXIMITY_PROBE: LENGTH_UNITS,
-    Transducer.DISPLACEMENT: LENGTH_UNITS,
-    Transducer.VELOCITY: (SensitivityUnit.MV_PER_MM_S,),
-    Transducer.ACCELEROMETER: (SensitivityUnit.MV_PER_G, SensitivityUnit.MV_PER_M_S2),
+ACCELERATION_UNITS = (SensitivityUnit.MV_PER_G, SensitivityUnit.MV_PER_M_S2)
+SENSITIVITIES = {
+    Transducer.PROXIMITY_PROBE: (LENGTH_UNITS, 0.5e-3, 50e-3),
+    Transducer.DISPLACEMENT: (LENGTH_UNITS, 0.05e-3, 500e-3),
+    Transducer.VELOCITY: ((SensitivityUnit.MV_PER_MM_S,), 0.5e-3, 2.0),
+    Transducer.ACCELEROMETER: (ACCELERATION_UNITS, 0.5e-3, 2.0),
 }
+"""Units and range of plausible sensitivities, the range in V per µm, mm/s or m/s²; a value outside
+the range indicates a wrong unit."""
 
 V_PER_ENGINEERING_UNIT = {
     SensitivityUnit.V_PER_MM: 1e-3,
@@ -94,15 +97,6 @@ V_PER_ENGINEERING_UNIT = {
     SensitivityUnit.MV_PER_G: 1e-3 / STANDARD_GRAVITY_M_S2,
 }
 """Factors from a sensitivity in each unit to volts per µm, mm/s or m/s²."""
-
-PLAUSIBLE_V_PER_UNIT = {
-    Transducer.PROXIMITY_PROBE: (0.5e-3, 50e-3),
-    Transducer.DISPLACEMENT: (0.05e-3, 500e-3),
-    Transducer.VELOCITY: (0.5e-3, 2.0),
-    Transducer.ACCELEROMETER: (0.5e-3, 2.0),
-}
-"""Ranges of plausible sensitivities, V per µm, mm/s or m/s²; a value outside its range indicates a
-wrong unit."""
 
 LINE_FLOORS = {
     Transducer.PROXIMITY_PROBE: 0.1,
@@ -242,11 +236,10 @@ class ChannelSettings(Settings):
             raise MisfitError("is required with slow_roll, which applies to one probe", "probe")
 
     def _check_sensitivity(self) -> None:
-        allowed = ALLOWED_UNITS[self.transducer]
+        allowed, low, high = SENSITIVITIES[self.transducer]
         if self.sensitivity_unit not in allowed:
             words = " or ".join(f'"{unit}"' for unit in allowed)
             raise MisfitError(f"must be {words} for {self.transducer}", "sensitivity_unit")
-        low, high = PLAUSIBLE_V_PER_UNIT[self.transducer]
         scale = V_PER_ENGINEERING_UNIT[self.sensitivity_unit]
         if self.sensitivity is None or not low <= abs(self.sensitivity) * scale <= high:
             raise MisfitError(

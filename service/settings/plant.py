@@ -1,7 +1,8 @@
-"""Model of the whole plant file, and its tables plant, service, analysis and spectra."""
+"""Model of the whole plant file, its loading, and its tables plant, service and analysis."""
 
 import math
-from typing import Annotated, Self
+from pathlib import Path
+from typing import Annotated, Any, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
@@ -26,6 +27,7 @@ from service.settings.storage import (
     SpaceSettings,
     StoreSettings,
 )
+from service.settings.toml_file import load_toml, schema_of
 from service.settings.units import UnitSettings, require_lines_apart
 
 EveryS = Annotated[float, Field(ge=1.0, le=86_400.0)]
@@ -309,7 +311,13 @@ class PlantFile(Settings):
                 f" {low:g} Hz, and below half the sampling rate, {high:g} Hz",
                 *("analysis", "max_frequency_hz"),
             )
-        self._check_velocity_band(unit)
+        low_hz = self.analysis.velocity_low_order * turn_hz
+        high_hz = min(self.analysis.velocity_high_hz, high)
+        if low_hz >= high_hz:
+            raise MisfitError(
+                f"for unit {unit.id} is {low_hz:g} Hz at rated speed; must be below {high_hz:g} Hz",
+                *("analysis", "velocity_low_order"),
+            )
         n_needed = math.ceil(MIN_SEGMENT_TURNS * unit.sampling_hz / turn_hz)
         if self.analysis.segment_samples < n_needed:
             raise MisfitError(
@@ -318,11 +326,15 @@ class PlantFile(Settings):
                 *("analysis", "segment_samples"),
             )
 
-    def _check_velocity_band(self, unit: UnitSettings) -> None:
-        low_hz = self.analysis.velocity_low_order * hz_from_rpm(unit.rated_speed_rpm)
-        high_hz = min(self.analysis.velocity_high_hz, unit.sampling_hz / 2)
-        if low_hz >= high_hz:
-            raise MisfitError(
-                f"for unit {unit.id} is {low_hz:g} Hz at rated speed; must be below {high_hz:g} Hz",
-                *("analysis", "velocity_low_order"),
-            )
+
+def plant_file_schema() -> dict[str, Any]:
+    """Return the JSON schema of a plant file, with description, limits and default of every key."""
+    return schema_of(PlantFile)
+
+
+def load_plant_file(path: Path) -> PlantFile:
+    """Read and validate a plant file, with its calibration sheets and register maps.
+
+    Raises `TomlFileError` if the file is unreadable or invalid; the message lists every mistake.
+    """
+    return load_toml(path, PlantFile)

@@ -1,6 +1,7 @@
 """Settings of stored data: database, retention, recordings, evidence and disk space."""
 
 from enum import StrEnum
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -61,10 +62,6 @@ def _keywords(conninfo: str) -> dict[str, Any]:
 
 
 Days = Annotated[float, Field(ge=0.0, le=36_500.0)]
-FINER = (
-    ("readings_days", "minutes_days"),
-    ("minutes_days", "ten_minutes_days"),
-)
 
 
 class RetentionSettings(Settings):
@@ -97,7 +94,7 @@ class RetentionSettings(Settings):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        for finer, coarser in FINER:
+        for finer, coarser in pairwise(("readings_days", "minutes_days", "ten_minutes_days")):
             least, found = getattr(self, finer), getattr(self, coarser)
             if (found and not least) or 0.0 < found < least:
                 limit = f"0, like {finer}" if not least else f"0, or at least {finer} = {least:g}"

@@ -68,35 +68,26 @@ def schema_of(model: type[Settings]) -> Schema:
 
 def description(schema: Schema, location: Location) -> str:
     """Return the description of a key in one line; an empty string if the key is unknown."""
-    node, text = schema, ""
-    for part in location:
-        step = _step(schema, node, part)
-        if step is None:
-            return ""
-        text = str(step.get("description", ""))
-        node = step
-    return " ".join(text.split())
+    return " ".join(str(_node(schema, location).get("description", "")).split())
 
 
 def known_keys(schema: Schema, location: Location) -> list[str]:
-    """Return the valid keys of a table, sorted."""
-    node: Schema | None = schema
+    """Return the valid keys of a table, sorted; empty if the table is unknown."""
+    options = _options(schema, _node(schema, location))
+    return sorted({key for option in options for key in option.get("properties", {})})
+
+
+def _node(schema: Schema, location: Location) -> Schema:
+    """Return the subschema of a value; an empty one if the value is unknown."""
+    node = schema
     for part in location:
-        node = _step(schema, node, part) if node is not None else None
-    return sorted(
-        {key for option in _options(schema, node or {}) for key in option.get("properties", {})}
-    )
-
-
-def _step(schema: Schema, node: Schema, part: int | str) -> Schema | None:
-    for option in _options(schema, node):
-        if isinstance(part, int) and "items" in option:
-            items: Schema = option["items"]
-            return items
-        if isinstance(part, str) and part in option.get("properties", {}):
-            properties: dict[str, Schema] = option["properties"]
-            return properties[part]
-    return None
+        options = _options(schema, node)
+        steps = [
+            o.get("items") if isinstance(part, int) else o.get("properties", {}).get(part)
+            for o in options
+        ]
+        node = next((step for step in steps if step is not None), {})
+    return node
 
 
 def _options(schema: Schema, node: Schema) -> list[Schema]:

@@ -49,7 +49,12 @@ def read_calibration_sheet(path: Path) -> ResponseTable:
             raise SheetError(f"{place}: expected {len(header)} values, got {len(cells)}")
         row = dict(zip(header, cells, strict=True))
         point = tuple(_number(f"{place}: {name}", row[name]) for name in COLUMNS)
-        _check(place, point, points)
+        before = points[-1][0] if points else 0.0
+        if point[0] <= before:
+            lowest = f"the previous one, {before:g}" if points else "0"
+            raise SheetError(f"{place}: frequency_hz must be above {lowest}, got {point[0]:g}")
+        if point[1] <= 0.0:
+            raise SheetError(f"{place}: magnitude must be above 0, got {point[1]:g}")
         points.append(point)
     if len(points) < 2:
         raise SheetError(f"{path}:{number}: expected at least two points, got {len(points)}")
@@ -77,15 +82,6 @@ def _number(place: str, cell: str) -> float:
     if not math.isfinite(value):
         raise SheetError(f"{place} must be finite, got {cell}")
     return value
-
-
-def _check(place: str, point: tuple[float, ...], before: list[tuple[float, ...]]) -> None:
-    frequency_hz, magnitude, _ = point
-    if frequency_hz <= (before[-1][0] if before else 0.0):
-        lowest = f"the previous one, {before[-1][0]:g}" if before else "0"
-        raise SheetError(f"{place}: frequency_hz must be above {lowest}, got {frequency_hz:g}")
-    if magnitude <= 0.0:
-        raise SheetError(f"{place}: magnitude must be above 0, got {magnitude:g}")
 
 
 class HighPassSettings(Settings):

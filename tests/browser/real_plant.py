@@ -18,8 +18,7 @@ from service.app.storage import open_store
 from service.cli.accounts import access_of
 from service.cli.offline.demo_history import fill
 from service.measuring.simulated_sources import simulated_history
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.store.access.identities import Role
 
 DEPLOY = Path(__file__).parents[2] / "deploy"

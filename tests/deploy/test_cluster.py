@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from service.cli.commands import app
 from service.cluster.ownership import Partition
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 
 FOLDER = Path(__file__).parents[2] / "deploy" / "cluster"
 PLANT = FOLDER / "plant-cluster.toml"

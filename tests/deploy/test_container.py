@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 import yaml
 
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "deploy" / "container"

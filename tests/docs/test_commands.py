@@ -14,7 +14,7 @@ from rigs.command_line import padwatch
 
 from service.cli.commands import app
 from service.settings.alarm_kinds import ALARM_KINDS
-from service.settings.loading import plant_file_schema
+from service.settings.plant import plant_file_schema
 from service.settings.sources.mapping import ImportMapping
 
 FENCE = re.compile(r"^```sh\n(.*?)^```$", re.MULTILINE | re.DOTALL)

@@ -22,8 +22,7 @@ from service.app.recordings import recording_writer, replay_source
 from service.cli.offline.reanalysis import refreshes
 from service.measuring.simulated_sources import simulated_feed
 from service.settings.core_values import analysis_of, calibration_of, machine_of
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.settings.units import UnitSettings
 
 HERE = Path(__file__).parent

@@ -22,8 +22,7 @@ from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingLimits, OperatingState
 from core.machine.unit import Estimator
 from core.quality import Reason
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.settings.storage import Origin
 from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings

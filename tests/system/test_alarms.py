@@ -15,7 +15,7 @@ from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.feed import SampleFeed
 from core.samples.blocks import SampleBlock
 from service.measuring.simulated_sources import simulated_feed
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 
 from .conftest import WIRE
 

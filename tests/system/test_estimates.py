@@ -19,8 +19,7 @@ from core.quality import Level, Reason, bad, missing, uncertain
 from core.stiffness.estimators import ESTIMATORS, is_reversed
 from service.measuring.simulated_sources import scenario_of
 from service.settings.core_values import analysis_of, calibration_of, machine_of
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.settings.units import UnitSettings
 
 DEMO = Path(__file__).parents[2] / "deploy" / "demo.toml"

@@ -12,7 +12,7 @@ from rigs.tiers import fast_and_long
 
 from acquisition.clock import SystemClock
 from service.measuring.sources import source_of
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 
 RECORDED_PLANT = Path(__file__).parents[1] / "recordings" / "plant.toml"
 CHANNELS = ("ujb_shaft_x", "ujb_shaft_y", "ujb_bearing_x", "ujb_bearing_y")

@@ -30,7 +30,7 @@ from core.samples.blocks import SampleBlock
 from core.spectra.runout import RunoutVerdict
 from core.spectra.speed import SpeedSource
 from service.settings.core_values import calibration_of, machine_of
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.settings.units import UnitSettings
 
 DEMO = Path(__file__).parents[2] / "deploy" / "demo.toml"

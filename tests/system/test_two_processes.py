@@ -20,7 +20,7 @@ from service.app.serving_process import WRONG_VERSION
 from service.live import exchange
 from service.runtime import child
 from service.runtime.heartbeats import UNHEARD
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.settings.storage import Origin
 
 from .conftest import SERVING, Program, Start

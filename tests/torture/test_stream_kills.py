@@ -13,7 +13,7 @@ from harness.nats_server import NatsServer, nats_server, nats_server_command
 from harness.service_rig import ServiceRig, until
 from harness.stream_rig import found_in, on_the_stream, positions, single_process
 
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 
 N_KILLS = 150
 

@@ -6,7 +6,7 @@ from typing import Any
 from padwatch_reference.examples import Examples, examples
 from padwatch_reference.schema import ROOT, Node, Table, submodels, tables
 from padwatch_reference.words import code, literal, type_words
-from service.settings.loading import plant_file_schema
+from service.settings.plant import plant_file_schema
 from service.settings.sources.mapping import ImportMapping
 
 HEAD = "| Key | Meaning | Type and limits | Default | Example |\n|---|---|---|---|---|"

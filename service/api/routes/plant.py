@@ -17,7 +17,7 @@ from service.api.parameters import TimeRange
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, Time
 from service.live.current_state import LiveUnits
-from service.settings.loading import plant_file_schema
+from service.settings.plant import plant_file_schema
 from service.settings.units import UnitSettings
 from service.store.access.identities import Permission
 

@@ -138,7 +138,7 @@ def ring_look(header: RingHeader, slot: Slot) -> RingLook:
         state=state,
         first_index=slot.first_index,
         start_ns=slot.start_ns,
-        slow=tuple(value if math.isfinite(value) else None for value in slot.slow),
+        slow=tuple(map(_finite, slot.slow)),
         channels=tuple(
             RingChannelLook(
                 channel=number,
@@ -166,7 +166,7 @@ def value_looks(decoder: MapDecoder, content: bytes) -> list[ValueLook]:
             address=value.cell.address,
             function=value.cell.function,
             registers=_words(decoder, content, value.cell),
-            value=float(number) if math.isfinite(number) else None,
+            value=_finite(float(number)),
             state=state.name.lower(),
             flags={f.cell.address: _words(decoder, content, f.cell)[0] for f in value.flags},
         )
@@ -186,11 +186,12 @@ def _look(data: bytes, address: int) -> RegisterLook:
     plausible: tuple[str, ...] = ()
     if len(data) == N_BYTES[NumberType.FLOAT32]:
         pairs = {
-            type_.value: {order.value: _shown(_number(data, type_, order)) for order in ByteOrder}
+            type_.value: {order.value: _finite(_number(data, type_, order)) for order in ByteOrder}
             for type_ in PAIR_TYPES
         }
         floats = pairs[NumberType.FLOAT32.value]
-        plausible = tuple(order for order, number in floats.items() if _is_plausible(number))
+        low, high = PLAUSIBLE
+        plausible = tuple(o for o, x in floats.items() if x is not None and low <= abs(x) <= high)
     return RegisterLook(address, int.from_bytes(data[:2], "big"), singles, pairs, plausible)
 
 
@@ -200,12 +201,8 @@ def _number(data: bytes, type_: NumberType, order: ByteOrder) -> float:
     return number
 
 
-def _shown(number: float) -> float | int | None:
+def _finite(number: float) -> float | None:
     return number if math.isfinite(number) else None
-
-
-def _is_plausible(number: float | None) -> bool:
-    return number is not None and PLAUSIBLE[0] <= abs(number) <= PLAUSIBLE[1]
 
 
 def _words(decoder: MapDecoder, content: bytes, cell: Cell) -> tuple[int, ...]:

@@ -15,7 +15,7 @@ from service.api.routes.overview import SHOWN
 from service.live.current_state import SILENT_AFTER_S
 from service.live.status import LinkState
 from service.settings.configuration import Configuration
-from service.settings.loading import plant_file_schema
+from service.settings.plant import plant_file_schema
 from service.store.access.audit_entries import AuditAction
 from service.store.access.audit_verification import head_path
 from service.store.port import UnitGap

@@ -23,8 +23,7 @@ from service.cli import processes as demo
 from service.cli.daq import FastClock, RunningDaq, held_lines
 from service.cli.offline.demo_history import fill, without_past
 from service.measuring.simulated_sources import simulated_history
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.store.baselines import versions_after
 from service.store.film_readings import FilmQuery
 from service.store.port import TrendQuery

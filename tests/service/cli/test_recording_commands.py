@@ -22,8 +22,7 @@ from service.cli.offline.reanalysis import assessment_document, refreshes
 from service.cli.record import ReconnectPolicy, record_blocks
 from service.measuring.simulated_sources import simulated_feed as feed_of
 from service.settings.core_values import analysis_of, calibration_of, machine_of
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.settings.units import UnitSettings
 
 SMALL = "[analysis]\nsegment_samples = 4096\nn_segments = 4\n\n[service]"

@@ -26,7 +26,7 @@ from core.samples.calibration import UnitCalibration
 from service.app.recordings import recording_writer
 from service.cli.offline.importing import CanLogDecoder
 from service.settings.core_values import calibration_of
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.settings.units import UnitSettings
 
 START_NS = 1_767_225_600_000_000_000

@@ -22,7 +22,7 @@ from service.api.auth.service import AccessService
 from service.app.kept_files import waveform_keeper
 from service.app.storage import open_store
 from service.settings.adapter_values import recorded_unit
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.store.access.identities import KeyState, Role, Session
 from service.store.highwater.commits import MAX_BEHIND
 from service.store.sqlite import SqliteStore, checking

@@ -21,8 +21,8 @@ from service.measuring.service_alarms import ServiceHealth
 from service.notifications.channel import Delivered
 from service.notifications.sender import Deliveries, Receiver
 from service.runtime.heartbeats import UNHEARD, Heartbeats, Pulse
-from service.settings.loading import load_plant_file
 from service.settings.notifications import WebhookSettings
+from service.settings.plant import load_plant_file
 from service.settings.storage import Origin
 from service.store.database import Hold
 from service.store.port import StoreError

@@ -15,7 +15,7 @@ from service.live.snapshot import UnitLink, link_document, link_of_document
 from service.live.status import LinkState, UnitStatus
 from service.measuring.live_view import LiveView
 from service.measuring.snapshots import bearing_snapshot
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 
 STALE_AFTER_S = 30.0
 UNIT = load_plant_file(Path(__file__).parents[3] / "deploy" / "demo.toml").unit[0]

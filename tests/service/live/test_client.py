@@ -8,7 +8,7 @@ from service.live.client import LiveClient
 from service.live.snapshot import Report, UnitLink, UnitReport, UnitSnapshot
 from service.live.status import LinkState, UnitStatus
 from service.measuring.snapshots import bearing_snapshot
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.store.sqlite import SqliteStore
 
 PLANT = load_plant_file(Path(__file__).parents[3] / "deploy" / "demo.toml")

@@ -20,8 +20,7 @@ from service.measuring.live_view import LiveView
 from service.reports.archive import EvidenceArchive
 from service.reports.folders import CapturePart, linked
 from service.settings.core_values import machine_of
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.settings.storage import Origin
 from service.store.sqlite import SqliteStore
 

@@ -12,7 +12,7 @@ import pytest
 
 from service.reports.plots import BOTTOM, LEFT, RIGHT, TOP, Plot, Scale, TimeScale, around
 from service.settings.configuration import configuration_of
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 
 
 def plot(x_label: str = "Time, UTC", **changes: object) -> Plot:

@@ -27,8 +27,7 @@ from service.settings.films import (
 from service.settings.limits import (
     AmplitudeLimitSettings,
 )
-from service.settings.loading import load_plant_file
-from service.settings.plant import DynamicModel, PlantFile
+from service.settings.plant import DynamicModel, PlantFile, load_plant_file
 from service.settings.storage import Origin
 from service.settings.toml_file import TomlFileError
 from service.settings.transducers import HighPassSettings, ResonanceSettings

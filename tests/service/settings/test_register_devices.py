@@ -29,7 +29,7 @@ from service.measuring.sources import modbus_source, monitor_for, retry_s
 from service.settings.adapter_values import link_settings
 from service.settings.can_values import can_daq_of, can_settings_of, can_shape_of
 from service.settings.core_values import calibration_of, machine_of
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.settings.sources.can import CanSettings
 from service.settings.sources.devices import (
     MappedDeviceSettings,

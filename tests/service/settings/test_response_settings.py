@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from core.machine.channel import Measurand, SlowRollVector
 from core.machine.response import HighPass, Resonance, ResponseChain, ResponseTable
 from service.settings.core_values import calibration_of, machine_of
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.settings.toml_file import TomlFileError
 from service.settings.transducers import (
     FOLDER,

@@ -18,8 +18,7 @@ from core.monitor.monitor import UnitMonitor
 from core.units import NS_PER_S
 from service.measuring.simulated_sources import scenario_of, simulated_feed, simulated_history
 from service.settings.core_values import analysis_of, calibration_of, machine_of
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.settings.toml_file import TomlFileError
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.settings.toml_file import MAX_FILE_BYTES, TomlFileError
 
 UNIT_1 = "unit[1]."

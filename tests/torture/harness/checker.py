@@ -28,7 +28,7 @@ from harness.lives import (
 )
 from harness.watch import Watch
 from service.app.storage import open_store
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.store.store import Store
 
 

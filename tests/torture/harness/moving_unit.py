@@ -16,8 +16,7 @@ from service.cluster.session import identity_of
 from service.measuring.acquirer import Bus
 from service.measuring.recorder import Findings
 from service.notifications.message import LiveContext
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.store.sqlite import SqliteStore
 
 STREAM = "born once"

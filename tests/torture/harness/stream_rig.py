@@ -33,8 +33,7 @@ from service.measuring.sources import monitor_of
 from service.notifications.message import LiveContext
 from service.runtime.heartbeats import Heartbeats
 from service.settings.core_values import stale_after_s
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.settings.storage import Origin
 from service.store.sqlite import SqliteStore
 from service.store.store import Store

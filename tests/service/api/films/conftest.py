@@ -16,8 +16,7 @@ from core.quality import GOOD, Quality, Reading
 from service.live.commands import FilmPlace
 from service.live.status import LinkState
 from service.measuring.baseline_learning import Learner
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.store.sqlite import SqliteStore
 
 DEMO = Path(__file__).parents[4] / "deploy" / "demo.toml"

@@ -29,8 +29,7 @@ from service.measuring.simulated_sources import simulated_feed
 from service.measuring.sources import WatchedUnit, monitor_of
 from service.runtime.listening import listen
 from service.runtime.polls import TimedSource
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 
 DEMO = Path(__file__).parents[4] / "deploy" / "demo.toml"
 BLOCK = 1024

@@ -17,7 +17,7 @@ from service.measuring.live_view import LiveView
 from service.measuring.sources import live_units
 from service.runtime.heartbeats import PATIENCE_S, Heartbeats, Pulse
 from service.runtime.service_manager import ServiceManager
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 
 from .conftest import Gates
 

@@ -30,8 +30,7 @@ from service.app.storage import open_store
 from service.cluster import consumer as consuming
 from service.cluster.consumer import Consumer
 from service.cluster.session import consumer_name, stream_name, subject
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
+from service.settings.plant import PlantFile, load_plant_file
 from service.store.port import StoreError
 from service.store.store import Store
 

@@ -16,7 +16,7 @@ from harness.stream_rig import analysing, blocks
 from service.cluster.frames import encoded_block
 from service.cluster.silent_units import SilenceWatch, silences_s
 from service.live.status import LinkState
-from service.settings.loading import load_plant_file
+from service.settings.plant import load_plant_file
 from service.store.port import AlarmQuery
 
 LEDGER = LedgerPlant(n_units=1, load=1.0, segment_samples=1024, n_segments=3)
