@@ -52,8 +52,14 @@ class DbcMessage:
 
     Attributes
     ----------
+    name, frame_id
+        Name and frame id in the file.
+    extended, fd
+        Whether the frame id has 29 bits; whether frames are CAN FD.
     key
         Frame key of the message, see `frame_key`.
+    signals
+        All signals of the message by name.
     length
         Data length of the message's frames in bytes.
     multiplexer

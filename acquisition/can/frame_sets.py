@@ -53,7 +53,7 @@ class DuplicateSenderDetector:
 
 
 class PlacedFrame(NamedTuple):
-    """Frame with the index of its first sample."""
+    """Data of a frame, with its place in the decoding plan and the index of its first sample."""
 
     part: Part
     data: bytes
@@ -145,7 +145,17 @@ class FrameSets:
         self.pending = {index + n_samples: found for index, found in self.pending.items()}
 
     def add(self, frame: PlacedFrame, epoch: int) -> Instant | None:
-        """Add a frame to the set of its instant; return the instant if now complete, else None."""
+        """Store a frame in the set of its instant; return the instant if this completes it.
+
+        Returns None otherwise, also for a frame without waveforms, and for a frame that is older
+        than the newest of its message or repeats it: it is counted as refused, not stored. With
+        more than `MAX_PENDING` incomplete sets, the oldest is dropped and counted as lost.
+
+        Raises
+        ------
+        FrameError
+            If the number of samples cannot be decoded.
+        """
         part, data, index = frame
         wave = part.wave
         if wave is None or not self._is_new(wave, index, data):

@@ -67,8 +67,13 @@ RX_PASSIVE, TX_PASSIVE = 0x10, 0x20
 _CONTROLLER_BYTE = 1
 
 
-def require_bus(message: Message) -> None:
+def require_bus(message: Message, where: str) -> None:
     """Check that an error frame reports neither a bus-off nor an error-passive controller.
+
+    Parameters
+    ----------
+    where
+        Name of the bus for messages.
 
     Raises
     ------
@@ -76,9 +81,13 @@ def require_bus(message: Message) -> None:
         If the controller is bus-off or error-passive; the received frames are then incomplete.
     """
     if message.arbitration_id & BUS_OFF:
-        raise LinkError("the CAN controller is bus-off; check bit rate, wiring and termination")
+        raise LinkError(
+            f"{where}: the CAN controller is bus-off; check bit rate, wiring and termination"
+        )
     if _controller_state(message) & (RX_PASSIVE | TX_PASSIVE):
-        raise LinkError("the CAN controller is error-passive; check bit rate and termination")
+        raise LinkError(
+            f"{where}: the CAN controller is error-passive; check bit rate and termination"
+        )
 
 
 def lost_in_controller(message: Message) -> bool:

@@ -61,6 +61,10 @@ class MessagePlan:
 
     Parameters
     ----------
+    message
+        Message of the DBC file.
+    multiplexer
+        Reader of the multiplexer value; None for a message without multiplexer.
     parts
         Parts by multiplexer value; the only key is 0 for a message without multiplexer.
     """
@@ -77,6 +81,8 @@ class Plan:
     ----------
     messages
         Decoding plan of each message by frame key.
+    decoder
+        Decoder of the waveform frames; it determines `samples_per_frame`.
     calibration
         Calibration of the unit: channels, slow channels and sampling rate.
     hold_samples
@@ -91,6 +97,10 @@ class Plan:
         Number of samples per channel in one frame.
     n_waves
         Number of waveform messages.
+    counted
+        Whether any message has a counter.
+    hold_uncounted
+        `hold_s` in samples; at least 1.
     widest_modulus
         Largest modulus of all counters; 0 without counters.
     quantities

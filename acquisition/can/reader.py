@@ -33,10 +33,12 @@ _JOIN_S = 10.0
 
 @dataclass(frozen=True)
 class Batch:
-    """Frames that were read together, in order of arrival.
+    """Frames that were read together.
 
     Parameters
     ----------
+    frames
+        Frames in order of arrival; at least one.
     arrived
         Time when the last frame was read, or its arrival time by the interface's time stamps.
     stamp_fault
@@ -90,7 +92,7 @@ class FrameReader:
         Raises
         ------
         LinkError, ConfigError
-            As `open_bus`.
+            If `open_bus` fails.
         """
         self._loop = asyncio.get_running_loop()
         self._thread = threading.Thread(target=self._run, name=f"can {self._where}", daemon=True)
@@ -102,7 +104,7 @@ class FrameReader:
     async def stop(self) -> None:
         """Close the bus and wait for the thread to end.
 
-        A thread blocked in a driver cannot be stopped; it ends with the process.
+        Returns after at most 10 s: a thread blocked in a driver ends only with the process.
         """
         with self._room:
             self._is_stopping = True
@@ -121,7 +123,7 @@ class FrameReader:
         Raises
         ------
         LinkError
-            If the bus is lost.
+            If the bus is lost. Any other error that ended the thread is raised as it is.
         """
         with suppress(TimeoutError):
             async with asyncio.timeout(timeout_s):
@@ -214,7 +216,7 @@ class FrameReader:
                 self._refused[Refusal.MALFORMED] += 1
                 continue
             if message is not None and message.is_error_frame and judges_errors:
-                require_bus(message)
+                require_bus(message, self._where)
                 self._refused[Refusal.OVERFLOW] += lost_in_controller(message)
             return message
         raise LinkError(f"{self._where}: {_MAX_NONSENSE} malformed messages; check the adapter")

@@ -48,7 +48,11 @@ class SideTable:
         self._entries: dict[str | int, list[_Entry]] = {key: [] for key in self._plan.quantities}
 
     def set(self, key: str | int, start: int, value: float, hold: int | None) -> None:
-        """Store a value, valid for `hold` samples from sample `start` on (None: see `_Entry`)."""
+        """Store a value that is valid for `hold` samples from sample `start` on.
+
+        With `hold` None, the quantity `HOLD` at the same sample gives the number. Each quantity
+        keeps 4,096 values; a further value deletes the oldest.
+        """
         entries = self._entries[key]
         at = bisect_right(entries, start, key=_START)
         replaces = at > 0 and entries[at - 1][0] == start

@@ -137,7 +137,13 @@ class ArrivalModel:
             self._bins[-1] = (host_s, delay_s, max(offsets_ns, default=None))
 
     def device_clock(self, n_faults: int = 0) -> DeviceClock:
-        """Return the present offset and drift of the device clock; unknown fields are None."""
+        """Return the present offset and drift of the device clock; unknown fields are None.
+
+        Parameters
+        ----------
+        n_faults
+            Number of faults of the device's time stamps, for the result.
+        """
         offsets_ns = [ns for *_, ns in self._bins if ns is not None]
         offset_ns = max(offsets_ns[-_MIN_BINS:], default=None)
         drift = None if self._drift is None else -1e6 * self._drift[0]
@@ -199,7 +205,10 @@ class HostStamps:
         self._least_delay_ns: int | None = None
 
     def add(self, epoch: int, stop_index: int, arrived_ns: int) -> None:
-        """Add the arrival of the samples before `stop_index`; call it before `start_ns`."""
+        """Add the arrival of the samples before `stop_index` at a UTC time, ns since 1970.
+
+        Call it at least once before `start_ns`, which has no meaning before.
+        """
         delay_ns = arrived_ns - self.start_ns(stop_index)
         if epoch != self._epoch or delay_ns < -_STEP_NS:
             self._begin(epoch, stop_index, arrived_ns)
@@ -261,12 +270,14 @@ class InterfaceClock:
     def arrival(self, stamp_s: float, read: Arrival) -> tuple[Arrival, StampFault | None]:
         """Return the arrival time of a frame, and the fault of its stamp or None.
 
+        The frame also updates the estimated delay; pass each frame once, in order of arrival.
+
         Parameters
         ----------
         stamp_s
-            Stamp of the interface, seconds.
+            Stamp of the interface, seconds; 0 from an interface without stamps.
         read
-            Time when the frame was read.
+            Time when the frame was read; the result if the stamp has a fault.
         """
         if not math.isfinite(stamp_s) or stamp_s <= 0.0:
             return read, StampFault.REPEATED  # an interface without stamps sends 0

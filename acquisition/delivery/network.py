@@ -21,7 +21,9 @@ class NameLookUp:
         self._asking: asyncio.Future[list[str]] | None = None
 
     async def addresses(self) -> list[str]:
-        """Return the IP addresses of the host, in the order in which to try them.
+        """Return up to `MAX_ADDRESSES` IP addresses of the host, in the order in which to try them.
+
+        The look-up runs in a daemon thread, and goes on if the caller is cancelled.
 
         Raises
         ------

@@ -23,7 +23,8 @@ class PollClock:
     Attributes
     ----------
     epoch
-        Time of the first tick, UTC seconds since 1970; identifies a run of the program.
+        Time of the first tick, UTC seconds since 1970; identifies a run of the program. 0 before
+        the first tick.
     """
 
     def __init__(self, clock: Clock, period_s: float) -> None:

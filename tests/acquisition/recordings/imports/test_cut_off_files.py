@@ -97,7 +97,7 @@ def test_a_file_that_was_cut_off_anywhere_is_refused(tmp_path, job_for, kind):
     WRITERS[kind](path)
     content = path.read_bytes()
     assert read_all(path, job) == 600
-    for length in (len(content) - 2, *(len(content) * n // 7 for n in range(1, 7))):
+    for length in (len(content) - 2, *(len(content) * n // 7 for n in (1, 4, 6))):
         path.write_bytes(content[: length - (content[length - 1 : length] == b"\n")])
         with pytest.raises(ConfigError) as error:
             read_all(path, job)
