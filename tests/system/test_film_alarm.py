@@ -1,8 +1,8 @@
 """A film that softens in the machine is an alarm at the API, through everything in between.
 
 The plant is that of `padwatch demo`: a simulated DAQ, a process of its own, behind Modbus TCP; a
-service that reads it in real time; and a year of readings from which a baseline was learned. Two
-minutes after the start the film of U2's UJB loses 30 % of its stiffness (`deploy/demo-life.toml`).
+service that reads it in real time; and a year of readings from which a baseline was learned. A
+minute after the start the film of U2's UJB loses 30 % of its stiffness (`deploy/demo-life.toml`).
 """
 
 import asyncio
@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 LOSS = 0.3
 SOFTENED = {"U2:UJB:film_stiffness"}
 PATIENCE_S = 1200.0
-"""The year before the start is simulated within a minute; the alarms come 5 to 6 minutes after it,
+"""The year before the start is simulated within a minute; the alarms come 4 to 5 minutes after it,
 as averages are over two and a half. A busy machine takes several times as long."""
 
 
