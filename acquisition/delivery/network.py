@@ -23,7 +23,7 @@ class NameLookUp:
     async def addresses(self) -> list[str]:
         """Return up to `MAX_ADDRESSES` IP addresses of the host, in the order in which to try them.
 
-        The look-up runs in a daemon thread, and goes on if the caller is cancelled.
+        The look-up runs in a daemon thread, and continues if the caller is cancelled.
 
         Raises
         ------

@@ -27,7 +27,7 @@ EVENT = "learned from a simulated year"
 
 
 def without_past(store: FilmStore, plant: PlantFile) -> list[UnitSettings]:
-    """Return the units with monitored films of which the store has no readings yet."""
+    """Return the units with monitored films without readings in the store."""
     return [unit for unit, _ in _new_units(store, plant)]
 
 
