@@ -71,7 +71,11 @@ class ProcessContext:
 
 @dataclass(frozen=True)
 class Analysis:
-    """Parts of the analysis; the caller passes blocks to `analyser` and runs `recorder`."""
+    """Parts of the analysis; the caller passes blocks to `analyser` and runs `recorder`.
+
+    The other fields are the background services of the process. The caller runs their loops, those
+    of `own_loops` and `shared_loops`, and then calls `close`.
+    """
 
     process: ProcessContext
     analyser: Analyser

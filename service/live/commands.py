@@ -151,7 +151,10 @@ class AlarmCommand:
 
 @dataclass(frozen=True)
 class BaselineCommand:
-    """Command to apply an action to the baselines of a bearing, with its author and reason."""
+    """Command to apply an action to the baselines of a bearing, with its author and reason.
+
+    `actor` is the name that the audit trail and the history of baselines show.
+    """
 
     place: FilmPlace
     action: BaselineAction

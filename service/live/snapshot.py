@@ -34,7 +34,11 @@ class UnreadableSnapshotError(Exception):
 
 @dataclass(frozen=True)
 class BearingSnapshot:
-    """Newest result of a bearing: an `Assessment` without spectrum, orbit and recent values."""
+    """Newest result of a bearing: an `Assessment` without spectrum, orbit and recent values.
+
+    `time_ns` is the end of the averaged samples, ns since 1970 UTC. Mappings are by quantity,
+    `runout` and `clipped_share` by channel. `condition` is None if unknown.
+    """
 
     time_ns: int
     window: AveragingWindow

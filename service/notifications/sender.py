@@ -74,7 +74,10 @@ S_PER_H = 3600.0
 
 @dataclass(frozen=True)
 class Receiver:
-    """Receiver of notifications, with its settings and its channel."""
+    """Receiver of notifications, with its settings and its channel.
+
+    `name` is unique among the receivers; messages in the outbox refer to it.
+    """
 
     name: str
     settings: AnyReceiver

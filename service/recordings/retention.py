@@ -74,7 +74,10 @@ def _time_ns(file: WaveformFile) -> int:
 
 @dataclass(frozen=True)
 class RoomLimits:
-    """Limits of the size of all recordings of a kind, bytes, and age of continuous ones, days."""
+    """Limits of the size of all recordings of a kind, bytes, and age of continuous ones, days.
+
+    Captures, the recordings around alarms, have no limit of age.
+    """
 
     continuous_bytes: int = 100_000_000_000
     capture_bytes: int = 10_000_000_000

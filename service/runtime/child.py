@@ -8,7 +8,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Child:
-    """Running child process, and this end of the socket pair."""
+    """Running child process, and this end of the socket pair.
+
+    The owner must call `close`; a child notices a closed connection, and ends.
+    """
 
     process: subprocess.Popen[bytes]
     connection: socket.socket

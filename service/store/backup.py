@@ -129,7 +129,10 @@ NAME = re.compile(r"(?P<stem>[a-z]+)-\d{8}T\d{6}Z\.sqlite3")
 
 @dataclass(frozen=True)
 class Backup:
-    """Verified backup, with the paths of the older backups that were then removed."""
+    """Verified backup in the file `path`, of `n_bytes` bytes.
+
+    `removed` are the paths of older backups that were removed after it was verified.
+    """
 
     path: Path
     n_bytes: int

@@ -56,7 +56,11 @@ class StoredStep:
 
 @dataclass(frozen=True)
 class BaselineEntry:
-    """Metadata of a stored baseline; `event` is the machine event that required it, or empty."""
+    """Metadata of a stored baseline.
+
+    Readings from `learned_from_ns` on, before `learned_until_ns`, were used for learning; times are
+    ns since 1970 UTC. `event` is the machine event that required the baseline, or empty.
+    """
 
     unit: str
     bearing: str

@@ -95,7 +95,10 @@ class FilmHistory:
 
 @dataclass(frozen=True)
 class StoredDecision:
-    """Decision on one direction of a film; `baseline_version` is None without a baseline."""
+    """Decision on direction "x" or "y" of a film, from the readings of one estimator.
+
+    `baseline_version` is the version compared with; None without a baseline.
+    """
 
     direction: str
     estimator: Estimator

@@ -68,6 +68,14 @@ class StoredMessage:
     ----------
     id
         Number of the message, in the order of queueing.
+    receiver
+        Name of the receiver.
+    event_id
+        Identifier of the event, by which the receiver recognises a repeated message.
+    body
+        Message as JSON.
+    n_attempts
+        Number of delivery attempts so far.
     answer
         Reply to the last attempt, or its error; empty before the first attempt.
     done_ns

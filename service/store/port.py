@@ -51,6 +51,8 @@ class TrendQuery:
 
     Parameters
     ----------
+    eccentricity_ratio, oil_temperature_c
+        Ranges of the operating condition; readings outside or without the value are left out.
     start_ns, end_ns
         Half-open time range, ns since 1970 UTC.
     max_points
@@ -79,7 +81,10 @@ class TrendQuery:
 
 @dataclass(frozen=True)
 class TrendSeries:
-    """Statistics of one quantity, one item per bucket; None without a usable reading."""
+    """Statistics of one quantity, one item per bucket; None without a usable reading.
+
+    `count` is the number of usable readings; `worst_level` is the worst quality of the readings.
+    """
 
     minimum: Sequence[float | None]
     maximum: Sequence[float | None]

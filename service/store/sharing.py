@@ -50,7 +50,8 @@ class UnitBeat:
     Parameters
     ----------
     process
-        Identifier of the reporting process, which changes with each start.
+        Identifier of the reporting process, which changes with each start. The other fields are
+        those of `UnitRow`.
     """
 
     unit: str

@@ -175,7 +175,10 @@ class PeriodRun:
 
 @dataclass(frozen=True, eq=False)
 class BearingRun:
-    """Result of the back-test of one bearing: its readings, operating states and periods."""
+    """Result of the back-test of one bearing: its readings, operating states and periods.
+
+    `place` is the pair of unit and bearing; `periods` are in order of time, one per baseline.
+    """
 
     place: Place
     rows: BearingRows

@@ -62,7 +62,11 @@ class CauseReport(_Part):
 
 
 class AlarmReport(_Part):
-    """Alarm of the back-test, with its largest change and its probable cause; times are UTC."""
+    """Alarm of the back-test, with its largest change and its probable cause.
+
+    Times are UTC, in RFC 3339 format. `direction` is "x" or "y". `raised` is the change when the
+    alarm began.
+    """
 
     unit: str
     bearing: str
@@ -91,7 +95,10 @@ class AlarmReport(_Part):
 
 
 class SupportReport(_Part):
-    """Baseline of one period: learning period, cells by support, scatter (null if not learned)."""
+    """Baseline of one period: learning period, cells by support, scatter (null if not learned).
+
+    Cells have readings of their own, borrow support from neighbours, or have none.
+    """
 
     version: int
     event: str

@@ -165,7 +165,10 @@ class Row:
 
 @dataclass(frozen=True)
 class Errors:
-    """Largest and root-mean-square error of rows, in percent."""
+    """Largest and root-mean-square error of rows, in percent.
+
+    Both are absolute values, relative to the figures of the paper.
+    """
 
     max_percent: float
     rms_percent: float

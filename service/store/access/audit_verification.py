@@ -87,7 +87,10 @@ MAX_BEHIND = 64
 
 @dataclass(frozen=True)
 class Finding:
-    """Defect of an audit trail: number of the first affected entry (None for the head file)."""
+    """Defect of an audit trail: number of the first affected entry (None for the head file).
+
+    `detail` is a sentence that describes the defect.
+    """
 
     number: int | None
     detail: str
