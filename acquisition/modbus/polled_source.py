@@ -64,7 +64,7 @@ class MapReader:
         return self._decoder.read(await self.content())
 
     async def content(self) -> bytes:
-        """Read all registers of the map; return their contents as `MapDecoder.read` needs them.
+        """Read all registers of the map; return their bytes in the order of `ReadPlan.spans`.
 
         Raises
         ------

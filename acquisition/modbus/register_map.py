@@ -84,6 +84,8 @@ class MapValue:
 
     Parameters
     ----------
+    flags
+        Checks of status bits; the worst state of all checks applies to the value.
     invalid_values
         Raw numbers that mark an invalid value; integers are compared by their bits: 0x8000 equals
         -32768. NaN is always invalid.

@@ -147,6 +147,8 @@ class Manifest(RecordedUnit):
         Program and person that made the recording.
     n_samples
         Number of samples per channel.
+    files
+        All other files of the recording by name.
     checksum
         SHA-256 of all other values; see :func:`checksum_of`.
     """

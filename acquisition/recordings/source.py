@@ -27,6 +27,8 @@ class Selection:
         Positions of the selected waveform channels in the recording.
     slow
         Positions of the selected slow channels in the recording.
+    calibration
+        Calibration of the selected channels, which replaces that of the recording.
     """
 
     channels: tuple[int, ...]

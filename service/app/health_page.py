@@ -61,7 +61,10 @@ class HealthServer:
         self._health, self._listener = health, listener
 
     async def run(self, pulse: Pulse) -> None:
-        """Serve until cancelled."""
+        """Serve the page until cancelled: in threads, which ask the event loop for its content.
+
+        Takes over the listening socket and closes it at the end; call it once.
+        """
         pulse.rest()
         loop = asyncio.get_running_loop()
 

@@ -385,6 +385,8 @@ class LiveFilms:
     def fetch(self, unit: str, state: UnitSnapshot) -> Mapping[str, BearingBaseline]:
         """Return the baselines in force of a unit snapshot from the store, by bearing.
 
+        Blocks while the store is read. Baselines that the store does not have are left out.
+
         Raises
         ------
         StoreError

@@ -172,7 +172,9 @@ def captures_in_use(root: Path) -> frozenset[str]:
 
 
 def link_all(root: Path, captures: Path) -> int:
-    """Write links that are missing after a crash; return their number.
+    """Link bundles to their recordings where a crash prevented it; return the number of new links.
+
+    `root` is the folder of the bundles, `captures` that of the recordings around alarms.
 
     Raises
     ------

@@ -279,7 +279,10 @@ def select_whole(
     Parameters
     ----------
     where
-        Condition on columns of the primary key and the order, which the checksums have as well.
+        Condition on columns of the primary key and the order, which the checksums have as well:
+        SQL from ``WHERE`` on, never text from outside.
+    parameters
+        Values of the placeholders in `where`, by name.
     """
     if isinstance(reader, sqlite3.Connection):  # PostgreSQL has checksums of its pages
         statement = f"SELECT seal FROM main.seal_{table} {where}"  # noqa: S608

@@ -30,6 +30,8 @@ class ModbusDevice(ABC):
 
     Parameters
     ----------
+    feed
+        Source of the samples.
     step_samples
         Number of samples per channel in a step, which are produced together.
     unit

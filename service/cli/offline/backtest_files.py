@@ -193,9 +193,10 @@ def _side(place: Place, found: FilmHistory, side: int) -> Any:
 
 @contextmanager
 def readings_file(path: Path) -> Iterator[Callable[[Any], None]]:
-    """Create a file, by its suffix CSV or Parquet; yield a function that adds rows.
+    """Create a file, CSV if its suffix is ".csv", else Parquet; yield a function that adds rows.
 
-    An error in the block removes the file.
+    The function takes a pyarrow.Table. The first table determines the columns; without any, the
+    file stays empty. An error in the block removes the file.
 
     Raises
     ------
