@@ -28,7 +28,7 @@ class ChatterRule:
 
 
 class ChatterWatch:
-    """Detector of chattering alarms from their newest activations."""
+    """Detector of chattering alarms from the times of their newest activations, of all units."""
 
     def __init__(self, rule: ChatterRule) -> None:
         self._rule = rule

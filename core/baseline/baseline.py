@@ -227,6 +227,7 @@ def _steps(x: FloatArray, width: float) -> tuple[npt.NDArray[np.int64], FloatArr
 class BearingBaseline:
     """Learned baseline of one bearing, from the readings of a learning period.
 
+    Readings from `learned_from_ns` on, before `learned_until_ns` (ns since 1970 UTC), were used.
     There is at most one `QuantityBaseline` per direction; directions with too few readings have
     none.
     """

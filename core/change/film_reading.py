@@ -38,7 +38,10 @@ class FilmValue:
 
 @dataclass(frozen=True)
 class FilmReading:
-    """Stiffness reading of one film in x and y, averaged over minutes; NaN for missing values."""
+    """Stiffness reading of one film in x and y, averaged over minutes; NaN for missing values.
+
+    `time_ns` is the end of the averaged samples, ns since 1970 UTC.
+    """
 
     unit: str
     bearing: str

@@ -95,7 +95,10 @@ class UnitMonitor:
         )
 
     def rewind(self, state: MonitorState) -> None:
-        """Prepare a new monitor for a replay of stored samples from index `state.start` on."""
+        """Prepare a new monitor for a replay of stored samples from index `state.start` on.
+
+        Call it before the first block; after the replay, call `settle` with the same state.
+        """
         self._rewound_to = state.start
 
     def settle(self, state: MonitorState) -> None:

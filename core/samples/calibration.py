@@ -93,6 +93,7 @@ class SlowCalibration:
 class UnitCalibration:
     """Calibration of one unit's device, with the channels in the order of the device.
 
+    `rate_hz` is the sampling rate of the waveform channels, per channel.
     A cell has `block_samples` samples, which share one OK state per channel and one set of slow
     values. Cells begin at multiples of this number, so that quality does not depend on the
     boundaries of the messages of the device.
