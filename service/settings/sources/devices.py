@@ -119,7 +119,8 @@ class ModbusPolledSettings(MappedDeviceSettings):
     def require_fit(self, channels: Sequence[str], slow: Sequence[str]) -> None:
         """Check that the register map matches the channels of the unit.
 
-        Raises `MisfitError` if a waveform channel has no value, or the map has vector quantities.
+        Raises `MisfitError` if a waveform channel has no value, a value belongs to no channel, or
+        the map has vector quantities.
         """
         self.require_known([*channels, *slow], "source")
         for row in self.rows:
