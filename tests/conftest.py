@@ -56,6 +56,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     the end, each with a browser and plants of its own.
     """
     first = [item for item in items if item.nodeid.startswith(PROGRAMS)]
+    first.sort(key=lambda item: "test_film_alarm" not in item.nodeid)  # eight minutes
     paged = [item for item in items if item.nodeid.startswith(BROWSER)]
     rest = [item for item in items if not item.nodeid.startswith(PROGRAMS + BROWSER)]
     before = max(0, len(items) // 2 - len(first))
