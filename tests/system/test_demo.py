@@ -56,6 +56,7 @@ async def test_a_service_that_is_killed_leaves_no_process_behind(demo, daq_of, s
     await gone(serving)
 
 
+@pytest.mark.long  # tests/browser/living/test_lost_link.py has the example
 async def test_a_daq_that_is_killed_leaves_numbers_that_are_not_current(demo, daq_of):
     await demo.until("/api/v1/units", all_are("connected"))
     assert (await demo.get("/readyz"))["status"] == "ok"

@@ -35,6 +35,10 @@ def in_both_directions(found: Any) -> bool:
     return [a["directions"] for a in found["alarms"] if a["id"] in SOFTENED] == ["xy"]
 
 
+def causes_are_known(film: Any) -> bool:
+    return all((film[d]["cause"] or {}).get("cause", "unknown") != "unknown" for d in ("x", "y"))
+
+
 async def acknowledge_as_in_the_tutorial(program: Program) -> None:
     """Run the tutorial's shell example against a program with the alarm."""
     text = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
@@ -76,7 +80,7 @@ async def test_a_film_that_loses_stiffness_in_the_machine_is_an_alarm_at_the_api
             assert alarm["raised_at"]["oil_temperature_c"] < cell["oil_temperature_high_c"]
     await program.until("/api/v1/alarms", in_danger, PATIENCE_S)  # as the tutorial says
     await program.until("/api/v1/alarms", in_both_directions, PATIENCE_S)
-    film = await program.get("/api/v1/units/U2/bearings/UJB/film")
+    film = await program.until("/api/v1/units/U2/bearings/UJB/film", causes_are_known, PATIENCE_S)
     for direction in ("x", "y"):
         assert film[direction]["deviation"]["percent"] == pytest.approx(-100.0 * LOSS, abs=6.0)
         assert film[direction]["cause"]["cause"] == "film"

@@ -50,6 +50,7 @@ async def answers(program: Program) -> bool:
     return False
 
 
+@pytest.mark.long  # tests/torture/test_serving_kills.py has the example
 async def test_a_killed_serving_process_is_replaced_on_the_same_port_and_measuring_goes_on(
     start, tmp_path, serving_of
 ):

@@ -44,6 +44,7 @@ def plant(torture_seed: int, is_whole: bool) -> LedgerPlant:
     return replace(WHOLE if is_whole else SHORT, seed=torture_seed)
 
 
+@pytest.mark.long
 @pytest.mark.timeout(9000)
 def test_a_long_time_under_load_leaves_everything_as_it_was(plant, daq, tmp_path, soak_s, torture):
     with Bench(plant, daq, tmp_path, FEW_BUNDLES, period_s=1.0) as bench:

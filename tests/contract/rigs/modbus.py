@@ -72,7 +72,7 @@ class OnTcp(Rig):
 
 class OnRtu(Rig):
     absence = r"/line: No such file or directory"
-    timeout_s = 0.6
+    timeout_s = 1.5
 
     def _serve(self, device: ModbusDevice) -> ModbusServer:
         return ModbusRtuServer(device, link=Path(self._folder.name) / "line")
