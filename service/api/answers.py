@@ -150,13 +150,20 @@ class Answers:
             context.run(ASKER.set, asker)
             task = asyncio.create_task(self._make(key, make), context=context)
             making = self._making[key] = _Making(task, asker)
+            task.add_done_callback(lambda _: self._forget(key, making))
         making.n_clients += 1
         try:
             # a client that disconnects must not cancel the answer of other clients
             return await asyncio.shield(making.task)
         finally:
             making.n_clients -= 1
-            making.asker.has_gone = making.n_clients == 0
+            if making.n_clients == 0:
+                self._forget(key, making)  # a later client must not get a cancelled answer
+                making.asker.leave()
+
+    def _forget(self, key: tuple[str, str], making: _Making) -> None:
+        if self._making.get(key) is making:
+            del self._making[key]
 
     async def _make(self, key: tuple[str, str], make: Make) -> Response:
         tag, encoding = key
@@ -165,13 +172,10 @@ class Answers:
             body, headers = encoded(made if isinstance(made, bytes) else json_of(made), encoding)
             return Response(body, media_type=JSON, headers={"ETag": tag, **headers})
 
-        try:
-            if iscoroutinefunction(make):
-                response = await asyncio.to_thread(answer, await make())
-            else:
-                response = await asyncio.to_thread(lambda: answer(cast("Answer", make())))
-        finally:
-            del self._making[key]
+        if iscoroutinefunction(make):
+            response = await asyncio.to_thread(answer, await make())
+        else:
+            response = await asyncio.to_thread(lambda: answer(cast("Answer", make())))
         self._keep(key, response)
         return response
 

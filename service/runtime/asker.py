@@ -1,14 +1,40 @@
 """Connection state of the client of the current request, as a context variable."""
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from threading import Lock, Thread
 
 
-@dataclass
 class Asker:
-    """Whether the client of a request has disconnected (`has_gone`); other threads read it."""
+    """Client of a request; threads that read for it ask whether it has disconnected."""
 
-    has_gone: bool = False
+    def __init__(self) -> None:
+        self.has_gone = False
+        self._lock = Lock()
+        self._cancels: list[Callable[[], None]] = []
+
+    def leave(self) -> None:
+        """Mark the client as disconnected; cancel its running statements in a new thread."""
+        with self._lock:
+            self.has_gone = True
+            cancels = tuple(self._cancels)
+        if cancels:
+            Thread(target=lambda: [cancel() for cancel in cancels], name="padwatch-cancel").start()
+
+    @contextmanager
+    def cancelling(self, cancel: Callable[[], None]) -> Iterator[None]:
+        """Return a context manager in which `cancel` is called if the client disconnects.
+
+        `cancel` may still run after the end of the context if `has_gone` is then true.
+        """
+        with self._lock:
+            self._cancels.append(cancel)
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._cancels.remove(cancel)
 
 
 ASKER: ContextVar[Asker | None] = ContextVar("asker", default=None)

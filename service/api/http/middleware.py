@@ -137,7 +137,7 @@ class CheckedRequests:
         except asyncio.CancelledError:
             refusal = _too_late("the service is stopping")  # cancelled by the server only
         finally:
-            asker.has_gone = True  # cancels store reads that still run in a thread
+            asker.leave()  # cancels store reads that still run in a thread
             ASKER.reset(before)
         if refusal is not None and not has_begun:
             await problem_answer(Request(scope), refusal)(scope, receive, send)

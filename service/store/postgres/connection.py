@@ -5,11 +5,10 @@ import os
 import re
 import socket
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from threading import Event, Thread
 from typing import Any
 
 import psycopg
@@ -17,7 +16,7 @@ from psycopg.abc import Buffer
 from psycopg.adapt import AdaptersMap, Dumper
 from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
-from service.runtime.asker import ASKER, Asker
+from service.runtime.asker import ASKER
 from service.store.database import Parameters
 from service.store.port import RefusedRowError, StoreError
 
@@ -213,7 +212,6 @@ def _unfit(
     return None
 
 
-LOOK_EVERY_S = 0.1
 CANCEL_WITHIN_S = 2.0
 
 
@@ -224,32 +222,23 @@ def cancelled_when_gone(session: Session) -> Iterator[None]:
     Raises
     ------
     StoreError
-        If the client has disconnected.
+        If the client has disconnected; the session may still be cancelled and is to be closed.
     """
     asker = ASKER.get()
     if asker is None:
         yield
         return
-    is_done = Event()
-    watcher = Thread(target=_watch, args=(session, asker, is_done), name="padwatch-asker")
-    watcher.start()
+
+    def cancel() -> None:
+        with suppress(psycopg.Error):  # without a connection the statement fails by itself
+            session.cancel_safe(timeout=CANCEL_WITHIN_S)
+
     try:
-        yield
+        with asker.cancelling(cancel):
+            yield
     finally:
-        is_done.set()
-        watcher.join()
         if asker.has_gone:
             raise StoreError("interrupted: the client has disconnected")
-
-
-def _watch(session: Session, asker: Asker, is_done: Event) -> None:
-    while not asker.has_gone:
-        if is_done.wait(LOOK_EVERY_S):
-            return
-    try:
-        session.cancel_safe(timeout=CANCEL_WITHIN_S)
-    except psycopg.Error:
-        return  # without a connection to the server the statement fails by itself
 
 
 BY_STATE = {

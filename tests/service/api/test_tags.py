@@ -205,7 +205,11 @@ async def test_many_clients_wait_for_one_answer_that_ends_with_the_last_of_them(
     alone.cancel()
     await asyncio.wait([alone])
     assert askers[1].has_gone
+    later = asyncio.create_task(answers.of(request(), 2, make))
+    while len(askers) == 2:
+        await asyncio.sleep(0.001)
     goes_on.set()
+    assert (await later).body == b'{"gone":false}'
 
 
 async def test_large_answers_are_compressed_as_the_client_accepts(read_only):

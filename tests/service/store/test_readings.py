@@ -244,7 +244,7 @@ def test_a_read_ends_when_its_asker_has_gone(store, monkeypatch):
     try:
         assert store.trend(query()).time_ns == []
 
-        asker.has_gone = True
+        asker.leave()
 
         with pytest.raises(StoreError, match="interrupted"):
             store.trend(query())

@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager, suppress
+from contextvars import copy_context
 from dataclasses import replace
 from multiprocessing.synchronize import Barrier
 from pathlib import Path
@@ -16,13 +17,14 @@ from rigs.assessments import assessment
 from rigs.store_fixtures import Build, at, query
 
 from core.monitor.assessment import Assessment
+from service.runtime.asker import ASKER, Asker
 from service.settings.storage import Origin
 from service.store.access.audit_entries import AuditAction
 from service.store.audit import AuditQuery
 from service.store.port import StoreError
 from service.store.postgres import PostgresStore
 from service.store.postgres.connection import PostgresAddress
-from service.store.postgres.database import PostgresDatabase, PostgresHold
+from service.store.postgres.database import PostgresDatabase, PostgresHold, Readers
 from service.store.postgres.store import HEAD_BEGUN, server_trail
 
 N_PROCESSES = 2
@@ -260,3 +262,21 @@ def test_a_dump_of_a_live_database_is_put_back_with_all_that_it_guards(own_place
     guards = "SELECT count(*) FROM pg_trigger WHERE NOT tgisinternal"
     assert back.execute(guards) == own_place.execute(guards)
     server.drop(back.database)
+
+
+def test_a_read_is_cancelled_at_the_server_when_its_client_disconnects(postgres_place):
+    asker, readers = Asker(), Readers(postgres_place.address)
+
+    def read() -> None:
+        ASKER.set(asker)
+        with readers.reading() as connection:
+            connection.execute("SELECT pg_sleep(600)")
+
+    with ThreadPoolExecutor(1) as threads, closing(readers):
+        reading = threads.submit(copy_context().run, read)
+        sleeping = "SELECT 1 FROM pg_stat_activity WHERE query LIKE '%pg_sleep(600)' AND datname = "
+        while not postgres_place.server.execute(f"{sleeping}'{postgres_place.database}'"):
+            time.sleep(0.01)
+        asker.leave()
+        with pytest.raises(StoreError, match="the client has disconnected"):
+            reading.result()
