@@ -70,7 +70,7 @@ docs: develop
 
 bench: develop
 	$(BIN)/python benchmarks/ingest.py
-	$(BIN)/python benchmarks/polling.py
+	PYTHONPATH=tests/torture:tests/contract $(BIN)/python benchmarks/polling.py --postgres
 	$(BIN)/python benchmarks/storms.py
 	$(BIN)/python benchmarks/alarms.py
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/trend_years.py

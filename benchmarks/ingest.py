@@ -122,8 +122,9 @@ def measure_service(plant: Path, duration_s: float) -> dict[str, Any]:
     }
 
 
-def fetch(url: str) -> Any:
-    with urllib.request.urlopen(url) as answer:  # noqa: S310  our own service
+def fetch(url: str, cookie: str = "") -> Any:
+    request = urllib.request.Request(url, headers={"Cookie": cookie})  # noqa: S310  our service
+    with urllib.request.urlopen(request) as answer:  # noqa: S310
         return json.load(answer)
 
 

@@ -3,18 +3,21 @@
 Simulated DAQs (20 units, 12 channels, 600 Hz, Modbus TCP on loopback), the service with its two
 processes, and this one: fifty clients that each ask for the overview, the alarms, a bearing and its
 trends once a second, as the dashboard does: what they have got already they name by its ETag, and
-of the overview they ask for the units that changed.
+of the overview they ask for the units that changed. ``--postgres`` repeats this with results in
+PostgreSQL and a login of each client, and needs the tests' harness on PYTHONPATH (``make bench``).
 Prints a table; ends with 1 if a sample was lost or a limit was passed.
 """
 
 import argparse
 import asyncio
 import json
+import subprocess
 import sys
 import tempfile
 import time
 import urllib.request
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -30,8 +33,13 @@ from ingest import cpu_s, daq, fetch, padwatch, plant_file, processes
 P99_LIMIT_MS = 15.0
 CORE_LIMIT = 0.08
 PERIOD_S = 1.0
+USERS = (sys.executable, "-m", "service.cli.main", "users", "add")
 TREND_MINUTES = 15
 MAX_POINTS = 500
+SESSIONS = 16
+"""Of an account, at the most."""
+
+PASSWORD = "polls once a second"  # noqa: S105  of the benchmark alone
 QUANTITIES = (
     "stiffness_xx_n_per_m",
     "stiffness_yy_n_per_m",
@@ -59,8 +67,10 @@ class Answers:
 class Client:
     """One browser: one connection, the ETags of what it has got."""
 
-    def __init__(self, address: tuple[str, int], answers: Mapping[str, Answers]) -> None:
-        self._address, self._answers = address, answers
+    def __init__(
+        self, address: tuple[str, int], answers: Mapping[str, Answers], cookie: str
+    ) -> None:
+        self._address, self._answers, self._cookie = address, answers, cookie
         self._etags: dict[str, str] = {}
         self.revision: str | None = None
 
@@ -85,6 +95,7 @@ class Client:
             path += f"?since={self.revision}"
         known = f"If-None-Match: {self._etags[path]}\r\n" if path in self._etags else ""
         known += "Accept-Encoding: gzip, deflate, br, zstd\r\n"
+        known += f"Cookie: {self._cookie}\r\n" if self._cookie else ""
         host, port = self._address
         writer.write(f"GET {path} HTTP/1.1\r\nHost: {host}:{port}\r\n{known}\r\n".encode())
         head = (await reader.readuntil(b"\r\n\r\n")).decode("latin-1")
@@ -123,8 +134,17 @@ def trend_path(unit: str, bearing: str) -> str:
     return f"/api/v1/units/{unit}/bearings/{bearing}/trends?{query}&max_points={MAX_POINTS}"
 
 
+def log_in(url: str, name: str) -> str:
+    """Log in; return the cookie of the session."""
+    body = json.dumps({"name": name, "password": PASSWORD}).encode()
+    headers = {"Content-Type": "application/json", "Origin": url.rstrip("/")}
+    request = urllib.request.Request(f"{url}api/v1/session", body, headers)  # noqa: S310
+    with urllib.request.urlopen(request) as answer:  # noqa: S310  our own service
+        return str(answer.headers["Set-Cookie"]).partition(";")[0]
+
+
 async def poll_all(
-    url: str, bearings: list[tuple[str, str]], n: int, options: Any
+    url: str, bearings: list[tuple[str, str]], cookies: Sequence[str], options: Any
 ) -> dict[str, Answers]:
     """Let all clients ask; return what they measured."""
     parts = urlsplit(url)
@@ -133,7 +153,8 @@ async def poll_all(
     begin_s = time.monotonic() + 2 * PERIOD_S
 
     async def client(number: int) -> None:
-        await asyncio.sleep(PERIOD_S * number / n)  # fifty browsers were not opened in one moment
+        # fifty browsers were not opened in one moment
+        await asyncio.sleep(PERIOD_S * number / len(cookies))
         unit, bearing = bearings[number % len(bearings)]
         paths = {
             "overview": lambda: "/api/v1/overview",
@@ -141,38 +162,41 @@ async def poll_all(
             "bearing": lambda: f"/api/v1/units/{unit}/bearings/{bearing}/latest",
             "trends": lambda: trend_path(unit, bearing),
         }
-        await Client(address, answers).poll(paths, begin_s, begin_s + options.seconds)
+        polling = Client(address, answers, cookies[number])
+        await polling.poll(paths, begin_s, begin_s + options.seconds)
 
-    await asyncio.gather(*(client(number) for number in range(n)))
+    await asyncio.gather(*(client(number) for number in range(len(cookies))))
     return answers
 
 
-def measure(plant: Path, options: Any) -> dict[str, Any]:
+def measure(plant: Path, options: Any, *, log_in_each: bool) -> dict[str, Any]:
     """Run the service, first alone and then with all clients."""
     with padwatch("run", str(plant), "--port", "0") as (process, line):
         url = line.split()[-1]
         watched = processes(process.pid)
         time.sleep(options.warm_up)
         alone = cores(watched, lambda: time.sleep(options.alone))
-        units = fetch(f"{url}api/v1/units")
+        names = [f"operator{n // SESSIONS}" for n in range(options.clients)]
+        cookies = [log_in(url, name) if log_in_each else "" for name in names]
+        units = fetch(f"{url}api/v1/units", cookies[0])
         bearings = [(unit["id"], bearing) for unit in units for bearing in unit["bearing_ids"]]
-        first = first_overview(url)
+        first = first_overview(url, cookies[0])
         answers: dict[str, Answers] = {}
         polled = cores(
             watched,
-            lambda: answers.update(uvloop.run(poll_all(url, bearings, options.clients, options))),
+            lambda: answers.update(uvloop.run(poll_all(url, bearings, cookies, options))),
         )
-        sources = [unit["source"] for unit in fetch(f"{url}api/v1/units")]
+        sources = [unit["source"] for unit in fetch(f"{url}api/v1/units", cookies[0])]
         lost = sum(source["n_offered"] - source["n_stored"] for source in sources)
         offered = sum(source["n_offered"] for source in sources)
     found = {"alone": alone, "polled": polled, "answers": answers, "first": first}
     return {**found, "lost": lost, "offered": offered}
 
 
-def first_overview(url: str) -> int:
+def first_overview(url: str, cookie: str) -> int:
     """Bytes of the body of the whole overview on the wire."""
     request = urllib.request.Request(  # noqa: S310  our own service
-        f"{url}api/v1/overview", headers={"Accept-Encoding": "zstd"}
+        f"{url}api/v1/overview", headers={"Accept-Encoding": "zstd", "Cookie": cookie}
     )
     with urllib.request.urlopen(request) as answer:  # noqa: S310
         return len(answer.read())
@@ -184,6 +208,15 @@ def cores(watched: Sequence[psutil.Process], do: Any) -> list[float]:
     do()
     elapsed = time.monotonic() - started
     return [(cpu_s(each) - begin) / elapsed for begin, each in zip(before, watched, strict=True)]
+
+
+@contextmanager
+def database() -> Iterator[str]:
+    """Start a PostgreSQL server of its own; yield the address of an empty database."""
+    from harness.postgres_server import PostgresServer
+
+    with PostgresServer() as server:
+        yield server.create("padwatch")
 
 
 def report(found: dict[str, Any], options: Any) -> int:
@@ -225,14 +258,26 @@ def main() -> None:
     parser.add_argument("--warm-up", type=float, default=20.0)
     parser.add_argument("--alone", type=float, default=30.0)
     parser.add_argument("--seconds", type=float, default=120.0)
+    parser.add_argument("--postgres", action="store_true", help="then PostgreSQL and logins, too")
     options = parser.parse_args()
+    failed = 0
     with tempfile.TemporaryDirectory() as folder:
         plant, data = Path(folder) / "plant.toml", Path(folder) / "data"
         plant.write_text(plant_file(options.units, data), encoding="utf-8")
         with daq(plant) as ports:
             plant.write_text(plant_file(options.units, data, ports), encoding="utf-8")
-            found = measure(plant, options)
-    sys.exit(report(found, options))
+            failed |= report(measure(plant, options, log_in_each=False), options)
+            if options.postgres:
+                with database() as conninfo:
+                    text = plant_file(options.units, data, ports)
+                    text += f'[store]\npostgresql = "{conninfo}"\n[access]\nlogin = true\n'
+                    plant.write_text(text, encoding="utf-8")
+                    for n in range(-(-options.clients // SESSIONS)):
+                        command = [*USERS, str(plant), f"operator{n}", "--password-fd", "0"]
+                        subprocess.run(command, input=PASSWORD.encode(), check=True)
+                    print("PostgreSQL, each client with a session of its own:")
+                    failed |= report(measure(plant, options, log_in_each=True), options)
+    sys.exit(failed)
 
 
 if __name__ == "__main__":
