@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import ComplexArray, FloatArray
+from core.arrays import FloatArray
 from core.machine.unit import BracketDynamics
 from core.quality import Reason
 from core.spectra.cross_spectrum import (
@@ -27,8 +27,9 @@ from core.stiffness.dynamic_lines import (
     probe_noise_power,
     used_lines,
 )
-from core.stiffness.film_covariance import DAMPING, DELAY, LAGS, MASS, STIFFNESS, FilmFits
+from core.stiffness.film_covariance import FilmFits
 from core.stiffness.film_fit import N_ITERATIONS, FilmLines, line_weights
+from core.stiffness.fitted_films import DAMPING, DELAY, LAGS, MASS, PARTS, STIFFNESS
 
 MIN_LINES = 12
 """Smallest number of usable lines for a result."""
@@ -41,17 +42,9 @@ MAX_MASS_STD = 0.5
 """Largest standard uncertainty of a fitted mass as a fraction of the largest plausible mass of the
 bracket. Beyond it the lines do not determine the mass, and there is no result."""
 
-
-TILT_LAG_RAD = 0.135
-"""Angle by which the shaft turns during the lag of a pad's tilt. It is about half the time that oil
-takes along a pad: 0.11 to 0.17 rad for the 12 and 16 pads of Brito et al. (decision 37)."""
-
-TILT_MODEL = 0.25
-"""Half-width of the error of coefficients from the assumed lag, as a fraction of their shift."""
-
-LAGS_DOUBTFUL, LAGS_CERTAIN = 9.5, 18.5
-"""Squared significance of four lagging parts, up to which a film is constant, and from which they
-are fully kept: exceeded by chance in 5 % and 0.1 % of averages (chi-squared)."""
+DELAY_DOUBTFUL, DELAY_CERTAIN = 9.5, 18.5
+"""Squared significance of a delay of the bearing channels up to which it is none, and from which
+it may explain a misfit."""
 
 AS_DELAY, AS_LAGS = 1.05, 1.3
 """Ratios of the squared significances of lagging parts and of a significant delay of the bearing
@@ -208,7 +201,8 @@ def _fitted(
     changes[:, STIFFNESS], changes[:, MASS] = stiffness, -(omega**2)
     changes[:, DAMPING] = 1j * omega
     moves = np.ones(len(measured), dtype=np.bool_)
-    lag, constant = tilt_lag(omega, math.pi * sum(turn_hz)), np.zeros((len(measured), len(LAGS)))
+    turn_rad_s = math.pi * sum(turn_hz)
+    constant = np.zeros((len(measured), len(PARTS))), np.zeros((len(measured), 1))
 
     def fit() -> tuple[FilmFits, npt.NDArray[np.bool_]]:
         bracket_n_per_m = stiffness - mass_kg * omega**2 + 1j * omega * damping
@@ -216,7 +210,7 @@ def _fitted(
         changes[:, DELAY] = 1j * omega * bracket_n_per_m
         weight, moving = line_weights(lines, bracket_n_per_m)
         errors = smear_share, n_segments, floor_std
-        found = FilmFits(lines, weight, bracket_n_per_m, changes, *errors, lag, constant)
+        found = FilmFits(lines, weight, bracket_n_per_m, changes, *errors, turn_rad_s, *constant)
         return found, moves & moving
 
     found, moves = fit()
@@ -229,63 +223,51 @@ def _fitted(
         found, moves = fit()
     if not moves.any():
         return [None] * len(measured)
-    kept, is_delay = kept_share(found)
-    kept = np.where(seeks | ~moves, 0.0, kept)[:, np.newaxis]
-    results = _results(found.with_lags(kept), kept, is_delay > 0.0, mass_kg[:, 0], seeks, bin_hz)
+    is_late = late_share(found)
+    kept = np.where(seeks | ~moves, 0.0, 1.0 - is_late)[:, np.newaxis]
+    lagging = found.with_parts(kept, LAGS)
+    delay = _delay(lagging, is_late > 0.0)
+    fits = lagging.with_parts(kept, PARTS)
+    results = _results(fits, delay, mass_kg[:, 0], seeks, bin_hz)
     return [
         result if moving else None for result, moving in zip(results, moves.tolist(), strict=True)
     ]
 
 
-def tilt_lag(omega: FloatArray, turn_rad_s: float) -> ComplexArray:
-    """Return the shape over frequency of the part of a film that lags as its pads tilt.
+def late_share(fits: FilmFits) -> FloatArray:
+    """Return the share of the misfit that a delay of the bearing channels explains, (n,), 0 to 1.
 
-    It is ``(iωτ)² / (1 + iωτ)`` less the stiffness and damping at 1×, where it is zero.
+    The share is continuous, so that results do not jump between averages.
     """
-
-    def lagging(omega: FloatArray | float) -> ComplexArray:
-        turned = 1j * np.asarray(omega) * TILT_LAG_RAD / turn_rad_s
-        return np.asarray(turned**2 / (1.0 + turned))
-
-    at_turn = complex(lagging(turn_rad_s))
-    return lagging(omega) - at_turn.real - 1j * at_turn.imag * omega / turn_rad_s
+    (*_, lags), delay = fits.posterior(LAGS), fits.delay_significance()
+    certain = np.clip((delay - DELAY_DOUBTFUL) / (DELAY_CERTAIN - DELAY_DOUBTFUL), 0.0, 1.0)
+    is_delay = 1.0 - np.clip((lags / delay - AS_DELAY) / (AS_LAGS - AS_DELAY), 0.0, 1.0)
+    return np.nan_to_num(certain * is_delay)
 
 
-def kept_share(fits: FilmFits) -> tuple[FloatArray, FloatArray]:
-    """Return the share of the lagging parts of films that the data demand, (n,), from 0 to 1.
+def _delay(fits: FilmFits, may_be_late: npt.NDArray[np.bool_]) -> FloatArray:
+    """Return the delay of the bearing channels, its uncertainty and per `DAMPING`, (3, n).
 
-    The share is continuous, so that results do not jump between averages (firm shrinkage, Gao and
-    Bruce 1997). It is less by the second array, (n,), the share of the misfit that a delay of the
-    bearing channels explains as well.
+    Where a delay is not excluded it is beside a film of constant coefficients, otherwise beside
+    lagging parts with the lag of the prior: a fitted lag would take up the delay.
     """
-    (*_, lags), delay = fits.lag_fit, fits.delay_significance()
-    undoubted = (np.array([lags, delay]) - LAGS_DOUBTFUL) / (LAGS_CERTAIN - LAGS_DOUBTFUL)
-    certain, is_delay = np.clip(undoubted, 0.0, 1.0)
-    is_delay *= 1.0 - np.clip((lags / delay - AS_DELAY) / (AS_LAGS - AS_DELAY), 0.0, 1.0)
-    return np.nan_to_num(certain * (1.0 - is_delay)), is_delay
+    delay, share = np.array(fits.delay([DELAY, MASS])), fits.kept[:, 0]
+    if not share.any():
+        return delay
+    mixed = (1.0 - share) * delay + share * np.array(fits.delay([DELAY, MASS, *LAGS]))
+    return np.where((share > 0.0) & ~may_be_late, mixed, delay)
 
 
 def _results(
     fits: FilmFits,
-    kept: FloatArray,
-    may_be_late: npt.NDArray[np.bool_],
+    delay: FloatArray,
     mass_kg: FloatArray,
     seeks_mass: npt.NDArray[np.bool_],
     bin_hz: float,
 ) -> list[DynamicStiffness]:
-    share, delay = kept[:, 0], np.array(fits.delay([DELAY, MASS]))
-    if fits.has_lags:
-        beside_lags = np.array(fits.delay([DELAY, MASS, *LAGS]))
-        mixed = (1.0 - share) * delay + share * beside_lags
-        delay = np.where((share > 0.0) & ~may_be_late, mixed, delay)
     delay_s, delay_std, delay_per_damping = delay
-    (shift, shift_std), of_row = fits.lags_shift(), kept[..., np.newaxis]
-    model = (1.0 - of_row) * math.sqrt(3.0) * np.hypot(shift, shift_std)
-    model += of_row * TILT_MODEL * np.abs(shift)
-    through: FloatArray | float = 0.0
-    if fits.has_lags:
-        through = of_row[..., np.newaxis, np.newaxis] * fits.through(LAGS, fits.estimate(LAGS)[1])
-    covariance = fits.film_covariance(through)
+    model = math.sqrt(3.0) * fits.parts_left
+    covariance = fits.film_covariance(fits.through_parts())
     mass_std_kg, whole = np.zeros(len(mass_kg)), np.zeros(len(mass_kg), dtype=np.bool_)
     if seeks_mass.any():
         masses_kg, of_mass = fits.estimate([MASS])
@@ -293,13 +275,11 @@ def _results(
         std = np.sqrt(fits.covariance(of_mass)[:, 0, 0, 0])
         mass_std_kg = np.where(whole, std, 0.0)
         covariance[whole] = fits.film_covariance(fits.through([MASS], of_mass))[whole]
-    per = fits.per[:, :4].copy()
-    beside_mass = STIFFNESS, DAMPING, DELAY
     # what is fitted follows a change of what is not
-    for fitted, fraction, moved in ([MASS], whole, beside_mass), (LAGS, share, range(4)):
-        for change in moved if fraction.any() else ():
-            follows = np.where(fraction > 0.0, fraction * fits.follow(change, fitted).T, 0.0)
-            per[:, change] += np.einsum("pn,npru->nru", follows, fits.per[:, fitted])
+    per = fits.per[:, :4] + np.einsum("npc,npru->ncru", fits.parts_follow(), fits.per[:, PARTS])
+    for change in (STIFFNESS, DAMPING, DELAY) if whole.any() else ():
+        follows = np.where(whole[:, np.newaxis], fits.follow(change, [MASS]), 0.0)
+        per[:, change] += np.einsum("np,npru->nru", follows, fits.per[:, [MASS]])
     lines = fits.lines
     scale = (lines.omega_unit ** (0.0, 0.0, 1.0, 1.0))[:, np.newaxis]
     coefficients = fits.unknowns / scale

@@ -2,13 +2,12 @@
 
 Every estimate is a linear function of ``Σ_lines w Σ_segments conj(f u) e``, with the weight w of a
 line, the residual force e, and the influence f of the shaft's motion u on the estimate. All
-influences are sums of the same eight: the four regressors of a film, the effects of the bracket's
-`FITTED` properties through the film, and the two lagging motions. Their covariance is therefore
-calculated once.
+influences are sums of the same nine: the four regressors of a film, the effects of the bracket's
+`FITTED` properties through the film, the two lagging motions, and the effect of their lag. Their
+covariance is therefore calculated once.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,7 +23,17 @@ from core.spectra.cross_spectrum import (
     correlated_sum,
 )
 from core.stiffness.dynamic_lines import own_power
-from core.stiffness.film_fit import MIN_SHARE, N_UNKNOWNS, ROUNDING, FilmLines
+from core.stiffness.film_fit import N_UNKNOWNS
+from core.stiffness.fitted_films import (
+    DAMPING,
+    DELAY,
+    LAGS,
+    MASS,
+    PARTS,
+    FittedFilms,
+    real_product,
+    times,
+)
 
 PART_PRODUCTS: FloatArray = np.array(
     [
@@ -42,160 +51,21 @@ of the six of `FilmFits._parts`, then imaginary parts of the first five."""
 
 N_PARTS = 6
 
-N_REWEIGHTED = 2
-"""Number of new fits of lagging parts with the weights of their own residual."""
-
-STIFFNESS, MASS, DAMPING, DELAY = range(4)
-"""Indices of the bracket properties that can change: relative stiffness, mass in kg, damping in
-N·s/m, and delay of the bearing channels in s."""
-
 FITTED = (DELAY, MASS)
 """Bracket properties that can be fitted together with the film."""
 
-LAGS = range(4, 8)
-"""Indices of the parts of a film that lag because its pads tilt, after the bracket properties: from
-x and y to the force in x, then to that in y; in N/m."""
-
-N_INFLUENCES = N_UNKNOWNS + len(FITTED)
+N_INFLUENCES = N_UNKNOWNS + len(FITTED) + 3
+LAGGING, TILTING = slice(N_INFLUENCES - 3, N_INFLUENCES - 1), N_INFLUENCES - 1
+"""Influences of the lagging motions, and of their lag."""
 
 
-@dataclass(frozen=True)
-class FilmFits:
-    """Weighted least-squares fits of the films of n bearings, and sources of their random errors.
-
-    Parameters
-    ----------
-    weight : (n, 2, n_used)
-        Weights from `core.stiffness.film_fit.line_weights`.
-    bracket_n_per_m : (n, n_used)
-        Dynamic stiffness of the brackets.
-    changes : (n, 4, n_used)
-        Derivatives of the dynamic stiffness with respect to `STIFFNESS`, `MASS`, `DAMPING` and
-        `DELAY`.
-    smear_share : (n, 2, n_used)
-        Power of the integration error as a fraction of the bearing's power.
-    n_segments : (n, 1)
-        Number of independent segments.
-    floor_std : (n, 2)
-        Relative standard uncertainty of each probe's noise power; zero if it is known.
-    lag : (n, n_used)
-        Dynamic stiffness per unit of a part in `LAGS`.
-    lagging : (n, 4)
-        Parts of the film that lag, in N/m; zero for a film that is constant over frequency.
-    """
-
-    lines: FilmLines
-    weight: FloatArray
-    bracket_n_per_m: ComplexArray
-    changes: ComplexArray
-    smear_share: FloatArray
-    n_segments: FloatArray
-    floor_std: FloatArray
-    lag: ComplexArray
-    lagging: FloatArray
-
-    @cached_property
-    def _normal(self) -> tuple[FloatArray, FloatArray]:
-        normal, share = self.lines.normal(self.weight)
-        normal[~(share >= MIN_SHARE)] = np.eye(N_UNKNOWNS)  # may be singular
-        return normal, share
-
-    @property
-    def signal_share(self) -> FloatArray:
-        """Smallest fraction of motion in the weighted shaft spectra of any direction, (n,)."""
-        return self._normal[1]
-
-    @cached_property
-    def _solved(self) -> FloatArray:
-        """Unknowns, and their derivatives with respect to each change, (n, 2, 4, 5)."""
-        brackets = np.concatenate([self.bracket_n_per_m[:, np.newaxis], self.changes], axis=1)
-        moments = self.lines.moments(self.weight, brackets)
-        return np.asarray(np.linalg.solve(self._normal[0], moments), dtype=np.float64)
-
-    @property
-    def unknowns(self) -> FloatArray:
-        """Coefficients (k_i1, k_i2, c_i1, c_i2) of each row, in N/m, (n, 2, 4)."""
-        return self._solved[..., 0] + self._shift(self.lagging)
-
-    @cached_property
-    def _lag_moments(self) -> FloatArray:
-        """Moments of the lagging motions with the regressors of each row, (n, 2, 4, 2)."""
-        moved = self._motion * self.lag[:, np.newaxis, np.newaxis]
-        scaled = self.lines.ratio[:, np.newaxis, np.newaxis] * moved.imag
-        moments = np.concatenate([moved.real, scaled], axis=2).reshape(len(moved), 8, -1)
-        weighted = (moments @ self.weight.swapaxes(1, 2)).reshape(-1, 2, N_UNKNOWNS, 2)
-        return weighted.transpose(0, 3, 2, 1)
-
-    @cached_property
-    def lag_per(self) -> FloatArray:
-        """Derivatives of a row's unknowns with respect to its two parts in `LAGS`, (n, 2, 4, 2)."""
-        return -np.asarray(np.linalg.solve(self._normal[0], self._lag_moments), dtype=np.float64)
-
-    @cached_property
-    def per(self) -> FloatArray:
-        """Derivatives of the unknowns with respect to each change, (n, 4 or 8, 2, 4).
-
-        The changes are those of the bracket, and `LAGS` if the film has lagging parts.
-        """
-        of_bracket = self._solved[..., 1:].transpose(0, 3, 1, 2)
-        if not self.has_lags:
-            return of_bracket
-        of_lags = np.einsum("nruj,rs->nrjsu", self.lag_per, np.eye(2))  # each acts on one row
-        return np.concatenate([of_bracket, of_lags.reshape(-1, 4, 2, N_UNKNOWNS)], axis=1)
-
-    @property
-    def has_lags(self) -> bool:
-        """Whether one of the films has lagging parts."""
-        return bool(self.lagging.any())
-
-    @cached_property
-    def lag_fit(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Estimated parts in `LAGS`, (n, 4), covariance of each row's, (n, 2, 2, 2), significance.
-
-        The significance, (n,), is chi-squared of four if the film has no other lagging parts.
-        """
-        shape = np.abs(self.lag[:, np.newaxis]) ** 2 * self.weight
-        own = np.einsum("nrl,njkl->nrjk", shape, self._motion.real)
-        information = own + self._lag_moments.swapaxes(2, 3) @ self.lag_per
-        turned = (self.lag.conj()[:, np.newaxis, np.newaxis] * self._common).real
-        score = np.einsum("nrl,nrcl->nrc", self.weight, turned)
-        inverse = _inverse(information.reshape(-1, 2, 2))[0].reshape(information.shape)
-        found = np.einsum("nrjk,nrk->nrj", inverse, score)
-        size = CORRELATED_LINES / (2.0 * self.n_segments[:, 0])
-        covariance = size[:, np.newaxis, np.newaxis, np.newaxis] * inverse
-        significance = (found * score).sum(axis=(1, 2)) / size
-        return self.lagging + found.reshape(-1, 4), covariance, significance
+class FilmFits(FittedFilms):
+    """Fitted films with their coherence, bracket changes and sources of random errors."""
 
     def delay_significance(self) -> FloatArray:
         """Return the squared significance of a delay of the bearing channels, (n,)."""
-        value, information = self.estimate([DELAY])[0][:, 0], self._information[:, DELAY, DELAY]
-        return np.asarray(2.0 * self.n_segments[:, 0] / CORRELATED_LINES * value**2 * information)
-
-    @cached_property
-    def film(self) -> ComplexArray:
-        """Dynamic stiffness of the films in N/m, (n, 2, 2, n_used)."""
-        lagging = self.lagging.reshape(-1, 2, 2, 1) * self.lag[:, np.newaxis, np.newaxis]
-        return self.lines.film(self.unknowns) + lagging
-
-    @cached_property
-    def force_power(self) -> FloatArray:
-        """Power of the brackets' forces in (N/m)² µm², for each row, (n, 2, n_used)."""
-        power = np.abs(self.bracket_n_per_m[:, np.newaxis]) ** 2 * self.lines.bearing_power
-        return np.asarray(power)
-
-    @cached_property
-    def _force(self) -> ComplexArray:
-        """Cross-spectra of the brackets' forces with the shaft's motion, (n, 2, 2, n_used)."""
-        force: ComplexArray = self.bracket_n_per_m[:, np.newaxis, np.newaxis] * self.lines.cross
-        return force
-
-    @cached_property
-    def residual(self) -> FloatArray:
-        """Power of the residual force in (N/m)² µm², (n, 2, n_used)."""
-        common = (self._force * self.film.conj()).real.sum(axis=2)
-        modelled = (_times(self.film, self.lines.shaft) * self.film.conj()).real.sum(axis=2)
-        left: FloatArray = self.force_power - 2.0 * common + modelled
-        return np.maximum(left, 0.0)
+        value, information = self.estimate([DELAY])[0], self._information[:, DELAY, DELAY]
+        return value[:, 0] ** 2 * information / self._size[:, 0, 0]
 
     @cached_property
     def coherence(self) -> FloatArray:
@@ -222,11 +92,6 @@ class FilmFits:
         found: FloatArray = 1.0 + 2.0 * self.coherence / variance
         return found
 
-    @cached_property
-    def _common(self) -> ComplexArray:
-        """Residual times the shaft's conjugated motion without noise, (n, 2, 2, n_used)."""
-        return self._force - _times(self.film, self._motion)
-
     @property
     def lack_of_fit(self) -> FloatArray:
         """Ratio of the residual's coherence with the shaft's motion to that by chance, (n, 2).
@@ -243,34 +108,6 @@ class FilmFits:
         found: FloatArray = self.n_segments * _summed(self.weight, power) / (2.0 * whole)
         return found
 
-    @cached_property
-    def _motion(self) -> ComplexArray:
-        """Cross-spectra of the shaft's motion without the probes' noise, (n, 2, 2, n_used)."""
-        motion = self.lines.shaft.copy()
-        np.einsum("niil->nil", motion)[...] -= self.lines.noise_power[..., np.newaxis]
-        return motion
-
-    @cached_property
-    def _relative(self) -> ComplexArray:
-        """Changes relative to the bracket's dynamic stiffness, (n, 4, n_used)."""
-        return self.changes / self.bracket_n_per_m[:, np.newaxis]
-
-    @cached_property
-    def _left(self) -> ComplexArray:
-        """Residual per unit of each change in `per` after a new fit, (n, ..., 2, 2, n_used)."""
-        through = -self.lines.film(self.per)
-        through[:, :4] += self._relative[:, :, np.newaxis, np.newaxis] * self.film[:, np.newaxis]
-        for part in LAGS if self.has_lags else ():
-            through[:, part, *divmod(part - LAGS[0], 2)] -= self.lag
-        return through
-
-    @cached_property
-    def _information(self) -> FloatArray:
-        """Information on the changes in the residual, (n, 4, 4) or (n, 8, 8)."""
-        moved = _times(self._left, self._motion[:, np.newaxis])
-        moved *= self.weight[:, np.newaxis, :, np.newaxis]
-        return _real_product(moved, self._left)
-
     def follow(self, change: int, fitted: Sequence[int]) -> FloatArray:
         """Return how a wrong bracket property shifts those that are fitted, (n, n_fitted).
 
@@ -281,7 +118,7 @@ class FilmFits:
         return -(inverse @ self._information[:, fitted, change, np.newaxis])[..., 0]
 
     def estimate(self, fitted: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-        """Return joint estimates of some of the `FITTED` changes and `LAGS`, and their influences.
+        """Return joint estimates of some of the `FITTED` changes and `PARTS`, and their influences.
 
         The estimation is one Gauss-Newton step. It uses the shaft's motion through the fitted film
         instead of the bearing's motion, whose noise would bias the estimates.
@@ -293,17 +130,23 @@ class FilmFits:
         """
         inverse, separate = _inverse(self._information[:, fitted][..., fitted])
         weighted = (self.weight[:, :, np.newaxis] * self._common)[:, np.newaxis]
-        score = _real_product(self._left[:, fitted], weighted)
+        score = real_product(self._left[:, fitted], weighted)
         value = np.where(separate[:, np.newaxis], -(inverse @ score)[..., 0], np.nan)
-        own = np.zeros((len(value), 2, len(fitted), self._n_influences))
+        return value, self._influences(inverse, fitted)
+
+    def _influences(self, inverse: FloatArray, fitted: Sequence[int]) -> FloatArray:
+        """Return weights of the influences in estimates with an inverse information matrix."""
+        own = np.zeros((len(inverse), 2, len(fitted), N_INFLUENCES))
         own[..., :N_UNKNOWNS] = self.per[:, fitted].swapaxes(1, 2)
         for n, change in enumerate(fitted):
             if change in FITTED:
                 own[..., n, N_UNKNOWNS + FITTED.index(change)] = -1.0
+            elif change in LAGS:
+                row, column = divmod(change - LAGS.start, 2)
+                own[:, row, n, LAGGING.start + column] = 1.0
             else:
-                row, column = divmod(change - LAGS[0], 2)
-                own[:, row, n, N_UNKNOWNS + len(FITTED) + column] = 1.0
-        return value, (inverse[:, np.newaxis] @ own)[:, np.newaxis]
+                own[:, change - LAGS.stop, n, TILTING] = 1.0
+        return (inverse[:, np.newaxis] @ own)[:, np.newaxis]
 
     def delay(self, fitted: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return `DELAY`, first of joint estimates, its uncertainty and per `DAMPING`, (n,)."""
@@ -311,29 +154,30 @@ class FilmFits:
         std = np.sqrt(self.covariance(influences)[:, 0, 0, 0])
         return value[:, 0], std, self.follow(DAMPING, fitted)[:, 0]
 
-    def with_lags(self, share: FloatArray) -> "FilmFits":
-        """Return fits with a share (n, 1) of their estimated lagging parts, and their weights."""
-        if not share.any():
-            return self
-        fits = replace(self, lagging=share * self.lag_fit[0])
-        for _ in range(N_REWEIGHTED):
-            least = ROUNDING * fits.force_power
-            weight = fits.lines.counted / fits.lines.smoothed(np.maximum(fits.residual, least))
-            weight = np.where(share[..., np.newaxis] > 0.0, weight, self.weight)
-            fits = replace(fits, weight=weight)
-            fits = replace(fits, lagging=share * fits.lag_fit[0])
-        return fits
+    @property
+    def parts_left(self) -> FloatArray:
+        """Standard uncertainty of the unknowns from what of `PARTS` is not estimated, (n, 2, 4).
 
-    def _shift(self, lagging: FloatArray) -> FloatArray:
-        """Return the change of the unknowns by lagging parts (n, 4), (n, 2, 4)."""
-        shift: FloatArray = np.einsum("nrup,nrp->nru", self.lag_per, lagging.reshape(-1, 2, 2))
-        return shift
+        Of the kept share it is the error of the prior, of the rest the estimate itself.
+        """
+        mean, covariance = self.of_parts
+        of_prior = covariance @ (self._prior[..., np.newaxis] * covariance)
+        whole = covariance + mean[..., np.newaxis] * mean[:, np.newaxis]
+        kept = self.kept[..., np.newaxis]
+        left = kept * of_prior + (1.0 - kept) * whole
+        per = self.per[:, PARTS]
+        variance: FloatArray = np.einsum("npru,npq,nqru->nru", per, left, per)
+        return np.sqrt(np.maximum(variance, 0.0))
 
-    def lags_shift(self) -> tuple[FloatArray, FloatArray]:
-        """Return the change of unknowns by all lagging parts, and its uncertainty, (n, 2, 4)."""
-        lagging, covariance, _ = self.lag_fit
-        variance = np.einsum("nrup,nrpq,nruq->nru", self.lag_per, covariance, self.lag_per)
-        return self._shift(lagging), np.sqrt(np.maximum(variance, 0.0))
+    def through_parts(self) -> FloatArray:
+        """Return weights of the influences in the unknowns through the kept `PARTS`, by row."""
+        inverse = self.kept[..., np.newaxis] * self.of_parts[1] / self._size
+        return self.through(PARTS, self._influences(inverse, PARTS))
+
+    def parts_follow(self) -> FloatArray:
+        """Return the change of the kept `PARTS` per wrong bracket property, (n, 6, 4)."""
+        information = self._information[:, PARTS, :4] / self._size
+        return -self.kept[..., np.newaxis] * (self.of_parts[1] @ information)
 
     def through(self, fitted: Sequence[int], influences: FloatArray) -> FloatArray:
         """Return weights of the influences in the unknowns through fitted changes, by row."""
@@ -345,7 +189,7 @@ class FilmFits:
 
         `through` holds the weights through changes that were fitted with the film.
         """
-        through = np.zeros((len(self.weight), 2, 2, N_UNKNOWNS, self._n_influences)) + through
+        through = np.zeros((len(self.weight), 2, 2, N_UNKNOWNS, N_INFLUENCES)) + through
         inverse = np.linalg.inv(self._normal[0])
         for row in (0, 1):
             through[:, row, row, :, :N_UNKNOWNS] += inverse[:, row]
@@ -356,7 +200,7 @@ class FilmFits:
 
         Parameters
         ----------
-        weights : (n, n_groups, 2, n_estimates, 6 or 8)
+        weights : (n, n_groups, 2, n_estimates, 9)
             Weights of the influences in the estimates, through the residual of each row.
         """
         covariance, slope = self._spread
@@ -365,15 +209,11 @@ class FilmFits:
         own += through @ through.swapaxes(-1, -2)
         return np.asarray(own)
 
-    @property
-    def _n_influences(self) -> int:
-        return N_INFLUENCES + 2 * self.has_lags
-
     @cached_property
     def _spread(self) -> tuple[FloatArray, FloatArray]:
-        """Covariance of the influences' sums, (n, 2, 6, 6), and its part from the noise floor.
+        """Covariance of the influences' sums, (n, 2, 9, 9), and its part from the noise floor.
 
-        The second array, (n, 2, 6, 2), holds the change of the sums per standard uncertainty of
+        The second array, (n, 2, 9, 2), holds the change of the sums per standard uncertainty of
         each probe's noise power.
         """
         lines, parts = self.lines, self._parts
@@ -381,15 +221,14 @@ class FilmFits:
         relative = self._relative[:, np.newaxis, FITTED]
         moved = (self.film[:, :, :, np.newaxis] * parts).sum(axis=2)
         moved = relative[:, :, :, np.newaxis] * moved[:, :, np.newaxis]
-        n_influences = self._n_influences
-        terms = np.empty((*parts.shape[:2], n_influences, 2 * N_PARTS - 1, parts.shape[-1]))
+        terms = np.empty((*parts.shape[:2], N_INFLUENCES, 2 * N_PARTS - 1, parts.shape[-1]))
         terms[:, :, :2, :N_PARTS] = parts.real
         terms[:, :, :2, N_PARTS:] = parts.imag[..., : N_PARTS - 1, :]
         np.multiply(-ratio, parts.imag, out=terms[:, :, 2:4, :N_PARTS])
         np.multiply(ratio, terms[:, :, :2, : N_PARTS - 1], out=terms[:, :, 2:4, N_PARTS:])
-        if self.has_lags:
-            lagging = self.lag[:, np.newaxis, np.newaxis, np.newaxis] * parts
-            moved = np.concatenate([moved, lagging], axis=2)
+        lag, per_deviation = (each[:, :, np.newaxis, np.newaxis] for each in self._lag)
+        tilting = per_deviation * (self._lagging[..., np.newaxis] * parts).sum(2, keepdims=True)
+        moved = np.concatenate([moved, lag * parts, tilting], axis=2)
         terms[:, :, 4:, :N_PARTS] = moved.real
         terms[:, :, 4:, N_PARTS:] = moved.imag[..., : N_PARTS - 1, :]
         # the real part of conj(x) e with circular e has half its power (Bendat and Piersol, 9.2)
@@ -398,15 +237,18 @@ class FilmFits:
         # per unit of noise power
         weight = self.weight[:, :, np.newaxis]
         weighted = weight * self.film
-        slope = np.empty((*parts.shape[:2], n_influences, 2))
+        slope = np.empty((*parts.shape[:2], N_INFLUENCES, 2))
         slope[:] = 0.0
         np.einsum("...ii->...i", slope[:, :, :2])[...] = weighted.real.sum(axis=-1)
         np.einsum("...ii->...i", slope[:, :, 2:4])[...] = (ratio[:, 0] * weighted.imag).sum(axis=-1)
         power = weight * (self.film.real**2 + self.film.imag**2)
         slope[:, :, 4:6] = relative.real @ power.swapaxes(-1, -2)
-        if self.has_lags:
-            turned = (self.lag.conj()[:, np.newaxis, np.newaxis] * weighted).real.sum(axis=-1)
-            np.einsum("...ii->...i", slope[:, :, 6:])[...] = turned
+        turned = [
+            (each.conj() * weighted).real.sum(axis=-1)
+            for each in (lag[..., 0, :], per_deviation[..., 0, :])
+        ]
+        np.einsum("...ii->...i", slope[:, :, LAGGING])[...] = turned[0]
+        slope[:, :, TILTING] = self._lagging[..., 0] * turned[1]
         slope *= (lines.noise_power * self.floor_std)[:, np.newaxis, np.newaxis]
         return covariance, slope
 
@@ -419,7 +261,7 @@ class FilmFits:
         """
         lines, shaft = self.lines, self.lines.shaft
         root, across = _hermitian_root(shaft), self.film.conj()
-        moved = _times(self.film, shaft)
+        moved = times(self.film, shaft)
         force = (moved * across).real.sum(axis=2)
         shared = moved.conj() / force[:, :, np.newaxis]
         smear = lines.smoothed(self.force_power) * self.smear_share
@@ -430,7 +272,7 @@ class FilmFits:
         smooth_root = np.sqrt(lines.smoothed(power) / power)[:, :, np.newaxis] * root
         apart = (
             smooth_root[:, np.newaxis]
-            - shared[:, :, :, np.newaxis] * _times(self.film, smooth_root)[:, :, np.newaxis]
+            - shared[:, :, :, np.newaxis] * times(self.film, smooth_root)[:, :, np.newaxis]
         )
         parts = np.empty((*self.weight.shape[:2], 2, N_PARTS, shaft.shape[-1]), dtype=np.complex128)
         parts[:, :, :, :2] = rest[:, :, np.newaxis, np.newaxis] * root[:, np.newaxis]
@@ -445,24 +287,10 @@ class FilmFits:
         return parts
 
 
-def _times(first: ComplexArray, second: ComplexArray) -> ComplexArray:
-    """Return the products of (..., n, 2, n_lines) and (..., 2, 2, n_lines) matrices."""
-    x, y = first[..., 0, np.newaxis, :], first[..., 1, np.newaxis, :]
-    return x * second[..., np.newaxis, 0, :, :] + y * second[..., np.newaxis, 1, :, :]
-
-
 def _summed(weight: FloatArray, values: FloatArray) -> FloatArray:
     """Return the sum over the lines of weighted values, (n, 2)."""
     total: FloatArray = np.einsum("nrl,nrl->nr", weight, values)
     return total
-
-
-def _real_product(first: ComplexArray, second: ComplexArray) -> FloatArray:
-    """Return the real inner products of p and q arrays of each bearing, (n, p, q)."""
-    p, q = (np.ascontiguousarray(array) for array in (first, second))
-    parts = [array.reshape(*array.shape[:2], -1).view(np.float64) for array in (p, q)]
-    product: FloatArray = parts[0] @ parts[1].swapaxes(1, 2)
-    return product
 
 
 def _inverse(information: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from acquisition.simulated.life.bearing import STANDING_TIME_FACTOR
 from acquisition.simulated.life.operation import Operation, lagged, wander
-from acquisition.simulated.plant.films import DAMPING_OVER_STIFFNESS_S, Film, FilmColumns
+from acquisition.simulated.plant.films import Film, FilmColumns
 from acquisition.simulated.plant.rotor import (
     N_SHAFT_COORDINATES,
     RotorParameters,
@@ -115,9 +115,9 @@ def order1_um_pk(
     for bracket in rotor.brackets:
         spring = bracket.stiffness_n_per_m * bracket_factors[bracket.bearing]
         b = spring - bracket.mass_kg * omega**2
-        film = _matrices(films[bracket.bearing]) * (1.0 + 1j * omega * DAMPING_OVER_STIFFNESS_S)
+        film = _matrices(films[bracket.bearing], omega)
         b = b[:, np.newaxis, np.newaxis]
-        share = _inverse(np.asarray(film + b * np.eye(2), np.complex128)) * b
+        share = _inverse(film + b * np.eye(2)) * b
         motion = shaft_motion(bracket.height_m)
         dynamic += motion.T @ (film @ share) @ motion
         shares[bracket.bearing] = share, motion
@@ -145,10 +145,10 @@ def _split(share: ComplexArray, shaft_m: ComplexArray) -> ComplexArray:
     return np.asarray(um_from_m(1.0) * np.concatenate([relative, shaft_m[:, :, 0].T - relative]))
 
 
-def _matrices(film: FilmColumns) -> FloatArray:
-    """Return the stiffness matrices of a film, (n, 2, 2)."""
-    rows = ((film.k_xx_n_per_m, film.k_xy_n_per_m), (film.k_xy_n_per_m, film.k_yy_n_per_m))
-    return np.moveaxis(np.array(rows), -1, 0)
+def _matrices(film: FilmColumns, omega: float) -> ComplexArray:
+    """Return the dynamic stiffness of a film at the running speed, (n, 2, 2)."""
+    k = np.array([film.k_xx_n_per_m, film.k_xy_n_per_m, film.k_yy_n_per_m])
+    return np.moveaxis((k + 1j * omega * film.c_n_s_per_m)[[[0, 1], [1, 2]]], -1, 0)
 
 
 def _inverse(matrix: ComplexArray) -> ComplexArray:

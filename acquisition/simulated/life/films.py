@@ -88,15 +88,13 @@ def film_course(
     """
     pads_um = _pad_clearance_um(bearing, setting, thermal)
     viscosity_pa_s = bearing.oil.viscosity_pa_s(thermal.oil_temperature_c)
-    factor: FloatArray | float = 1.0
     if altered is not None:
         pads_um, centre_um = pads_um * altered.clearance, centre_um * altered.clearance
         pads_um[worn] += altered.pivot_share * bearing.configured_clearance_um
         viscosity_pa_s = viscosity_pa_s * altered.viscosity
-        factor = altered.stiffness
+        viscosity_pa_s = viscosity_pa_s * altered.stiffness  # scales all forces
     film = bearing.ring.film(pads_um, centre_um, viscosity_pa_s, speed_rpm)
-    scaled = (factor * k for k in (film.k_xx_n_per_m, film.k_xy_n_per_m, film.k_yy_n_per_m))
-    return FilmCourse(FilmColumns(*scaled), np.mean(pads_um, axis=0), centre_um)
+    return FilmCourse(film, np.mean(pads_um, axis=0), centre_um)
 
 
 def mean_clearance_um(

@@ -149,11 +149,16 @@ def rotor_matrices(
     lag_n_per_m, lag_s = np.array([sizes for _, *sizes in lags]).reshape(-1, 2).T
     damping = relative.T @ _block_diagonal([f.damping_n_s_per_m for f in ordered]) @ relative
     films_n_per_m = relative.T @ _block_diagonal([f.stiffness_n_per_m for f in ordered]) @ relative
+    rotor_kg, tilt = parameters.rotor_mass_kg, parameters.diametral_inertia_kg_m2
+    brackets_kg = [b.mass_kg for b in parameters.brackets for _ in "xy"]
+    gyroscopic = np.zeros_like(damping)
+    gyroscopic[2, 3] = parameters.polar_inertia_kg_m2
+    gyroscopic[3, 2] = -parameters.polar_inertia_kg_m2
     return RotorMatrices(
-        mass=_mass(parameters),
+        mass=np.diag([rotor_kg, rotor_kg, tilt, tilt, *brackets_kg]),
         # (iωτ)² / (1 + iωτ) = 1/(1 + iωτ) − 1 + iωτ
         damping=damping + (lag_map.T * lag_n_per_m * lag_s) @ lag_map,
-        gyroscopic=_gyroscopic(parameters),
+        gyroscopic=gyroscopic,
         stiffness=_structure_stiffness(parameters)
         + films_n_per_m
         - (lag_map.T * lag_n_per_m) @ lag_map,
@@ -224,19 +229,6 @@ def _shaft_motion(parameters: RotorParameters, height_m: float) -> FloatArray:
     rows[0, [0, 3]] = 1.0, height_m
     rows[1, [1, 2]] = 1.0, -height_m
     return rows
-
-
-def _mass(parameters: RotorParameters) -> FloatArray:
-    rotor, tilt = parameters.rotor_mass_kg, parameters.diametral_inertia_kg_m2
-    brackets = [b.mass_kg for b in parameters.brackets for _ in "xy"]
-    return np.diag([rotor, rotor, tilt, tilt, *brackets])
-
-
-def _gyroscopic(parameters: RotorParameters) -> FloatArray:
-    matrix = np.zeros((parameters.n_coordinates, parameters.n_coordinates))
-    matrix[2, 3] = parameters.polar_inertia_kg_m2
-    matrix[3, 2] = -parameters.polar_inertia_kg_m2
-    return matrix
 
 
 def _structure_stiffness(parameters: RotorParameters) -> FloatArray:

@@ -67,14 +67,7 @@ def discretize(
         (10, n_forces) generalized force per unit of each force.
     output_map
         (n_outputs, n_states) map from the state to the outputs.
-
-    Raises
-    ------
-    ValueError
-        If the rate is not positive.
     """
-    if not rate_hz > 0.0:
-        raise ValueError(f"sampling rate must be above 0 Hz, got {rate_hz}")
     transition, held, ramped = _step(matrices, force_map, rate_hz)
     # s = (x, dx/dt) − ramped f takes f[n+1] out of the recursion (Franklin, Powell, Workman,
     # Digital Control of Dynamic Systems, triangle hold)
@@ -122,15 +115,7 @@ class LiftedRotor:
 
 
 def lift(rotor: DiscreteRotor, n_steps: int) -> LiftedRotor:
-    """Return a rotor that combines `n_steps` steps into one.
-
-    Raises
-    ------
-    ValueError
-        If `n_steps` is less than 1.
-    """
-    if n_steps < 1:
-        raise ValueError(f"n_steps must be at least 1, got {n_steps}")
+    """Return a rotor that combines `n_steps` steps into one."""
     powers = [np.eye(rotor.transition.shape[0])]
     for _ in range(n_steps):
         powers.append(rotor.transition @ powers[-1])
@@ -163,32 +148,17 @@ def simulate(
     -------
     outputs, state
         (n_outputs, n_samples), and the state at the sample after the last.
-
-    Raises
-    ------
-    ValueError
-        If the number of forces is wrong or the samples do not fill whole blocks.
     """
-    if forces.shape[0] != rotor.n_forces or forces.shape[1] % rotor.n_steps:
-        raise ValueError(
-            f"forces of shape {forces.shape} do not fill blocks of"
-            f" {rotor.n_forces} forces and {rotor.n_steps} steps"
-        )
-    blocks = _time_to_blocks(forces, rotor.n_steps)
-    states, state = _block_states(rotor, state, blocks @ rotor.input_map.T)
-    outputs = states @ rotor.output_map.T + blocks @ rotor.feedthrough.T
-    return _blocks_to_time(outputs, rotor.n_outputs), state
-
-
-def _block_states(
-    rotor: LiftedRotor, state: FloatArray, driven: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the state at the start of each block, (n_blocks, n_states), and the final state."""
-    states = np.empty_like(driven)
-    for index, push in enumerate(driven):
+    n_blocks = forces.shape[1] // rotor.n_steps
+    by_block = forces.reshape(rotor.n_forces, n_blocks, rotor.n_steps).swapaxes(0, 1)
+    blocks = by_block.reshape(n_blocks, -1)
+    states = np.empty((n_blocks, state.size))
+    for index, push in enumerate(blocks @ rotor.input_map.T):
         states[index] = state
         state = rotor.transition @ state + push
-    return states, state
+    outputs = states @ rotor.output_map.T + blocks @ rotor.feedthrough.T
+    by_output = outputs.reshape(n_blocks, rotor.n_outputs, rotor.n_steps).swapaxes(0, 1)
+    return by_output.reshape(rotor.n_outputs, -1), state
 
 
 def _feedthrough(observed: FloatArray, rotor: DiscreteRotor) -> FloatArray:
@@ -201,14 +171,3 @@ def _feedthrough(observed: FloatArray, rotor: DiscreteRotor) -> FloatArray:
         pushed = np.arange(n_steps - delay)
         matrix[:, pushed + delay, :, pushed] = response
     return matrix.reshape(n_outputs * n_steps, -1)
-
-
-def _time_to_blocks(signals: FloatArray, n_steps: int) -> FloatArray:
-    n_signals, n_samples = signals.shape
-    blocks = signals.reshape(n_signals, n_samples // n_steps, n_steps).swapaxes(0, 1)
-    return blocks.reshape(n_samples // n_steps, n_signals * n_steps)
-
-
-def _blocks_to_time(blocks: FloatArray, n_signals: int) -> FloatArray:
-    signals = blocks.reshape(len(blocks), n_signals, -1).swapaxes(0, 1)
-    return signals.reshape(n_signals, -1)

@@ -21,7 +21,7 @@ from core.spectra.cross_spectrum import phasor_power_per_density
 from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, films
 from core.stiffness.dynamic_lines import DynamicSettings
 from core.stiffness.dynamic_readings import _fit_quality, dynamic_budgets
-from core.stiffness.film_covariance import MASS
+from core.stiffness.fitted_films import MASS
 from core.uncertainty import Kind
 
 SPEED_RAD_S = 2.0 * np.pi * TURN_HZ[0]
@@ -200,4 +200,4 @@ def test_the_stated_change_with_the_brackets_mass_is_the_change_on_tilting_pads(
     assert np.abs(stated[0, 0]) > 3e-4 * right.k_n_per_m[0, 0]
     change = heavier.coefficients - right.coefficients
     scale = np.array([right.k_n_per_m[0, 0]] * 2 + [right.c_n_s_per_m[0, 0]] * 2)
-    np.testing.assert_allclose(change / scale, stated / scale, atol=3e-4)
+    np.testing.assert_allclose(change / scale, stated / scale, atol=1e-3)  # of 0.3 and 0.7 %

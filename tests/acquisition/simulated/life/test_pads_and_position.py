@@ -66,7 +66,13 @@ def test_eliminated_brackets_change_no_amplitude_and_no_phase():
     random = np.random.default_rng(3)
     rotor, n = RotorParameters(), 5
     films = {
-        b.bearing: FilmColumns(*(s * random.uniform(0.2e9, 2e9, n) for s in (1.0, 0.2, 1.0)))
+        b.bearing: FilmColumns(
+            *(s * random.uniform(0.2e9, 2e9, n) for s in (1.0, 0.2, 1.0)),
+            random.uniform(1e6, 2e7, (3, n)),
+            random.uniform(-2e8, 2e8, (3, n)),
+            np.full(n, 0.014),
+            np.full(n, 0.014 * 2.0 * np.pi * 90.9 / 60.0),
+        )
         for b in rotor.brackets
     }
     grade_mm_s = random.uniform(0.5, 4.0, n)

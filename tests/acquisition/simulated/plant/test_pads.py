@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.simulated.plant.films import Film
+from acquisition.simulated.plant.films import PAD_LAWS, Film, FilmColumns, PadRing
 from acquisition.simulated.plant.moving_rotor import MovingRotor
 from acquisition.simulated.plant.rotor import (
     ForcePlane,
@@ -107,6 +107,56 @@ def test_clearance_oil_and_uneven_pads_act_as_they_should():
 
     with pytest.raises(ValueError, match="touches a pad"):
         ring.film(wide, (510.0, 0.0), VISCOSITY_PA_S, 92.3)
+
+
+def ring_film(
+    bearing: str,
+    clearance_um: float,
+    centre_um: tuple[float, float],
+    viscosity_pa_s: float = VISCOSITY_PA_S,
+    opening: FloatArray | float = 0.0,
+) -> FilmColumns:
+    """One row of the film of a ring with the fitted law of a pad and the stiffness of its pads."""
+    warm_um = {"UJB": 500.0, "LJB": 615.0, "TJB": 425.0}[bearing]
+    k_gn_per_m = coefficients(film(bearing, warm_um, 0.0), 1.0)[0]
+    ring = PadRing(
+        PADS[bearing].n_pads, 1e9 * k_gn_per_m, warm_um, VISCOSITY_PA_S, 92.3, law=PAD_LAWS[bearing]
+    )
+    pads_um = clearance_um * (1.0 + opening * np.ones(ring.n_pads))[:, np.newaxis]
+    oil_and_speed = np.array([viscosity_pa_s]), np.array([92.3])
+    return ring.film(pads_um, np.array(centre_um)[:, np.newaxis], *oil_and_speed)
+
+
+@pytest.mark.parametrize(("bearing", "clearance_um"), [("UJB", 500), ("LJB", 615), ("TJB", 425)])
+def test_a_ring_of_fitted_pads_has_the_film_of_reynolds_equation_at_all_frequencies(
+    bearing, clearance_um
+):
+    opening = 0.1 * np.cos(4.0 * np.pi * np.arange(PADS[bearing].n_pads) / PADS[bearing].n_pads)
+    exact = 0.035 if bearing == "TJB" else 0.007  # where the film cavitates the solver has steps
+    for eccentricity in (0.0, 0.3, 0.6):
+        centre_um = 0.8 * eccentricity * clearance_um, 0.6 * eccentricity * clearance_um
+        theirs = PADS[bearing].film(clearance_um * (1.0 + opening), centre_um, VISCOSITY_PA_S, 92.3)
+        ours = ring_film(bearing, clearance_um, centre_um, opening=opening).at(0)
+
+        for whirl in (0.25, 1.0, 8.0):
+            expected = theirs.dynamic_stiffness_n_per_m(whirl * SPEED_RAD_S)
+            found = ours.dynamic_stiffness_n_per_m(whirl * SPEED_RAD_S)
+            np.testing.assert_allclose(found, expected, atol=exact * np.abs(expected).max())
+
+
+def test_oil_scales_stiffness_and_damping_and_clearance_moves_their_ratio_as_by_ross():
+    """ROSS (commit 631a249a), UJB, 500 µm, shaft 150 µm along x; k and c/k in x and y."""
+
+    def k_and_ratio(found: FilmColumns) -> FloatArray:
+        k = np.array([found.k_xx_n_per_m[0], found.k_yy_n_per_m[0]])
+        return np.concatenate([k, found.c_n_s_per_m[[0, 2], 0] / k])
+
+    usual = k_and_ratio(ring_film("UJB", 500.0, (150.0, 0.0)))
+    thin = k_and_ratio(ring_film("UJB", 500.0, (150.0, 0.0), 0.8 * VISCOSITY_PA_S))
+    wide = k_and_ratio(ring_film("UJB", 550.0, (150.0, 0.0)))
+
+    np.testing.assert_allclose(thin / usual - 1.0, [-0.2, -0.2, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(wide / usual - 1.0, [-0.301, -0.269, 0.032, 0.025], atol=0.002)
 
 
 def test_the_rotor_moves_on_tilting_pads_as_their_dynamic_stiffness_demands():

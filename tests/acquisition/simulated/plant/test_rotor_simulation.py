@@ -103,13 +103,3 @@ def test_steady_state_under_a_rotating_force_is_the_frequency_response(plane):
         rows = [2 * index, 2 * index + 1, 6 + 2 * index, 7 + 2 * index]
         # Loss of a force in ramps over 1/600 s: (π f / rate)² / 3 = 2.2e-5
         assert np.abs(outputs[rows][:, 600 * 50 :] - expected).max() <= 3e-5 * np.abs(phasor).max()
-
-
-def test_forces_of_uneven_blocks_and_a_rate_of_zero_are_refused():
-    rotor = lift(discrete_rotor(), 32)
-    with pytest.raises(ValueError, match=r"\(6, 33\).*32 steps"):
-        simulate(rotor, np.zeros(20), np.zeros((6, 33)))
-    with pytest.raises(ValueError, match="n_steps must be at least 1"):
-        lift(discrete_rotor(), 0)
-    with pytest.raises(ValueError, match="above 0 Hz"):
-        discretize(MATRICES, np.zeros((10, 2)), np.zeros((12, 20)), 0.0)
