@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.accuracy_estimates import Estimate, amplitudes, estimates
-from benchmarks.accuracy_plant import spectra
+from benchmarks.accuracy_plant import FlexibleRun, flexible_spectra, spectra
 from benchmarks.accuracy_rows import ROWS, Required, Row
 from core.arrays import FloatArray
 
@@ -54,7 +54,10 @@ class Found:
 def simulate(job: tuple[str, int]) -> dict[str, list[Estimate]]:
     """Evaluate one run of a row, by bearing."""
     row = ROWS[job[0]]
-    found = spectra(row.run, job[1], row.response)
+    if isinstance(row.run, FlexibleRun):
+        found = flexible_spectra(row.run, job[1])
+    else:
+        found = spectra(row.run, job[1], row.response)
     if not row.mass_known:
         found = {
             bearing: replace(of, bracket=replace(of.bracket, mass_kg=None))
@@ -64,22 +67,32 @@ def simulate(job: tuple[str, int]) -> dict[str, list[Estimate]]:
         return {bearing: amplitudes(found[bearing]) for bearing in row.bearings}
     return {
         bearing: estimates(
-            found[bearing], row.accuracy, row.lines, row.c_over_k_xx, row.runout_um_pk
+            found[bearing],
+            row.accuracy,
+            row.lines,
+            row.c_over_k_xx,
+            row.runout_um_pk,
+            good_only=isinstance(row.run, FlexibleRun),
         )
         for bearing in row.bearings
     }
 
 
 def gather(runs: list[dict[str, list[Estimate]]]) -> Iterator[tuple[str, Found]]:
-    """Statistics of each bearing and figure."""
+    """Statistics of each bearing and figure, and of all coefficients of `dynamic` together."""
     for bearing, first in runs[0].items():
-        for index, estimate in enumerate(first):
-            all_runs = [run[bearing][index] for run in runs]
+        names = [estimate.name for estimate in first]
+        figures_of = {name: [place] for place, name in enumerate(names)}
+        of_dynamic = [place for place, name in enumerate(names) if name.startswith("dynamic ")]
+        if of_dynamic:
+            figures_of["dynamic together"] = of_dynamic
+        for name, places in figures_of.items():
+            all_runs = [run[bearing][place] for run in runs for place in places]
             given = [e for e in all_runs if np.isfinite(e.error)]
             yield (
                 bearing,
                 Found(
-                    estimate.name,
+                    name,
                     np.array([e.error for e in given]),
                     float(np.mean([e.covered for e in given])) if given else float("nan"),
                     float(np.mean([e.covered_random for e in given])) if given else float("nan"),

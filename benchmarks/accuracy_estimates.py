@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 from benchmarks.accuracy_plant import BearingSpectra
 from core.machine.unit import BearingAccuracy
-from core.quality import Reason
+from core.quality import Level, Reason
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.spectra.segments import ORDER1, VORTEX
 from core.stiffness.dynamic import FilmSpectrum, films
 from core.stiffness.dynamic_lines import DynamicSettings
-from core.stiffness.dynamic_readings import dynamic_budgets
+from core.stiffness.dynamic_readings import dynamic_budgets, fit_quality
 from core.stiffness.estimators import DYNAMIC_COEFFICIENTS
 from core.stiffness.evidence import line_excitation
 from core.stiffness.stiffness_budget import ratio_budget, transfer_budgets
@@ -50,6 +50,7 @@ def estimates(
     lines: tuple[str, ...] = ("1×",),
     c_over_k_xx: bool = False,
     runout_um_pk: float = 0.0,
+    good_only: bool = False,
 ) -> list[Estimate]:
     """Evaluate every estimator.
 
@@ -59,8 +60,10 @@ def estimates(
         Where `transfer` and `ratio` are read.
     c_over_k_xx
         Compare ω·c at 1× with k_xx, as cross-coupled damping may be nothing to compare with.
+    good_only
+        Leave out results of `dynamic` whose fit makes them uncertain.
     """
-    found = list(_dynamic(spectra, accuracy, c_over_k_xx))
+    found = list(_dynamic(spectra, accuracy, c_over_k_xx, good_only))
     for name in lines:
         found += _at_line(spectra, accuracy, name, runout_um_pk)
     return found
@@ -80,14 +83,16 @@ def amplitudes(spectra: BearingSpectra) -> list[Estimate]:
 
 
 def _dynamic(
-    spectra: BearingSpectra, accuracy: BearingAccuracy, c_over_k_xx: bool
+    spectra: BearingSpectra, accuracy: BearingAccuracy, c_over_k_xx: bool, good_only: bool
 ) -> Iterator[Estimate]:
     film = spectra.film
     measured = FilmSpectrum(spectra.bins, spectra.bracket, spectra.turn_hz, spectra.n_integrations)
     [result] = films([measured], DynamicSettings())
-    budgets = (
-        {} if isinstance(result, Reason) else dynamic_budgets(result, spectra.bracket, accuracy)
-    )
+    budgets = {}
+    if not isinstance(result, Reason):
+        level = fit_quality(result, BearingAccuracy().delay_s, 0.0).level
+        if level is Level.GOOD or not good_only:
+            budgets = dynamic_budgets(result, spectra.bracket, accuracy)
     omega = 2.0 * math.pi * float(spectra.orders.frequency_hz[ORDER1])
     for letter, truth in (("k", film.stiffness_n_per_m), ("c", film.damping_n_s_per_m)):
         scale = float(truth[0, 0])

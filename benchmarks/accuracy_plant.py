@@ -21,6 +21,13 @@ from acquisition.simulated.plant.rotor import (
 )
 from acquisition.simulated.plant.scenario import ChannelScenario, Scenario, TransducerNoise
 from acquisition.simulated.plant.unit import SimulatedUnit
+from benchmarks.flexible_rotor import (
+    BRACKETS,
+    FREQUENCY_HZ,
+    TURN_HZ,
+    recording,
+    tilting_films,
+)
 from core.arrays import FloatArray
 from core.machine.channel import Channel, Measurand
 from core.machine.response import Response
@@ -29,7 +36,7 @@ from core.monitor.assessment import AnalysisSettings
 from core.samples.blocks import SampleBlock
 from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from core.samples.ring import Ring
-from core.spectra.cross_spectrum import CrossSpectrum, average
+from core.spectra.cross_spectrum import NO_SPECTRUM, CrossSpectrum, average
 from core.spectra.segments import SegmentTransform
 from core.units import rad_s_from_rpm
 
@@ -100,6 +107,15 @@ class Run:
 
 
 @dataclass(frozen=True)
+class FlexibleRun:
+    """Spectra of tilting pads under a flexible rotor (`benchmarks.flexible_rotor`)."""
+
+    eccentricity: float
+    bends_at_hz: float
+    n_segments: int = 140
+
+
+@dataclass(frozen=True)
 class BearingSpectra:
     """What the estimators get, and the truth beside it.
 
@@ -167,6 +183,25 @@ def spectra(run: Run, seed: int, response: Response | None = None) -> dict[str, 
     settings = AnalysisSettings(n_segments=n_chunks)  # more than there can be: all are averaged
     transform = _transform(unit, settings, _blocks(unit, scenario, seed, n_chunks))
     return {b.id: _of_bearing(unit, b, scenario, transform) for b in unit.bearings}
+
+
+def flexible_spectra(run: FlexibleRun, seed: int) -> dict[str, BearingSpectra]:
+    """Draw the spectra of a flexible rotor between the harmonics, by bearing; no lines at 1×."""
+    films, found = tilting_films(run.eccentricity), {}
+    turn_hz = np.array([TURN_HZ])
+    for place, (name, film) in enumerate(films.items()):
+        own_seed = len(films) * seed + place
+        phasors = recording(name, run.eccentricity, own_seed, run.n_segments, run.bends_at_hz)
+        found[name] = BearingSpectra(
+            bins=average(FREQUENCY_HZ, phasors, np.ones(phasors.shape[:2], dtype=np.bool_)),
+            orders=replace(NO_SPECTRUM, frequency_hz=turn_hz),
+            film=film.at(2.0 * np.pi * TURN_HZ),
+            bracket=BRACKETS[name],
+            turn_hz=(TURN_HZ, TURN_HZ),
+            n_integrations=(0, 0),
+            order1_um_pk=np.zeros(4),
+        )
+    return found
 
 
 def drawn(run: Run, unit: Unit, draws: np.random.Generator) -> Scenario:

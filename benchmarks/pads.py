@@ -162,3 +162,6 @@ PADS: Mapping[str, TiltingPads] = MappingProxyType(
     }
 )
 """Pads of the guide bearings of Brito et al., Table 1."""
+
+WARM_UM: Mapping[str, float] = MappingProxyType({"UJB": 500.0, "LJB": 615.0, "TJB": 425.0})
+"""Clearances of the warm bearings."""

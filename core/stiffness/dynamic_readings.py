@@ -51,7 +51,7 @@ NAMES = (
 def dynamic_readings(bearing: Bearing, found: DynamicStiffness, quality: Quality) -> Found:
     """Return the readings of `dynamic` for a fitted film, with budgets, from input of a quality."""
     damping = _damping_half_width(found, bearing.bracket, bearing.accuracy)
-    quality = worst((quality, _fit_quality(found, bearing.accuracy.delay_s, damping)))
+    quality = worst((quality, fit_quality(found, bearing.accuracy.delay_s, damping)))
     coefficients = dynamic_budgets(found, bearing.bracket, bearing.accuracy)
     of_film = {name: (Reading(b.value, quality), b) for name, b in coefficients.items()}
     return with_budgets(of_film | _evidence(found, bearing, damping, quality))
@@ -94,7 +94,7 @@ def _damping_half_width(
     return damping_half_width_n_s_per_m(bracket, max(found.bracket_mass_kg, 0.0), accuracy)
 
 
-def _fit_quality(found: DynamicStiffness, max_delay_s: float, damping: float) -> Quality:
+def fit_quality(found: DynamicStiffness, max_delay_s: float, damping: float) -> Quality:
     """Return the quality of the fit: uncertain if it shows a channel delay or is poor."""
     sure = coverage_factor((), 1.0 - FALSE_ALARM)
     limits_s = max_delay_s + abs(found.delay_per_damping) * damping

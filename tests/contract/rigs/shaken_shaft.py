@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from benchmarks.flexible_rotor import FREQUENCY_HZ, hann_noise
 from core.arrays import ComplexArray
 from core.machine.unit import BracketDynamics
 from core.quality import Reason
@@ -9,20 +10,11 @@ from core.spectra.cross_spectrum import CrossSpectrum, average
 from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, films
 from core.stiffness.dynamic_lines import DynamicSettings
 
-FREQUENCY_HZ = 600.0 / 8192 * np.arange(1, 342)
 TURN_HZ = (92.3 / 60.0, 92.3 / 60.0)
 BRACKET = BracketDynamics(1.18e9, 0.45e5)
 STIFFNESS = np.array([[1.2e9, -0.33e9], [-0.25e9, 0.7e9]])
 DAMPING = np.array([[1.5e7, 2.0e6], [-1.0e6, 0.9e7]])
 NOISE_FREE = DynamicSettings(probe_noise_um2_per_hz=(0.0, 0.0))
-BIN_HZ = float(FREQUENCY_HZ[0])
-
-
-def hann_noise(rng: np.random.Generator, n_segments: int, n_channels: int) -> ComplexArray:
-    """White noise of unit power with the neighbours' correlation that Hann's taper gives."""
-    shape = (n_segments, n_channels, FREQUENCY_HZ.size + 2)
-    white = rng.normal(size=shape) + 1j * rng.normal(size=shape)
-    return (white[..., 1:-1] - 0.5 * (white[..., :-2] + white[..., 2:])) / np.sqrt(3.0)
 
 
 def shaken(

@@ -6,24 +6,30 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rigs.shaken_shaft import (
-    BIN_HZ,
     BRACKET,
     DAMPING,
-    FREQUENCY_HZ,
     NOISE_FREE,
     STIFFNESS,
     TURN_HZ,
     averaged,
     dynamic_stiffness,
     found,
-    hann_noise,
 )
 
+from benchmarks.flexible_rotor import BIN_HZ, FREQUENCY_HZ, hann_noise
 from core.arrays import ComplexArray, FloatArray
-from core.quality import Reason
+from core.machine.unit import Bearing
+from core.quality import GOOD, Reason, missing
 from core.spectra.cross_spectrum import phasor_power_per_density
 from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, films
 from core.stiffness.dynamic_lines import DynamicSettings
+from core.stiffness.dynamic_readings import dynamic_readings
+from core.stiffness.estimators import (
+    DYNAMIC_COEFFICIENTS,
+    ESTIMATORS,
+    TRANSFERS,
+    signs_checked,
+)
 from core.stiffness.fitted_films import DELAY
 from core.stiffness.fitted_films import STIFFNESS as STIFFENING
 
@@ -276,6 +282,52 @@ def test_each_demand_on_the_evidence_can_refuse_alone(recording, stricter):
     strict = replace(base, **stricter)
     result = dynamic_stiffness(spectrum, BRACKET, TURN_HZ, strict)
     assert result is Reason.INSUFFICIENT_EXCITATION
+
+
+def test_fewer_lines_than_unknowns_or_gaps_in_a_spectrum_give_a_reason(recording):
+    spectrum = averaged(recording(bearing_um=0.1))
+    few = DynamicSettings(band_hz=(2.0, 2.5))
+    assert dynamic_stiffness(spectrum, BRACKET, TURN_HZ, few) is Reason.INSUFFICIENT_EXCITATION
+
+    spectrum.matrix[100:103], spectrum.power[100:103] = np.nan, np.nan
+    result = dynamic_stiffness(spectrum, BRACKET, TURN_HZ, DynamicSettings())
+    assert result is Reason.INSUFFICIENT_EXCITATION
+
+
+def test_lines_that_do_not_show_what_lags_leave_it_to_the_stated_uncertainty(recording):
+    """In a narrow band lagging parts cannot be told from stiffness and damping."""
+    narrow = replace(NOISE_FREE, band_hz=(2.0, 4.0), min_segments=4)
+
+    wide, found_narrow = (
+        [found(recording(seed, bearing_um=0.05), settings) for seed in range(20)]
+        for settings in (NOISE_FREE, narrow)
+    )
+
+    for each in found_narrow:
+        error = np.abs(each.k_n_per_m - STIFFNESS)
+        stated = np.hypot(each.std, each.model / np.sqrt(3.0))[:, :2]
+        assert np.all(error < 4.0 * stated)
+    left = np.mean([each.model for each in found_narrow]), np.mean([each.model for each in wide])
+    assert left[0] > 3.0 * left[1]
+
+
+def test_a_film_of_negative_damping_is_no_number(recording):
+    backwards = recording(bearing_um=0.05).conj()  # of K − iωC, as the bracket has no damping
+    result = found(backwards, DynamicSettings())
+    assert np.all(np.diag(result.c_n_s_per_m) < 0.0)
+    bearing = Bearing("UJB", 1.18e9, "ux", "uy", "vx", "vy", 500.0, (2000.0, 2000.0))
+    at_lines = {
+        name: missing(Reason.NO_VORTEX)
+        for estimator in TRANSFERS.values()
+        for axes in ("xx", "yy")
+        for name in ESTIMATORS[estimator].names(axes)
+    }
+
+    of_film, _ = dynamic_readings(bearing, result, GOOD)
+    readings = signs_checked(of_film | at_lines)
+
+    for row in DYNAMIC_COEFFICIENTS:
+        assert [readings[name] for name in row] == [missing(Reason.POLARITY)] * 4
 
 
 def test_bearings_fitted_together_have_the_films_that_each_has_alone(recording):
