@@ -42,6 +42,10 @@ MAX_MASS_STD = 0.5
 """Largest standard uncertainty of a fitted mass as a fraction of the largest plausible mass of the
 bracket. Beyond it the lines do not determine the mass, and there is no result."""
 
+CONSTANT_ODDS = 1e-4
+"""Prior odds of a film that is constant over frequency. Films of fixed pads are, and those of
+tilting pads nearly so at some positions of the shaft."""
+
 DELAY_DOUBTFUL, DELAY_CERTAIN = 9.5, 18.5
 """Squared significance of a delay of the bearing channels up to which it is none, and from which
 it may explain a misfit."""
@@ -223,12 +227,13 @@ def _fitted(
         found, moves = fit()
     if not moves.any():
         return [None] * len(measured)
-    is_late = late_share(found)
-    kept = np.where(seeks | ~moves, 0.0, 1.0 - is_late)[:, np.newaxis]
+    is_late, odds = late_share(found), found.constant_odds()
+    dropped = np.where(seeks | ~moves, 1.0, is_late)[:, np.newaxis]
+    kept = np.nan_to_num((1.0 - dropped) / (1.0 + CONSTANT_ODDS * odds[:, np.newaxis]))
     lagging = found.with_parts(kept, LAGS)
     delay = _delay(lagging, is_late > 0.0)
     fits = lagging.with_parts(kept, PARTS)
-    results = _results(fits, delay, mass_kg[:, 0], seeks, bin_hz)
+    results = _results(fits, dropped, delay, mass_kg[:, 0], seeks, bin_hz)
     return [
         result if moving else None for result, moving in zip(results, moves.tolist(), strict=True)
     ]
@@ -260,13 +265,14 @@ def _delay(fits: FilmFits, may_be_late: npt.NDArray[np.bool_]) -> FloatArray:
 
 def _results(
     fits: FilmFits,
+    dropped: FloatArray,
     delay: FloatArray,
     mass_kg: FloatArray,
     seeks_mass: npt.NDArray[np.bool_],
     bin_hz: float,
 ) -> list[DynamicStiffness]:
     delay_s, delay_std, delay_per_damping = delay
-    model = math.sqrt(3.0) * fits.parts_left
+    model = math.sqrt(3.0) * fits.parts_left(dropped)
     covariance = fits.film_covariance(fits.through_parts())
     mass_std_kg, whole = np.zeros(len(mass_kg)), np.zeros(len(mass_kg), dtype=np.bool_)
     if seeks_mass.any():

@@ -154,17 +154,17 @@ class FilmFits(FittedFilms):
         std = np.sqrt(self.covariance(influences)[:, 0, 0, 0])
         return value[:, 0], std, self.follow(DAMPING, fitted)[:, 0]
 
-    @property
-    def parts_left(self) -> FloatArray:
-        """Standard uncertainty of the unknowns from what of `PARTS` is not estimated, (n, 2, 4).
+    def parts_left(self, dropped: FloatArray) -> FloatArray:
+        """Return the standard uncertainty of unknowns from `PARTS` that are not random, (n, 2, 4).
 
-        Of the kept share it is the error of the prior, of the rest the estimate itself.
+        It is the error of their prior, the doubt whether there are any, and the whole of a share
+        `dropped` (n, 1) that is not estimated.
         """
         mean, covariance = self.of_parts
         of_prior = covariance @ (self._prior[..., np.newaxis] * covariance)
         whole = covariance + mean[..., np.newaxis] * mean[:, np.newaxis]
         kept = self.kept[..., np.newaxis]
-        left = kept * of_prior + (1.0 - kept) * whole
+        left = kept * of_prior + (kept * (1.0 - kept) + dropped[..., np.newaxis]) * whole
         per = self.per[:, PARTS]
         variance: FloatArray = np.einsum("npru,npq,nqru->nru", per, left, per)
         return np.sqrt(np.maximum(variance, 0.0))

@@ -55,7 +55,7 @@ class FittedFilms:
     parts : (n, 6)
         Estimates of the `PARTS`; zero for a film that is constant over frequency.
     kept : (n, 1)
-        Share of `parts` in the film.
+        Probability that the film has `parts`, by which they are multiplied.
     """
 
     lines: FilmLines
@@ -203,6 +203,13 @@ class FittedFilms:
     def of_parts(self) -> tuple[FloatArray, FloatArray]:
         """Mean, (n, 6), and covariance, (n, 6, 6), of the `PARTS` by spectra and prior."""
         return self.posterior(PARTS)[:2]
+
+    def constant_odds(self) -> FloatArray:
+        """Return the ratio of the marginal likelihoods of no `LAGS` and of any, (n,)."""
+        _, covariance, significance = self.posterior(LAGS)
+        prior = self._prior[:, np.newaxis, : len(LAGS)]
+        shrinkage = np.linalg.slogdet(covariance * prior)[1]
+        return np.asarray(np.exp(-0.5 * (significance + shrinkage)))
 
     def posterior(self, fitted: range) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return mean, covariance and significance of `LAGS` or `PARTS` by spectra and prior.
