@@ -42,7 +42,7 @@ MAX_MASS_STD = 0.5
 """Largest standard uncertainty of a fitted mass as a fraction of the largest plausible mass of the
 bracket. Beyond it the lines do not determine the mass, and there is no result."""
 
-CONSTANT_ODDS = 1e-4
+CONSTANT_ODDS = 3e-5
 """Prior odds of a film that is constant over frequency. Films of fixed pads are, and those of
 tilting pads nearly so at some positions of the shaft."""
 

@@ -1,9 +1,10 @@
 """Films of several bearings fitted to weighted lines, with parts that lag as pads tilt.
 
-A film is ``K + iωC + R s(ω)``, with the shape s of `core.stiffness.tilt_lag`. Given R, the unknowns
-K and C follow from normal equations; R and its lag are estimated from the residual force.
+A film is ``K + iωC + R s(ω)``, with the shape s of `tilt_lag` (decision 37). Given R, the
+unknowns K and C follow from normal equations; R and its lag are estimated from the residual force.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -13,7 +14,18 @@ import numpy as np
 from core.arrays import ComplexArray, FloatArray
 from core.spectra.cross_spectrum import CORRELATED_LINES
 from core.stiffness.film_fit import MIN_SHARE, N_UNKNOWNS, ROUNDING, FilmLines
-from core.stiffness.tilt_lag import LAG_PRIOR, tilt_lag
+
+TILT_LAG_RAD, TILT_LAG_STD = 0.135, 0.2
+"""Prior mean and relative standard deviation of the angle by which the shaft turns during the lag.
+It is about half the time that oil takes along a pad: 0.10 to 0.17 rad for the 12 and 16 pads of
+Brito et al."""
+
+LAG_PRIOR = 0.3
+"""Prior standard deviation of a lagging part as a fraction of the row's direct dynamic stiffness.
+Pads of Brito et al. have -0.19 to 0.46 of their stiffness, up to eccentricity ratios of 0.6."""
+
+MAX_DEVIATION = 2.5
+"""Largest deviation of the lag from its prior mean, in standard deviations of the prior."""
 
 N_REWEIGHTED = 2
 """Number of new fits of lagging parts with the weights of their own residual."""
@@ -29,6 +41,34 @@ x and y to the force in x, then to that in y; in N/m."""
 PARTS = range(4, 10)
 """Indices of `LAGS` and of the deviations of the lags of the forces in x and in y from their prior
 mean, in standard deviations of the prior."""
+
+
+def tilt_lag(
+    omega: FloatArray, turn_rad_s: float, deviation: FloatArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return the dynamic stiffness of a unit lagging part, and its derivative, (n, k, n_lines).
+
+    It is ``(iωτ)² / (1 + iωτ)`` less the stiffness and damping at 1×, where it is zero.
+
+    Parameters
+    ----------
+    omega : (n, 1, n_lines)
+        Angular frequencies.
+    deviation : (n, k)
+        Deviations of the lag τ from its prior mean, in standard deviations of the prior.
+    """
+    deviation = np.clip(deviation, -MAX_DEVIATION, MAX_DEVIATION)[..., np.newaxis]
+    lag_s = TILT_LAG_RAD / turn_rad_s * (1.0 + TILT_LAG_STD * deviation)
+    std_s = TILT_LAG_RAD / turn_rad_s * TILT_LAG_STD
+
+    def beside_turn(shape: Callable[[ComplexArray], ComplexArray]) -> ComplexArray:
+        turns, at_turn = np.asarray(1j * omega * lag_s), shape(np.asarray(1j * turn_rad_s * lag_s))
+        return shape(turns) - at_turn.real - 1j * at_turn.imag * omega / turn_rad_s
+
+    return (
+        beside_turn(lambda turn: turn**2 / (1.0 + turn)),
+        beside_turn(lambda turn: turn**2 * (2.0 + turn) / (1.0 + turn) ** 2 / lag_s * std_s),
+    )
 
 
 @dataclass(frozen=True)
