@@ -77,6 +77,10 @@ def is_from_here(scope: Scope) -> bool:
     return not any(name in PASSED_ON for name, _ in scope["headers"])
 
 
+CALLER = "caller"
+"""Key under which the ``state`` of an ASGI scope contains the caller."""
+
+
 @dataclass(frozen=True)
 class Caller:
     """Sender of a request, authenticated or not.

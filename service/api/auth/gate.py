@@ -7,7 +7,7 @@ from fastapi import Request
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.auth.authenticator import Authenticator, Caller
+from service.api.auth.authenticator import CALLER, Authenticator, Caller
 from service.api.auth.declared import Declared, Reach
 from service.api.auth.refusals import REFUSED, SAFE
 from service.api.problems import DETAIL, STORE_FAILS, ProblemError, problem_answer
@@ -65,9 +65,6 @@ def not_this_unit() -> ProblemError:
 
 
 CHANGE_PASSWORD = "POST /api/v1/session/password"  # noqa: S105  an operation
-
-CALLER = "caller"
-"""Key under which the ``state`` of an ASGI scope contains the caller."""
 
 
 class Gate:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
@@ -216,7 +217,9 @@ def alarm_router(context: Context) -> APIRouter:
                 }
             )
 
-        return await context.answers.of(request, alarm_list_revision(engine, films), make)
+        return await context.answers.of(
+            request, partial(alarm_list_revision, engine, films), make, is_lasting=True
+        )
 
     @router.get(
         "/events",

@@ -259,9 +259,10 @@ def bearing_router(context: Context) -> APIRouter:
     async def latest(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the newest result of a bearing; readings are null if the result is not current."""
         context.bearing(unit, bearing)
-        revision = context.live.revision(unit)
-        make = partial(latest_model, context.live, unit, bearing)
-        return await context.answers.of(request, revision, make)
+        live = context.live
+        make = partial(latest_model, live, unit, bearing)
+        revision = partial(live.revision, unit)
+        return await context.answers.of(request, revision, make, is_lasting=True)
 
     @router.get(
         "/{bearing}/budgets/{quantity}",
@@ -285,7 +286,7 @@ def bearing_router(context: Context) -> APIRouter:
                 raise ProblemError(409, "No result", detail)
             return found
 
-        return await context.answers.of(request, context.live.revision(unit), make)
+        return await context.answers.of(request, lambda: context.live.revision(unit), make)
 
     return router
 

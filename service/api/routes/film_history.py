@@ -1,6 +1,6 @@
 """Route for the stiffness readings of an oil film over time, with their operating conditions."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Hashable, Iterable, Iterator
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
@@ -304,7 +304,10 @@ def film_history_router(context: Context) -> APIRouter:
             return film_table(*read())
 
         if wanted == "json":
-            revision = (times, context.live.past_revision(unit, query.end_ns))
+
+            def revision() -> Hashable:
+                return times, context.live.past_revision(unit, query.end_ns)
+
             return await context.answers.of(request, revision, lambda: read()[0])
         return table_response(wanted, await in_thread(read_columns), f"film-{unit}-{bearing}")
 

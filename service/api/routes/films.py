@@ -451,6 +451,8 @@ def film_router(context: Context) -> APIRouter:
         """
         context.bearing(unit, bearing)
         make = partial(film_model, context, unit, bearing)
-        return await context.answers.of(request, context.now_revision(unit), make)
+        return await context.answers.of(
+            request, partial(context.now_revision, unit), make, is_lasting=True
+        )
 
     return router

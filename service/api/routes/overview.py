@@ -1,6 +1,7 @@
 """Route for the overview of the plant: what a tile shows of each unit, and what changed."""
 
 from collections.abc import Hashable
+from functools import partial
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
@@ -178,13 +179,11 @@ class Overview:
         self._head = head
         return self._n
 
-    def model(self, n: int, since: str | None) -> OverviewModel:
-        """Return the API model of the overview.
+    def model(self, since: str | None) -> OverviewModel:
+        """Return the API model of the overview at its newest revision.
 
         Parameters
         ----------
-        n
-            Revision of the overview.
         since
             Revision after which units have changed, as text; None for all units.
         """
@@ -193,7 +192,7 @@ class Overview:
         before = int(number) if process == started and number.isdecimal() else 0
         return OverviewModel.of(
             context,
-            revision=f"{started}-{n}",
+            revision=f"{started}-{self._n}",
             since=since if before else None,
             plant=PlantModel.of(context, name=context.plant_name),
             store=StoreModel.of(context.live, error=context.live.store_error),
@@ -274,7 +273,7 @@ def overview_router(context: Context) -> APIRouter:
         ] = None,
     ) -> Response:
         """Return all units with bearings and films; values that are not current are null."""
-        n = shown.revision()
-        return await context.answers.of(request, n, lambda: shown.model(n, since))
+        make = partial(shown.model, since)
+        return await context.answers.of(request, shown.revision, make, is_lasting=True)
 
     return router

@@ -1,6 +1,6 @@
 """Routes for the amplitude spectra of a bearing: newest spectra, and stored spectra over time."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 from typing import Annotated, Literal
 
@@ -265,7 +265,10 @@ def spectra_router(context: Context) -> APIRouter:
         context.bearing(unit, bearing)
         places = list(dict.fromkeys(channel or PLACES))
         query = SpectraQuery(unit, bearing, *times, max_spectra)
-        revision = (times, context.live.past_revision(unit, times[1]))
+
+        def revision() -> Hashable:
+            return times, context.live.past_revision(unit, times[1])
+
         make = partial(_read, context, query, places, max_frequency_hz)
         return await context.answers.of(request, revision, make)
 
@@ -289,7 +292,7 @@ async def newest_answer(
             raise no_result(unit, bearing)
         return model
 
-    return await context.answers.of(request, context.live.revision(unit), answer)
+    return await context.answers.of(request, lambda: context.live.revision(unit), answer)
 
 
 def _read(

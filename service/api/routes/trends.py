@@ -1,6 +1,6 @@
 """Route for trends: quantities of a bearing over time."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Annotated, TypeVar
 
@@ -298,8 +298,16 @@ def trend_router(context: Context) -> APIRouter:
         grid = context.films.settings.baseline.settings().grid
         read = partial(_read, context, query, group_by, grid)
         if wanted == "json":
-            revision = (times, context.live.past_revision(unit, query.end_ns))
-            return await context.answers.of(request, revision, lambda: trend_answer(query, *read()))
+
+            def revision() -> Hashable:
+                return times, context.live.past_revision(unit, query.end_ns)
+
+            return await context.answers.of(
+                request,
+                revision,
+                lambda: trend_answer(query, *read()),
+                is_lasting="last" not in request.query_params,
+            )
         whole, groups, past = await in_thread(read)
         columns = await in_thread(lambda: trend_table(whole, groups, past))
         cursor = None if whole.next_ns is None else str(whole.next_ns)

@@ -104,6 +104,14 @@ async def test_whatever_changes_is_news(running, assessments):
             assert (await ask(running, path, tag)).status_code == 200, path
 
 
+async def test_the_last_hours_are_others_later(running):
+    path = "units/U1/bearings/UJB/trends?last=1h&quantity=speed_rpm"
+    tag = (await ask(running, path)).headers["etag"]
+    assert (await ask(running, path, tag)).status_code == 304
+    running.clock.step(61_000_000_000)  # beyond the minute that the range is rounded to
+    assert (await ask(running, path, tag)).status_code == 200
+
+
 async def test_an_answer_is_the_same_while_only_time_passes(running):
     before = {path: (await ask(running, path)).json() for path in POLLED}
     advance(running)
@@ -186,7 +194,7 @@ async def test_many_clients_wait_for_one_answer_that_ends_with_the_last_of_them(
         goes_on.wait(30)
         return {"gone": asker.has_gone}
 
-    first, second = (asyncio.create_task(answers.of(request(), 1, make)) for _ in range(2))
+    first, second = (asyncio.create_task(answers.of(request(), lambda: 1, make)) for _ in range(2))
     while not askers:
         await asyncio.sleep(0.001)
     first.cancel()
@@ -195,17 +203,17 @@ async def test_many_clients_wait_for_one_answer_that_ends_with_the_last_of_them(
     goes_on.set()
     assert (await second).body == b'{"gone":false}'
     assert len(askers) == 1
-    assert (await answers.of(request(), 1, make)).body == b'{"gone":false}'
+    assert (await answers.of(request(), lambda: 1, make)).body == b'{"gone":false}'
     assert len(askers) == 1
 
     goes_on.clear()
-    alone = asyncio.create_task(answers.of(request(), 2, make))
+    alone = asyncio.create_task(answers.of(request(), lambda: 2, make))
     while len(askers) == 1:
         await asyncio.sleep(0.001)
     alone.cancel()
     await asyncio.wait([alone])
     assert askers[1].has_gone
-    later = asyncio.create_task(answers.of(request(), 2, make))
+    later = asyncio.create_task(answers.of(request(), lambda: 2, make))
     while len(askers) == 2:
         await asyncio.sleep(0.001)
     goes_on.set()
@@ -240,7 +248,7 @@ def test_the_cache_forgets_the_answers_used_longest_ago():
             return {"text": "x" * 30}
 
         for n in (1, 2, 1, 3, 1, 2):
-            await answers.of(request(), n, lambda n=n: make(n))
+            await answers.of(request(), lambda n=n: n, lambda n=n: make(n))
         return made
 
     assert asyncio.run(fill()) == [1, 2, 3, 2]

@@ -248,6 +248,25 @@ async def test_a_key_for_some_units_opens_those_and_what_belongs_to_none(access,
             assert expected or status == 403, f"{operation}: {status}"
 
 
+async def test_a_cached_answer_is_confirmed_only_to_those_who_may_have_it(access, show):
+    keys = [await show("key", "good", "viewer", unit) for unit in ("U1", "U2")]
+    path = "/api/v1/units/U1/bearings/UJB/latest"
+    async with access.client(**keys[0]) as client:
+        tag = {"If-None-Match": (await client.get(path)).headers["etag"]}
+        for _ in range(2):
+            assert (await client.get(path, headers=tag)).status_code == 304
+        assert (await client.get(f"{path}?a=1", headers=tag)).status_code == 422
+        body = tag | {"Content-Type": "application/json"}
+        sent = await client.request("GET", path, headers=body, content=b"{}")
+        assert sent.status_code == 400
+        access.service.access.keys.revoke(keys[0]["Authorization"].split("_")[1], 0)
+        access.service.clock.step(1_000_000_001)
+        assert (await client.get(path, headers=tag)).status_code == 401
+    for headers, status in ((keys[1], 403), ({}, 401)):
+        async with access.client(**headers) as client:
+            assert (await client.get(path, headers=tag)).status_code == status
+
+
 async def test_a_key_for_some_units_may_ask_for_the_history_of_those(access, show):
     headers = await show("key", "good", "viewer", "U1")
     asked = {
