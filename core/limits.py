@@ -72,7 +72,7 @@ class Limits:
     Parameters
     ----------
     alert, danger
-        Upper limits of the two levels, above zero and rising; None if unused. At least one limit,
+        Upper limits of the two levels, rising; None if unused. At least one limit,
         upper or lower, is given.
     deadband
         Distance inside the limit that a value must reach for an active level to end.

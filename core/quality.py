@@ -44,6 +44,7 @@ class Reason(StrEnum):
     NON_STATIONARY = "non_stationary"
     POWER_UNKNOWN = "power_unknown"
     REDUCED_PROBES = "reduced_probes"
+    BRACKET_UNKNOWN = "bracket_unknown"
 
 
 @dataclass(frozen=True)

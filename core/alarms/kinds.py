@@ -9,6 +9,7 @@ from core.alarms.alarm import AlarmIdentity, AlarmRule
 from core.alarms.rules import BearingRules, LimitRule, UnitRules
 from core.condition.cells import OperatingPoint
 from core.limits import AlarmLevel, Judgement
+from core.machine.slow_channel import SLOW_QUANTITIES
 from core.machine.unit import Unit
 from core.quality import Reading
 
@@ -17,6 +18,9 @@ CHANNEL_NOT_OK, LINK_LOST, FILM_STIFFNESS = "channel_not_ok", "link_lost", "film
 
 OIL_TEMPERATURE, TIME_STAMPS = "oil_temperature", "time_stamps"
 """Names of alarm kinds that are also the names of their rules."""
+
+SLOW_LIMITS = "slow_limits"
+"""Name of the rule of the limits of recorded slow channels."""
 
 CHANNEL, BEARING, DEVICE, LINK = "channel", "bearing", "device", "link"
 """Subject types of alarms: a channel or bearing, given by its id, or a unit's device or link."""
@@ -123,6 +127,15 @@ ALARM_KINDS = kind_table(
         "oil_temperature_c",
         OIL_TEMPERATURE,
     ),
+    AlarmKind(
+        "pad_temperature_excess",
+        "Hottest pad above the mean",
+        "K",
+        BEARING,
+        "pad_temperatures",
+        "pad_temperature_excess_k",
+    ),
+    *(AlarmKind(q.name, q.label, q.unit, CHANNEL, SLOW_LIMITS) for q in SLOW_QUANTITIES.values()),
     AlarmKind(FILM_STIFFNESS, "Film stiffness changed", "%", BEARING, "films"),
     AlarmKind(
         "clock_offset",
@@ -230,9 +243,13 @@ def watches_of(unit: Unit, rules: UnitRules) -> list[Watch]:
     of_bearings = [(each, rules.bearings.get(each.id, {})) for each in unit.bearings]
     for channel in unit.channels:
         add(not_ok, channel.id, channel.id, not_ok.rule, {})
+    limited = [each for each in unit.slow_channels if rules.slow_limits.get(each.id)]
     oils = (b.oil_temperature for b, own in of_bearings if own.get(OIL_TEMPERATURE))
-    for source in dict.fromkeys(filter(None, oils)):
+    for source in dict.fromkeys(filter(None, (*oils, *(slow.id for slow in limited)))):
         add(not_ok, source, source, SLOW_CHANNEL, {})
+    for each in limited:
+        own_limits = {SLOW_LIMITS: rules.slow_limits[each.id]}
+        add(ALARM_KINDS[each.quantity], each.id, each.id, SLOW_LIMITS, own_limits)
     for bearing, own in of_bearings:
         slow = {OIL_TEMPERATURE: bearing.oil_temperature}
         for kind in ALARM_KINDS.values():

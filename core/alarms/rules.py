@@ -142,6 +142,8 @@ class UnitRules:
         Rule for faults of slow channels with limits; they may come late from another device.
     bearings
         Limit rules by bearing id.
+    slow_limits
+        Limit rules of recorded slow channels, by channel id.
     films
         Rule for changes of film stiffness, which `core.change` detects.
     clock_offset
@@ -157,6 +159,7 @@ class UnitRules:
     channel: AlarmRule = field(default_factory=lambda: rule_of(0.5, 10.0))
     slow_channel: AlarmRule = field(default_factory=lambda: rule_of(5.0, 10.0))
     bearings: Mapping[str, BearingRules] = field(default_factory=dict)
+    slow_limits: Mapping[str, LimitRule] = field(default_factory=dict)
     films: AlarmRule | None = None
     clock_offset: LimitRule | None = field(
         default_factory=lambda: LimitRule(Limits(2.0), rule_of(30.0, 30.0))

@@ -23,6 +23,7 @@ from core.alarms.kinds import (
     LINK_LOST,
     OIL_TEMPERATURE,
     SLOW_CHANNEL,
+    SLOW_LIMITS,
     TIME_STAMPS,
     VECTORS,
     WAVEFORM_CHANNEL,
@@ -71,7 +72,7 @@ class UnitAlarms(AlarmBoard):
         self._of_results: defaultdict[str, list[Watch]] = defaultdict(list)
         for watch in watches:
             self._of_rule[watch.group].append(watch)
-            if watch.limits and watch.group not in (OIL_TEMPERATURE, *CLOCK_READINGS):
+            if watch.limits and watch.group not in (OIL_TEMPERATURE, SLOW_LIMITS, *CLOCK_READINGS):
                 self._of_results[watch.identity.subject].append(watch)
         of_rows = [channel.id for channel in unit.channels] if rows is None else list(rows)
         self._rows_of = {
@@ -81,7 +82,7 @@ class UnitAlarms(AlarmBoard):
         self._channels_of = {bearing.id: bearing.channels for bearing in unit.bearings}
         self._bearing_of = {
             id_: bearing.id for bearing in unit.bearings for id_ in bearing.channels
-        }
+        } | {slow.id: slow.bearing for slow in unit.slow_channels if slow.bearing}
         self._references = {(r.bearing, r.state): r for r in references}
         self._segment_faults: dict[str, Reason] = {}
         self._clipped_percent: dict[str, float] = {}
@@ -118,9 +119,9 @@ class UnitAlarms(AlarmBoard):
             reading = block.slow.get(watch.source, NOT_MEASURED)
             fault = reading.quality.reason if reading.value is None else None
             self._update(watch, fault_judgement(fault), now_ns)
-        for watch in self._of_rule[OIL_TEMPERATURE]:
-            reading = block.slow.get(watch.source, NOT_MEASURED)
-            point = self._recent_point(watch.identity.subject, now_ns)
+        for watch in (*self._of_rule[OIL_TEMPERATURE], *self._of_rule[SLOW_LIMITS]):
+            reading, subject = block.slow.get(watch.source, NOT_MEASURED), watch.identity.subject
+            point = self._recent_point(self._bearing_of.get(subject, subject), now_ns)
             self._compare(watch, reading, now_ns, point)
         point = self._recent_point(DEVICE, now_ns)
         for rule, reading_of in CLOCK_READINGS.items():

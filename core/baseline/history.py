@@ -1,5 +1,6 @@
 """`StiffnessHistory`: stiffness readings of one bearing over time."""
 
+import math
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from typing import TypeAlias
@@ -15,6 +16,22 @@ CodeArray: TypeAlias = npt.NDArray[np.int8]
 
 DIRECTIONS = ("x", "y")
 """Directions of the film stiffness; row 0 of a (2, n) column is x, row 1 is y."""
+
+
+MIN_LN_K = math.log(1e5)
+"""Smallest ln of a stiffness in N/m; larger than that of any ratio to a bracket stiffness. Brackets
+have 1e7 N/m and more, and films are less than a hundred times softer or stiffer."""
+
+
+def are_ratios(ln_k: FloatArray | float) -> npt.NDArray[np.bool_]:
+    """Return where values of `StiffnessHistory.ln_k` are of ratios to the bracket stiffness."""
+    return np.asarray(np.asarray(ln_k) < MIN_LN_K)
+
+
+def absolute_and_ratio(values: FloatArray, ln_k: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return values, with NaN where `ln_k` is of a ratio and where it is of a stiffness in N/m."""
+    are = are_ratios(ln_k)
+    return np.where(are, np.nan, values), np.where(are, values, np.nan)
 
 
 class ReadingOutcome(IntEnum):
@@ -34,7 +51,8 @@ class StiffnessHistory:
     Parameters
     ----------
     ln_k
-        Natural logarithm of the measured stiffness in N/m.
+        Natural logarithm of the measured stiffness in N/m, or of its ratio to an unknown bracket
+        stiffness; see `are_ratios`.
     u_random
         Relative random standard uncertainty of the stiffness, equal to that of `ln_k`.
     u_eccentricity

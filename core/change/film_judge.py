@@ -9,7 +9,7 @@ import numpy as np
 
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
-from core.baseline.history import DIRECTIONS
+from core.baseline.history import DIRECTIONS, are_ratios
 from core.change.cause import Attribution, Cause, UnitReadings, attribute
 from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, outcomes, step
 from core.change.film_reading import FilmReading
@@ -132,7 +132,7 @@ MAX_RECENT = 4 * MEAN_READINGS
 class FilmJudge:
     """Detector of stiffness changes in the films of one unit; holds baselines and decisions.
 
-    `brackets_n_per_m` is the bracket stiffness by bearing id.
+    `brackets_n_per_m` is the bracket stiffness by bearing id, None if unknown.
 
     Attributes
     ----------
@@ -140,13 +140,18 @@ class FilmJudge:
         Shaft response used to find the cause of a change; None if it has not been learned.
     """
 
-    def __init__(self, rules: FilmRules, brackets_n_per_m: Mapping[str, float]) -> None:
+    def __init__(self, rules: FilmRules, brackets_n_per_m: Mapping[str, float | None]) -> None:
         self.response: ShaftResponse | None = None
         self._rules = rules
         self._baselines: dict[str, BearingBaseline] = {}
         self._decisions: dict[FilmDirection, Decision] = {}
         self._films = [(bearing, d) for bearing in rules.estimators for d in DIRECTIONS]
-        self._brackets = np.array([brackets_n_per_m[bearing] for bearing, _ in self._films])
+        stiffness = [brackets_n_per_m[bearing] for bearing, _ in self._films]
+        self._has_bracket = {
+            b: k is not None for (b, _), k in zip(self._films, stiffness, strict=True)
+        }
+        known = [k for k in stiffness if k is not None]
+        self._brackets = np.array(known) if len(known) == len(stiffness) else None
         self._recent: deque[FloatArray] = deque(maxlen=MAX_RECENT)
 
     def baseline(self, bearing: str) -> BearingBaseline | None:
@@ -159,9 +164,10 @@ class FilmJudge:
         """Set the active baseline of a bearing from the next reading on; None removes it.
 
         `decisions` are the decisions in x and y to continue from; by default, initial decisions.
-        Their times are cleared, so that the next reading may have any time.
+        Their times are cleared, so that the next reading may have any time. A baseline learned
+        before the bracket stiffness became known or unknown is not comparable and counts as None.
         """
-        if baseline is None:
+        if baseline is None or not self._is_comparable(baseline):
             self._baselines.pop(bearing, None)
         else:
             self._baselines[bearing] = baseline
@@ -274,6 +280,12 @@ class FilmJudge:
         columns = newest[-MEAN_READINGS:] or [np.full((5, len(self._films)), np.nan)]
         readings = UnitReadings(*np.stack(columns, axis=-1))
         return attribute(film, self.response, readings, self._brackets)
+
+    def _is_comparable(self, baseline: BearingBaseline) -> bool:
+        cells = [cell.location for each in baseline.quantities for cell in each.table.cells]
+        return bool(
+            np.all(are_ratios(np.array(cells)) != self._has_bracket[baseline.origin.bearing])
+        )
 
     def _learned(self, bearing: str, direction: str) -> QuantityBaseline | None:
         baseline = self._baselines.get(bearing)

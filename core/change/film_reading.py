@@ -9,6 +9,7 @@ from core.condition.cells import BearingCondition, FilmConditions
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Level, Quality, Reading, Reason, worst
+from core.stiffness.bracket_ratio import reported_name
 from core.stiffness.estimators import ESTIMATORS
 
 
@@ -19,7 +20,8 @@ class FilmValue:
     Parameters
     ----------
     ln_k, u_random
-        Natural logarithm of the stiffness in N/m, and its random standard uncertainty.
+        Natural logarithm of the stiffness in N/m, or of its ratio to an unknown bracket stiffness,
+        and its random standard uncertainty.
     shaft_um_pk, bearing_um_pk
         1× amplitudes of the shaft relative to the bearing, and of the bearing itself.
     outcome
@@ -100,7 +102,8 @@ def good_or_nan(reading: Reading) -> float:
 
 
 def _value(readings: Mapping[str, Reading], estimator: Estimator, direction: str) -> FilmValue:
-    stiffness = readings[ESTIMATORS[estimator].stiffness.format(axes=direction * 2)]
+    name = ESTIMATORS[estimator].stiffness.format(axes=direction * 2)
+    stiffness = readings[reported_name(readings, name)]
     outcome, reason = _outcome(
         stiffness,
         worst(readings[key].quality for key in ("eccentricity_ratio", "oil_temperature_c")),

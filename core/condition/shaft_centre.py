@@ -23,12 +23,14 @@ def locate_shaft(
     clearance_um: float,
     accuracy: GapAccuracy | None = None,
     last_growth: Growth | None = None,
+    matrix: FloatArray | None = None,
 ) -> Found:
     """Locate the shaft from one or two probes on each axis, with uncertainty.
 
     One probe cannot separate shaft displacement from thermal growth. An axis with one probe uses
     the present growth of the other axis, else the last measured growth, else zero growth, each with
-    its uncertainty. `accuracy` is by default `GapAccuracy()`.
+    its uncertainty. `accuracy` is by default `GapAccuracy()`. `matrix` (2, 2) resolves the
+    displacements along two probe axes other than x and y into x and y.
 
     Returns
     -------
@@ -38,6 +40,10 @@ def locate_shaft(
     """
     accuracy = accuracy or GapAccuracy()
     axes = ProbeAxes(x, y, accuracy, last_growth)
+    quality_x, quality_y = x.quality, y.quality
+    if matrix is not None:
+        axes.weights = matrix @ axes.weights
+        quality_x = quality_y = worst((quality_x, quality_y))
     position_um = axes.weights @ axes.values_um
     of_x, of_y = (
         Budget(float(value), axes.lines(weights))
@@ -47,7 +53,7 @@ def locate_shaft(
     angle_rad = math.atan2(of_y.value, of_x.value)
     outward = np.array([math.cos(angle_rad), math.sin(angle_rad)])
     quality, growth = worst((x.quality, y.quality)), axes.growth_budget()
-    stated = {"shaft_centre_x_um": (of_x, x.quality), "shaft_centre_y_um": (of_y, y.quality)}
+    stated = {"shaft_centre_x_um": (of_x, quality_x), "shaft_centre_y_um": (of_y, quality_y)}
     if growth is not None:
         stated["gap_growth_um"] = (growth, axes.growth_quality)
     of_ratio = _eccentricity(axes, outward, radius_um, clearance_um, accuracy)

@@ -5,11 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from core.arrays import FloatArray
+from core.condition.pad_temperatures import pad_pattern
 from core.condition.probe_axes import Growth, ProbeAxis
 from core.condition.shaft_centre import locate_shaft
 from core.machine.channel import Measurand
+from core.machine.slow_channel import PAD_TEMPERATURE
 from core.machine.unit import Bearing, GapAccuracy, Unit
 from core.quality import NOT_MEASURED, Reading, Reason, current_mean, missing
+from core.spectra.resolution import shaft_matrix
 from core.spectra.segments import Segment
 from core.uncertainty import (
     SHAFT_GAIN,
@@ -48,7 +51,8 @@ def position_results(
     near, far = tuple(gaps.values())[:2], tuple(gaps.values())[2:]
     x, y = (probe_axis(bearing, near, far, axis) for axis in (0, 1))
     centre, centre_budgets = locate_shaft(
-        x, y, bearing.clearance_um, bearing.gap_accuracy, last_growth
+        *(x, y, bearing.clearance_um, bearing.gap_accuracy, last_growth),
+        shaft_matrix(unit, bearing),
     )
     return gaps | centre, gap_budgets | centre_budgets
 
@@ -68,8 +72,10 @@ def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
 
 
 def slow_channels(unit: Unit, bearing: Bearing) -> dict[str, str | None]:
-    """Return the slow channel ids of power and oil temperature, by quantity; None if absent."""
-    return {"power_mw": unit.power_channel, "oil_temperature_c": bearing.oil_temperature}
+    """Return the slow channel ids of a bearing and its unit, by quantity; None if absent."""
+    recorded = {channel.reading: channel.id for channel in unit.slow_channels_of(bearing.id)}
+    fixed = {"power_mw": unit.power_channel, "oil_temperature_c": bearing.oil_temperature}
+    return fixed | recorded
 
 
 def slow_results(segments: Sequence[Segment], channels: Mapping[str, str | None]) -> Found:
@@ -83,6 +89,12 @@ def slow_results(segments: Sequence[Segment], channels: Mapping[str, str | None]
         mean, values = _mean_slow(segments, channel)
         found[name] = mean, None if mean.value is None else mean_budget(mean.value, values)
     return with_budgets(found)
+
+
+def pad_results(unit: Unit, bearing: Bearing, readings: Mapping[str, Reading]) -> Found:
+    """Return the pattern of a bearing's pad temperatures; `readings` are from `slow_results`."""
+    pads = [c for c in unit.slow_channels_of(bearing.id) if c.quantity == PAD_TEMPERATURE]
+    return pad_pattern([(readings[pad.reading], pad.angle_deg) for pad in pads]), {}
 
 
 def probe_axis(

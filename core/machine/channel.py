@@ -61,6 +61,9 @@ class Channel:
         +1 if a growing reading means motion along the positive bearing axis, -1 if against it. The
         gap of a probe on the positive axis shrinks as the shaft approaches: -1. For a key-phase
         channel, -1 if its pulses fall.
+    angle_deg
+        Angle from x towards y of the axis that the channel measures along; None if it is the axis
+        of the bearing that names the channel. The signals are resolved into x and y.
     response
         Frequency response of transducer and amplifier, relative to the sensitivity; None if flat.
     delay_s
@@ -88,6 +91,7 @@ class Channel:
     ok_limits: tuple[float, float] = (-math.inf, math.inf)
     probe: str = ""
     slow_roll: SlowRollVector | None = None
+    angle_deg: float | None = None
 
 
 def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexArray:

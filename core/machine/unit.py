@@ -8,6 +8,7 @@ import numpy as np
 
 from core.arrays import ComplexArray, FloatArray
 from core.machine.channel import Channel
+from core.machine.slow_channel import SlowChannel
 
 
 class Estimator(StrEnum):
@@ -147,7 +148,8 @@ class Bearing:
     Parameters
     ----------
     bracket_stiffness_n_per_m
-        Radial stiffness k_b of the bracket that holds the bearing.
+        Radial stiffness k_b of the bracket that holds the bearing; None if unknown. Coefficients
+        are then reported as ratios to k_b (`core.stiffness.bracket_ratio`).
     clearance_um
         Radial assembled clearance in operation: the radius within which the shaft centre moves.
     gap_reference_um, opposite_reference_um
@@ -168,7 +170,7 @@ class Bearing:
     """
 
     id: str
-    bracket_stiffness_n_per_m: float
+    bracket_stiffness_n_per_m: float | None
     shaft_x: str
     shaft_y: str
     bearing_x: str
@@ -192,10 +194,14 @@ class Bearing:
 
     @property
     def bracket(self) -> BracketDynamics:
-        """Stiffness, mass and damping of the bracket, from which the film force is derived."""
-        return BracketDynamics(
-            self.bracket_stiffness_n_per_m, self.bracket_mass_kg, self.bracket_damping_n_s_per_m
-        )
+        """Stiffness, mass and damping of the bracket, from which the film force is derived.
+
+        An unknown stiffness is 1 N/m.
+        """
+        stiffness = self.bracket_stiffness_n_per_m
+        if stiffness is None:
+            return BracketDynamics(1.0)
+        return BracketDynamics(stiffness, self.bracket_mass_kg, self.bracket_damping_n_s_per_m)
 
     @property
     def channels(self) -> tuple[str, str, str, str]:
@@ -221,6 +227,8 @@ class Unit:
         Id of the waveform channel with one pulse per turn; None if not installed.
     rated_power_mw
         Rated power, the reference of relative load changes; None if unknown.
+    slow_channels
+        Slow channels that are recorded beside the vibration.
     """
 
     id: str
@@ -234,6 +242,11 @@ class Unit:
     has_vortex: bool = True
     key_phase: str | None = None
     rated_power_mw: float | None = None
+    slow_channels: tuple[SlowChannel, ...] = ()
+
+    def slow_channels_of(self, bearing: str) -> list[SlowChannel]:
+        """Return the slow channels recorded with a bearing: its own and those of the unit."""
+        return [c for c in self.slow_channels if c.bearing in (None, bearing)]
 
 
 def require_same_machine(here: Unit, there: Unit) -> None:

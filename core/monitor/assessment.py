@@ -80,7 +80,8 @@ class Assessment:
     time_ns
         End of the newest segment, UTC nanoseconds since 1970.
     readings
-        One reading for each quantity of :data:`core.monitor.catalogue.CATALOGUE`.
+        One reading for each quantity of :data:`core.monitor.catalogue.CATALOGUE`, and for each
+        recorded slow channel of the bearing and of the unit.
     quality
         Quality of the bearing: the worst of its 1× amplitudes and its preferred stiffness.
     budgets

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
 from core.checks.sensor_checks import stationarity
-from core.condition.shaft_readings import slow_channels, slow_results
+from core.condition.shaft_readings import pad_results, slow_channels, slow_results
 from core.machine.channel import line_floor_um_pk
 from core.machine.unit import Bearing, Estimator, Unit
 from core.monitor.assessment import AnalysisSettings
@@ -33,9 +33,11 @@ from core.spectra.cross_spectrum import (
     CrossSpectrum,
     average,
 )
+from core.spectra.resolution import Resolution
 from core.spectra.runout import RunoutVerdict
 from core.spectra.segments import ORDER1, VORTEX, Evidence, KeptSegments
 from core.stiffness.agreement import contradicting
+from core.stiffness.bracket_ratio import as_ratios, ratio_name
 from core.stiffness.channel_budget import frequency_budget
 from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, films
 from core.stiffness.dynamic_readings import NAMES as DYNAMIC_NAMES
@@ -100,6 +102,9 @@ class UnitEvaluation:
             axes: preferred_stiffness(readings, bearing.preference, axes) for axes in ("xx", "yy")
         }
         readings |= {f"stiffness_{axes}_n_per_m": reading for axes, (reading, _) in chosen.items()}
+        if bearing.bracket_stiffness_n_per_m is None:
+            readings = as_ratios(readings)
+            budgets = {ratio_name(name) or name: budget for name, budget in budgets.items()}
         return BearingReadings(
             readings,
             budgets,
@@ -159,9 +164,11 @@ class _Bearing:
         unit, segments = self._unit, self._segments
         speed = segments[-1].speed
         dynamic, dynamic_budgets, film = self._dynamic(found)
+        slow = slow_results(segments, slow_channels(unit, self._bearing))
         parts: list[Found] = [
             with_budgets({"speed_rpm": (speed.rpm, speed.budget)}),
-            slow_results(segments, slow_channels(unit, self._bearing)),
+            slow,
+            pad_results(unit, self._bearing, slow[0]),
             position,
             self._order("order1_", ORDER1),
             with_budgets(self._lines[ORDER1].phases(self._line_quality), "order1_"),
@@ -222,10 +229,9 @@ class _Bearing:
             if self.spectrum is None:
                 parts = self._phasors[:, :, line : line + 1], self._usable[:, line]
                 of_line, at = average(self._order_hz[line : line + 1], *parts), 0
-            floors_um_pk = (
-                line_floor_um_pk(self._unit.channels[row], float(self._order_hz[line]))
-                for row in self._rows
-            )
+            line_hz = float(self._order_hz[line])
+            floors_um_pk = np.array([line_floor_um_pk(c, line_hz) for c in self._unit.channels])
+            floors_um_pk = Resolution(self._unit).floors(floors_um_pk)[self._rows]
             lines.append(
                 OrderLine(
                     bearing=self._bearing,
@@ -240,7 +246,7 @@ class _Bearing:
                     has_phase=has_phase[:, line],
                     at_mark_um_pk=at_mark,
                     has_mark=has_mark & has_phase[:, ORDER1],
-                    floors_um_pk=tuple(floors_um_pk),
+                    floors_um_pk=tuple(floors_um_pk.tolist()),
                     round_shafts=frozenset(p for p in (SHAFT_X, SHAFT_Y) if self._is_round(p)),
                 )
             )

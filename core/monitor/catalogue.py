@@ -1,9 +1,13 @@
 """Catalogue of all reported quantities of a bearing: name, unit and label."""
 
+import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
+from core.machine.slow_channel import SLOW_QUANTITIES
 from core.quality import AXES
+from core.stiffness.bracket_ratio import absolute_name
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,10 @@ CATALOGUE: tuple[Quantity, ...] = (
     *_each("shaft_centre_{}_um", "µm", "Shaft centre {}", STORED),
     Quantity("eccentricity_ratio", "1", "Eccentricity ratio", *STORED),
     Quantity("attitude_angle_deg", "deg", "Attitude angle", *STORED),
+    Quantity("pad_temperature_mean_c", "°C", "Mean pad temperature"),
+    Quantity("pad_temperature_excess_k", "K", "Hottest pad above the mean of the pads"),
+    Quantity("pad_temperature_vector_k", "K", "First harmonic of the pad temperatures"),
+    Quantity("pad_temperature_direction_deg", "deg", "Direction of the first harmonic of the pads"),
     *_order_quantities("order1", "1×"),
     *_each("order1_shaft_{}_phase_deg", "deg", "Phase of shaft vibration {}, 1×"),
     *_each("order1_bearing_{}_phase_deg", "deg", "Phase of bearing vibration {}, 1×"),
@@ -94,3 +102,31 @@ CATALOGUE: tuple[Quantity, ...] = (
 )
 
 BY_NAME = {quantity.name: quantity for quantity in CATALOGUE}
+
+_SLOW = re.compile(rf"({'|'.join(SLOW_QUANTITIES)})(?:_([a-z0-9_]+))?_(c|m|percent|a|v)")
+
+
+@lru_cache(maxsize=4096)
+def quantity_named(name: str) -> Quantity | None:
+    """Return the quantity with a name; None if there is none.
+
+    Beside `CATALOGUE`, these are the slow quantities at any position, and the ratios of film
+    coefficients to the bracket stiffness.
+    """
+    if name in BY_NAME:
+        return BY_NAME[name]
+    if (absolute := BY_NAME.get(absolute_name(name) or "")) is not None:
+        unit = "s" if name.endswith("_s") else "1"
+        return replace(absolute, name=name, unit=unit, label=f"{absolute.label}, over k_b")
+    found = _SLOW.fullmatch(name)
+    if found is None or found[3] != SLOW_QUANTITIES[found[1]].suffix:
+        return None
+    slow, position = SLOW_QUANTITIES[found[1]], (found[2] or "").replace("_", " ")
+    return Quantity(name, slow.unit, f"{slow.label} {position}".rstrip(), *LIVE)
+
+
+def quantity_of(name: str) -> Quantity:
+    """Return the quantity of a reading as `quantity_named` does; raise `KeyError` if unknown."""
+    if (found := quantity_named(name)) is None:
+        raise KeyError(name)
+    return found

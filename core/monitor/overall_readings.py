@@ -3,6 +3,8 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from core.machine.unit import Bearing
 from core.quality import Level, Reading, Reason, current_mean, missing, worst
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
@@ -75,7 +77,7 @@ def recent_readings(
             span = recent.peak_to_peak_um[part, row] if is_span else math.nan
             readings[f"overall_{name}_um_pp"] = segment.reading((row,), float(span))
             readings[f"order1_{name}_um_pk"] = _turning(
-                segment, segment.reading((row,), float(recent.order1_um_pk[part, row]))
+                segment, _order1(segment, row, float(recent.order1_um_pk[part, row]))
             )
         found.append(RecentReadings(segment.stop_ns - behind_ns, readings))
     speeds = {
@@ -91,19 +93,20 @@ def polled_readings(polls: Sequence[Segment], rows: Sequence[int]) -> tuple[Rece
         RecentReadings(
             poll.stop_ns,
             {
-                f"order1_{name}_um_pk": _turning(poll, _polled(poll, rows[place]))
-                for place, name in SHAFTS.items()
+                f"order1_{name}_um_pk": _turning(poll, _order1(poll, row, amplitudes_um_pk[row]))
+                for name, row in ((name, rows[place]) for place, name in SHAFTS.items())
             },
         )
         for poll in polls
+        for amplitudes_um_pk in [np.abs(poll.order_phasors_um_pk[:, ORDER1]).tolist()]
     )
 
 
-def _polled(poll: Segment, row: int) -> Reading:
-    quality = poll.order_quality[ORDER1][row]
+def _order1(segment: Segment, row: int, amplitude_um_pk: float) -> Reading:
+    quality = segment.order_quality[ORDER1][row]
     if quality.level is Level.BAD:
         return missing(quality.reason)
-    return Reading(float(abs(poll.order_phasors_um_pk[row, ORDER1])), quality)
+    return Reading(amplitude_um_pk, quality)
 
 
 def _turning(segment: Segment, amplitude: Reading) -> Reading:

@@ -14,7 +14,9 @@ from core.monitor.bearing_readings import UnitEvaluation
 from core.monitor.overall_readings import polled_readings, recent_readings
 from core.quality import worst
 from core.samples.ring import Window
+from core.spectra.resolution import shaft_matrix
 from core.spectra.segments import ORDER1, KeptSegments, Segment
+from core.stiffness.bracket_ratio import reported_name
 from core.stiffness.order_line import AMPLITUDES
 from core.uncertainty import Found
 from core.units import hz_from_rpm, ns_from_s
@@ -96,7 +98,9 @@ class Refresh:
             time_ns=newest.stop_ns,
             window=self.averaged,
             speed_source=newest.speed.source,
-            quality=worst(r.quality for name, r in found.readings.items() if name in JUDGED),
+            quality=worst(
+                found.readings[reported_name(found.readings, name)].quality for name in JUDGED
+            ),
             readings=found.readings,
             budgets=found.budgets,
             estimators=found.estimators,
@@ -148,5 +152,7 @@ class Refresh:
         signs = np.array([[self.unit.channels[row].direction] for row in rows], dtype=np.float32)
         traces = signs * window.samples[rows, start:]
         traces -= traces.mean(axis=1, keepdims=True)
+        if (matrix := shaft_matrix(self.unit, self.bearing)) is not None:
+            traces = matrix.astype(np.float32) @ traces
         start_ns = window.start_ns + ns_from_s(start / window.rate_hz)
         return OrbitTrace(start_ns, window.rate_hz, traces[0], traces[1])

@@ -18,6 +18,7 @@ from core.machine.unit import Unit
 from core.quality import Reading
 from core.spectra.cross_spectrum import NOISE_BANDWIDTH_BINS
 from core.spectra.lines import SegmentSettings
+from core.spectra.resolution import shaft_matrix
 from core.units import hz_from_rpm
 
 MAX_PARTS = 4
@@ -39,7 +40,8 @@ class Overall:
     Parameters
     ----------
     peak_to_peak_um : (n_channels,)
-        Range of the raw samples; NaN for channels that measure no displacement.
+        Range of the raw samples, along the transducer; NaN for channels that measure no
+        displacement.
     orbit_um_pk : (n_bearings,)
         Largest displacement of each shaft from its mean position, S_max of ISO 20816-1, annex B;
         NaN unless both directions are displacements.
@@ -64,6 +66,8 @@ class OverallTransform:
         ids = [channel.id for channel in unit.channels]
         self._is_displacement = np.array([c.measurand in DISPLACEMENTS for c in unit.channels])
         self._shafts = [[ids.index(b.shaft_x), ids.index(b.shaft_y)] for b in unit.bearings]
+        self._matrices = [shaft_matrix(unit, bearing) for bearing in unit.bearings]
+        self._directions = np.array([[channel.direction] for channel in unit.channels])
         bin_hz = unit.rate_hz / settings.segment_samples
         frequency_hz: FloatArray = bin_hz * np.arange(
             1, settings.segment_samples // 2, dtype=np.float64
@@ -97,12 +101,15 @@ class OverallTransform:
         return Overall(span, self._orbits(centred), np.sqrt(power))
 
     def _orbits(self, centred: FloatArray) -> FloatArray:
-        return np.array([self._orbit(centred, rows) for rows in self._shafts])
+        pairs = zip(self._shafts, self._matrices, strict=True)
+        return np.array([self._orbit(centred, rows, matrix) for rows, matrix in pairs])
 
-    def _orbit(self, centred: FloatArray, rows: Sequence[int]) -> float:
+    def _orbit(self, centred: FloatArray, rows: Sequence[int], matrix: FloatArray | None) -> float:
         if not self._is_displacement[rows].all():
             return float("nan")
         x, y = centred[rows]
+        if matrix is not None:
+            x, y = matrix @ (self._directions[rows] * centred[rows])
         return math.sqrt(float((x * x + y * y).max()))
 
 

@@ -34,6 +34,7 @@ from core.spectra.lines import (
     turning_factors,
 )
 from core.spectra.overall import Overall, OverallTransform, RecentVibration, parts_of
+from core.spectra.resolution import Resolution
 from core.spectra.runout import RunoutVerdict, shaft_angle_rad, without_runout
 from core.spectra.speed import KeyPhase, Speed, read_key_phase, running_speed
 from core.spectra.vortex import vortex_frequency_hz
@@ -71,7 +72,8 @@ class Segment:
     mean
         (n_channels,) mean of the samples, in the engineering unit of each channel.
     bin_phasors_um_pk
-        (n_channels, n_lines) displacement phasors at the bins above zero; None for a poll.
+        (n_channels, n_lines) displacement phasors at the bins above zero, along x and y; None for a
+        poll.
     order_frequency_hz
         (2,) exact frequencies of 1× and of the vortex; without a vortex peak, the nominal frequency
         of the vortex.
@@ -80,7 +82,8 @@ class Segment:
         the vortex band.
     order_phasors_um_pk
         (n_channels, 2) displacement phasors at exactly `order_frequency_hz`, finite also if not
-        usable; amplitudes if the phase is unknown. Runout is subtracted from 1× if possible.
+        usable; amplitudes if the phase is unknown. Runout is subtracted from 1× if possible. The
+        phasors of two transducers in other directions than x and y are resolved into x and y.
     order_quality
         (2, n_channels) qualities of `order_phasors_um_pk`.
     order_usable : (2, n_channels)
@@ -234,6 +237,7 @@ class SegmentTransform(KeptSegments):
         n_lines = min(int(settings.max_frequency_hz / bin_hz), settings.segment_samples // 2 - 1)
         self.frequency_hz: FloatArray = bin_hz * np.arange(1, n_lines + 1, dtype=np.float64)
         self._overall = OverallTransform(unit, settings)
+        self._resolution = Resolution(unit)
         self._bin_factor = _factors(unit.channels, self.frequency_hz)
         shafts = {id_ for bearing in unit.bearings for id_ in (bearing.shaft_x, bearing.shaft_y)}
         self._is_shaft = np.array([channel.id in shafts for channel in unit.channels])
@@ -260,13 +264,14 @@ class SegmentTransform(KeptSegments):
         centred = samples - mean[:, np.newaxis]
         prepared = centred * taper_weights(samples.shape[1])
         lines = bin_phasors(prepared, prepared.shape[1] // 2 - 1)
-        bins = lines[:, : self.frequency_hz.size] * self._bin_factor
+        bins = self._resolution.phasors(lines[:, : self.frequency_hz.size] * self._bin_factor)
         key_phase = self._key_phase(samples, window.rate_hz, usable_channels(quality))
         speed = self._speed(window, bins, usable_channels(quality), key_phase)
         clipped = self._clipped(quality, samples)
         quality = self._judged(quality, samples, mean, speed)
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
-        vortex_hz = self._vortex_hz(turn_hz, bins, usable_channels(quality))
+        resolved = self._resolution.qualities(quality)
+        vortex_hz = self._vortex_hz(turn_hz, bins, usable_channels(resolved))
         order_hz = np.array([turn_hz, vortex_hz or self._settings.vortex_order * turn_hz])
         factors = _factors(self._unit.channels, order_hz)
         turn_samples = window.rate_hz / turn_hz
@@ -276,14 +281,15 @@ class SegmentTransform(KeptSegments):
         orders[:, ORDER1], runout = without_runout(
             orders[:, ORDER1], self._unit, shafts, speed, key_phase
         )
-        angle_rad, usable = shaft_angle_rad(speed, key_phase), usable_channels(quality)
+        orders = self._resolution.phasors(orders)
+        angle_rad, usable = shaft_angle_rad(speed, key_phase), usable_channels(resolved)
         segment = Segment(
             epoch=window.epoch,
             first_index=window.first_index,
             stop_index=window.stop_index,
             stop_ns=window.stop_ns,
             channel_quality=quality,
-            usable=usable,
+            usable=usable_channels(quality),
             slow=window.slow,
             mean=mean,
             speed=speed,
@@ -291,7 +297,7 @@ class SegmentTransform(KeptSegments):
             order_frequency_hz=order_hz,
             has_vortex_peak=vortex_hz is not None,
             order_phasors_um_pk=orders,
-            order_quality=(quality, quality),
+            order_quality=(resolved, resolved),
             order_usable=np.array([usable, usable]),
             has_phase=np.ones((2, usable.size), dtype=np.bool_),
             at_mark_um_pk=None if angle_rad is None else _turned(orders[:, ORDER1], -angle_rad),
@@ -370,7 +376,7 @@ class SegmentTransform(KeptSegments):
             at_turn = np.ascontiguousarray(turning[start:stop, ORDER1 : ORDER1 + 1])
             phasors = factors[:, ORDER1] * part_phasors(part, at_turn)[:, 0]
             clean, _ = without_runout(phasors, self._unit, shafts, speed, key_phase)
-            amplitudes.append(np.abs(clean))
+            amplitudes.append(np.abs(self._resolution.phasors(clean)))
             spans.append(np.ptp(part, axis=1))
         return RecentVibration(stops, np.array(amplitudes), np.array(spans))
 
@@ -386,7 +392,7 @@ class SegmentTransform(KeptSegments):
         near = slice(first, int(np.searchsorted(self.frequency_hz, band_hz[1] + margin_hz)))
         before = [s.bin_phasors_um_pk for s in self.segments if s.bin_phasors_um_pk is not None]
         phasors = np.array([part[:, near] for part in (*before, bins)])
-        counted = np.array([*(s.usable for s in self.segments), usable])
+        counted = np.array([*(s.order_usable[VORTEX] for s in self.segments), usable])
         spectra = [
             average(self.frequency_hz[near], phasors[:, rows], counted[:, rows])
             for rows in self._bearing_rows

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from core.machine.unit import Estimator
 from core.quality import Reading, Reason, missing, uncertain, worst
+from core.stiffness.bracket_ratio import reported_name
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,8 @@ def is_reversed(readings: Mapping[str, Reading], axes: str) -> bool | None:
     Return None without a result. `readings` are from :func:`signs_checked`; `axes` is "xx" or "yy".
     """
     for estimator in (Estimator.DYNAMIC, Estimator.TRANSFER_VORTEX, Estimator.TRANSFER_ORDER1):
-        reading = readings.get(ESTIMATORS[estimator].stiffness.format(axes=axes))
+        name = ESTIMATORS[estimator].stiffness.format(axes=axes)
+        reading = readings.get(reported_name(readings, name))
         if reading is not None and reading.quality.reason is Reason.POLARITY:
             return True
         if reading is not None and reading.value is not None:

@@ -282,7 +282,7 @@ class OrderLine:
         if budget is not None:
             return Reading(budget.value, quality), budget
         ratio = float(self.orders.amplitude_ratio(bearing, shaft)[self.at])
-        k_eff = effective_stiffness_n_per_m(ratio, 1.0, self.bearing.bracket_stiffness_n_per_m)
+        k_eff = effective_stiffness_n_per_m(ratio, 1.0, self.bearing.bracket.stiffness_n_per_m)
         return Reading(k_eff, quality), None
 
     def _transfer(

@@ -14,7 +14,7 @@ from acquisition.recordings.reader import open_recording
 from acquisition.recordings.source import RecordingSource
 from acquisition.source import SampleSource
 from core.monitor.assessment import Assessment
-from core.monitor.catalogue import BY_NAME
+from core.monitor.catalogue import quantity_of
 from core.monitor.monitor import UnitMonitor
 from service.app.recordings import selection_of
 from service.cli.offline.reanalysis import (
@@ -141,4 +141,5 @@ def _table(assessment: Assessment) -> Iterator[str]:
             continue
         value = "—" if reading.value is None else f"{reading.value:.6g}"
         doubt = "" if reading.level == "good" else f"  {reading.level}: {reading.reason}"
-        yield f"  {BY_NAME[name].label:<48}{value:>14} {BY_NAME[name].unit:<10}{doubt}".rstrip()
+        quantity = quantity_of(name)
+        yield f"  {quantity.label:<48}{value:>14} {quantity.unit:<10}{doubt}".rstrip()

@@ -100,8 +100,9 @@ def _refuse_misfit(unit: UnitSettings, simulation: SimulationSettings) -> None:
     for bearing in unit.bearing:
         bracket, name = brackets[bearing.id], bearing.id
         _compare(unit, f"{name} clearance_um", bearing.clearance_um, clearances_um[name])
-        stiffness = bearing.bracket_stiffness_n_per_m
-        _compare(unit, f"{name} bracket_stiffness_n_per_m", stiffness, bracket.stiffness_n_per_m)
+        if (stiffness := bearing.bracket_stiffness_n_per_m) is not None:
+            key = f"{name} bracket_stiffness_n_per_m"
+            _compare(unit, key, stiffness, bracket.stiffness_n_per_m)
 
 
 def _compare(unit: UnitSettings, key: str, found: float, wanted: float) -> None:

@@ -14,6 +14,7 @@ from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
 from core.quality import Reading, Reason, missing
 from core.spectra.orbit import Ellipse, ellipse_of, marks_of, order_phasors, trace_of
+from core.spectra.resolution import shaft_matrix
 from core.units import hz_from_rpm, ns_from_s, rpm_from_hz, s_from_ns
 from service.live.samples import SampleWindow, sample_window
 from service.recordings.library import RecordingWindow, window_of
@@ -85,13 +86,16 @@ def motion_of(window: SampleWindow, unit: Unit, bearing: Bearing) -> ShaftMotion
     x_um, y_um = (
         _displacement(window, channels[id_]) for id_ in (bearing.shaft_x, bearing.shaft_y)
     )
+    matrix = shaft_matrix(unit, bearing)
+    if matrix is not None:
+        x_um, y_um = matrix @ np.stack([x_um, y_um])
     marks = _marks(window, channels, unit.key_phase)
     speed_rpm = _speed(window, unit, marks)
     return ShaftMotion(
         window=window,
         x_um=x_um,
         y_um=y_um,
-        centre_um=_centre(window, channels, bearing),
+        centre_um=_centre(window, channels, bearing, matrix),
         speed_rpm=speed_rpm,
         order1=_order1(window, x_um, y_um, speed_rpm),
         marks=marks,
@@ -142,7 +146,10 @@ def _order1(
 
 
 def _centre(
-    window: SampleWindow, channels: dict[str, Channel], bearing: Bearing
+    window: SampleWindow,
+    channels: dict[str, Channel],
+    bearing: Bearing,
+    matrix: FloatArray | None,
 ) -> tuple[float, float] | None:
     near, far = (
         [_gap(window, channels.get(id_ or ""), slow) for id_, slow in pairs]
@@ -155,7 +162,7 @@ def _centre(
         )
     )
     x, y = (probe_axis(bearing, near, far, axis) for axis in (0, 1))
-    found, _ = locate_shaft(x, y, bearing.clearance_um, bearing.gap_accuracy)
+    found, _ = locate_shaft(x, y, bearing.clearance_um, bearing.gap_accuracy, matrix=matrix)
     x_um, y_um = (found[f"shaft_centre_{axis}_um"].value for axis in "xy")
     return None if x_um is None or y_um is None else (x_um, y_um)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import CellStatistics
-from core.baseline.history import StiffnessHistory
+from core.baseline.history import StiffnessHistory, are_ratios
 from core.change.cause import Attribution
 from core.change.decision import Decision
 from core.change.film_judge import FilmFinding, FilmNews
@@ -15,8 +15,9 @@ from core.change.settings import FilmRules, percent_of
 from core.condition.cells import BearingCondition, Cell, CellGrid, FilmConditions
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
-from core.monitor.catalogue import BY_NAME
+from core.monitor.catalogue import quantity_of
 from core.quality import Level, Reading
+from core.stiffness.bracket_ratio import reported_name
 from core.stiffness.estimators import ESTIMATORS
 from core.uncertainty import Budget
 from core.units import NS_PER_S
@@ -79,7 +80,7 @@ def reading_part(name: str, reading: Reading) -> ReadingPart:
     """
     return ReadingPart(
         value=finite(reading.value),
-        unit=BY_NAME[name].unit,
+        unit=quantity_of(name).unit,
         level=LEVEL_WORDS[reading.quality.level],
         reason=reading.quality.reason.value,
         u_random=finite(reading.u_random),
@@ -103,7 +104,7 @@ def cell_bounds(cell: Cell | None, grid: CellGrid | None) -> list[tuple[float, f
 def _estimators(found: Assessment, watched: Estimator | None) -> Iterator[EstimatorPart]:
     for estimator, entry in ESTIMATORS.items():
         for direction in AXES:
-            name = entry.stiffness.format(axes=direction * 2)
+            name = reported_name(found.readings, entry.stiffness.format(axes=direction * 2))
             coherence = found.readings[entry.coherence.format(axis=direction)]
             yield EstimatorPart(
                 estimator=estimator.value,
@@ -185,7 +186,7 @@ def _members_part(found: StiffnessHistory, direction: Direction) -> MembersPart:
     measured = np.flatnonzero(np.isfinite(found.ln_k[row]))
     rows = measured[:: max(1, -(-measured.size // MAX_MEMBERS))]
     columns = {
-        "stiffness_n_per_m": np.exp(found.ln_k[row, rows]),
+        "stiffness": np.exp(found.ln_k[row, rows]),
         "u_random": found.u_random[row, rows],
         "eccentricity_ratio": found.eccentricity_ratio[rows],
         "oil_temperature_c": found.oil_temperature_c[rows],
@@ -269,12 +270,13 @@ def comparison(
         direction=direction,
         estimator=reading.estimator.value,
         time=rfc3339(reading.time_ns),
-        stiffness_n_per_m=rounded(math.exp(value.ln_k)),
+        stiffness=rounded(math.exp(value.ln_k)),
+        stiffness_unit="k_b" if are_ratios(value.ln_k) else "N/m",
         u_random=rounded(value.u_random),
         eccentricity_ratio=finite(reading.eccentricity_ratio),
         oil_temperature_c=finite(reading.oil_temperature_c),
         attitude_deg=finite(reading.attitude_deg),
-        expected_n_per_m=None if found is None else rounded(float(found[0])),
+        expected_stiffness=None if found is None else rounded(float(found[0])),
         baseline=_baseline(baseline, learned) if baseline and learned else None,
         cell=None if own is None else _cell_part(own),
         bounds=cell_bounds(cell, rules.grid),
@@ -305,7 +307,7 @@ def _line(learned: QuantityBaseline, news: FilmNews) -> ExpectedPart | None:
     along = FilmConditions(e, here.oil_temperature_c * one, here.attitude_deg * one)
     return ExpectedPart(
         eccentricity_ratio=[rounded(each) for each in e.tolist()],
-        stiffness_n_per_m=[rounded(each) for each in _expected_at(learned, along)],
+        stiffness=[rounded(each) for each in _expected_at(learned, along)],
     )
 
 
@@ -327,7 +329,7 @@ def _cell_part(found: CellStatistics) -> CellPart:
         cell=list(found.cell),
         n_readings=found.n_readings,
         n_days=found.n_days,
-        location_n_per_m=float(f"{math.exp(found.location):.7g}"),
+        location=float(f"{math.exp(found.location):.7g}"),
         scatter=found.scatter,
         surface_std=found.surface_std,
         support=found.support.value,

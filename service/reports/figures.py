@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 
+from core.baseline.history import are_ratios
 from core.quality import Reason
 from core.units import NS_PER_S
 from service.reports.case import Case
@@ -97,6 +98,13 @@ def _rows(table: Columns, bearing: str | None) -> list[int]:
 
 GN_PER_M = 1e9
 
+
+def stiffness_scale(values: Values) -> tuple[str, float]:
+    """Return the unit in which stiffnesses are drawn, and its size: GN/m, or k_b if unknown."""
+    largest = max((abs(v) for v in values if v), default=GN_PER_M)
+    return ("k_b", 1.0) if are_ratios(math.log(largest)) else ("GN/m", GN_PER_M)
+
+
 DAY_S = 86_400.0
 
 
@@ -116,25 +124,26 @@ def condition_figure(case: Case) -> Figure | None:
         return None
     recent, members = _recent(case), found.members
     e = [*(members.eccentricity_ratio if members else ()), *recent[0], found.eccentricity_ratio]
-    k = [*(members.stiffness_n_per_m if members else ()), *recent[1], found.stiffness_n_per_m]
+    k = [*(members.stiffness if members else ()), *recent[1], found.stiffness]
     x, y = around(e, 0.25), around(k, 0.15)
     if x is None or y is None:
         return None
+    unit, size = stiffness_scale(k)
     plot = Plot(
         *(350.0, 148.0),
-        *(Scale(*x), Scale(*y, divisor=GN_PER_M)),
-        *("Eccentricity ratio, 1", f"Stiffness {case.direction}, GN/m"),
+        *(Scale(*x), Scale(*y, divisor=size)),
+        *("Eccentricity ratio, 1", f"Stiffness {case.direction}, {unit}"),
         *("Stiffness against condition", "condition"),
     )
     expected = found.expected
     if found.bounds:
         plot.cell(found.bounds[0], y, "strip")
     if members is not None:
-        plot.dots(members.eccentricity_ratio, members.stiffness_n_per_m, "member")
+        plot.dots(members.eccentricity_ratio, members.stiffness, "member")
     if expected is not None:
-        plot.line(expected.eccentricity_ratio, expected.stiffness_n_per_m, "expected")
+        plot.line(expected.eccentricity_ratio, expected.stiffness, "expected")
     plot.dots(*recent, "today")
-    k_alarm, u = found.stiffness_n_per_m, found.u_random
+    k_alarm, u = found.stiffness, found.u_random
     error = None if k_alarm is None or u is None else 1.96 * u * k_alarm
     plot.points([found.eccentricity_ratio], [k_alarm], "alarm", 2.4, [error])
     return Figure(
@@ -157,16 +166,17 @@ def map_figure(case: Case) -> Figure | None:
         *(350.0, 148.0, x, y),
         *("Eccentricity ratio, 1", "Oil temperature, °C", "Map of the baseline", "map"),
     )
-    known = [e.location_n_per_m for e in found.map if e.support != "none"] or [1.0]
+    known = [e.location for e in found.map if e.support != "none"] or [1.0]
     low, high = min(known), max(known)
+    unit, size = stiffness_scale(known)
     for each, bounds in zip(found.map, cells, strict=True):
         plot.cell(bounds[0], bounds[1], LOOKS[each.support], _darkness(each, low, high))
     plot.cell(own[0], own[1], "own", 0.0)
     plot.points([found.eccentricity_ratio], [found.oil_temperature_c], "alarm", 2.2)
     return Figure(
         plot,
-        f"Stiffness of the baseline, darker if stiffer, {low / GN_PER_M:.3g} to"
-        f" {high / GN_PER_M:.3g} GN/m. Dashed: from neighbours. White: too few readings to"
+        f"Stiffness of the baseline, darker if stiffer, {low / size:.3g} to"
+        f" {high / size:.3g} {unit}. Dashed: from neighbours. White: too few readings to"
         " compare. Red: the cell and reading of the alarm.",
     )
 
@@ -180,7 +190,7 @@ def _bounds(found: ComparisonPart, cell: CellPart) -> list[tuple[float, float]]:
 def _darkness(cell: CellPart, low: float, high: float) -> float:
     if cell.support == "none" or high == low:
         return 1.0 if cell.support == "none" else 0.5
-    return 0.12 + 0.78 * math.log(cell.location_n_per_m / low) / math.log(high / low)
+    return 0.12 + 0.78 * math.log(cell.location / low) / math.log(high / low)
 
 
 def _recent(case: Case) -> tuple[list[float | None], list[float | None]]:
@@ -192,7 +202,7 @@ def _recent(case: Case) -> tuple[list[float | None], list[float | None]]:
     if not rows:
         return [], []
     e = finite_of(table["eccentricity_ratio"])
-    k = finite_of(table[f"stiffness_n_per_m_{case.direction}"])
+    k = finite_of(table[f"stiffness_{case.direction}"])
     return [e[i] for i in rows], [k[i] for i in rows]
 
 
@@ -208,15 +218,16 @@ def trend_figure(case: Case) -> Figure | None:
     found, axis = _trend(case), case.direction
     if found is None:
         return None
-    own = None if case.comparison is None else case.comparison.stiffness_n_per_m
+    own = None if case.comparison is None else case.comparison.stiffness
     room = around([own, *found.stiffness, *found.lows, *found.highs])
     if room is None:
         return None
+    unit, size = stiffness_scale([own, *found.stiffness])
     plot = Plot(
         *(720.0, 126.0),
         TimeScale(found.first_s, found.last_s),
-        Scale(*room, divisor=GN_PER_M),
-        *("Time, UTC", f"Stiffness {axis}, GN/m", "Stiffness over time", "trend"),
+        Scale(*room, divisor=size),
+        *("Time, UTC", f"Stiffness {axis}, {unit}", "Stiffness over time", "trend"),
     )
     time, k, after = found.time, found.stiffness, found.after
     before = [s and not a for s, a in zip(found.is_settled, after, strict=True)]
@@ -275,7 +286,7 @@ def _trend(case: Case) -> _Trend | None:
     table = {name: [*old, *case.after.get(name, ())] for name, old in case.before.items()}
     if not table.get("time_ns"):
         return None
-    stiffness = finite_of(table[f"stiffness_n_per_m_{case.direction}"])
+    stiffness = finite_of(table[f"stiffness_{case.direction}"])
     deviation = table[f"deviation_{case.direction}"]
     return _Trend(
         alarm_s=case.evidence.alarm.time_ns / NS_PER_S,

@@ -300,9 +300,11 @@ def _estimate(found: EstimatorPart) -> tuple[str, str]:
     reading = found.stiffness
     if reading.value is None:
         return plain(reading.reason), coherence
-    parts = [f"{reading.value / GN_PER_M:.4f}"]
+    scale, unit = (GN_PER_M, []) if reading.unit == "N/m" else (1.0, ["k_b"])
+    parts = [f"{reading.value / scale:.4f}"]
     for u in (reading.u_random, reading.u_systematic):
-        parts.append("±?" if u is None else f"±{u / GN_PER_M:.4f}")
+        parts.append("±?" if u is None else f"±{u / scale:.4f}")
+    parts += unit
     doubt = "" if reading.level == "good" else f" ({plain(reading.reason)})"
     return " ".join(parts) + doubt, coherence
 

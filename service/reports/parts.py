@@ -296,8 +296,8 @@ class CellPart(EvidencePart):
     n_days: int
     """Number of days with readings in the cell."""
 
-    location_n_per_m: float
-    """Median stiffness of the readings, in N/m."""
+    location: float
+    """Median stiffness of the readings, in the unit of the comparison."""
 
     scatter: float
     """Scatter of the readings, in ln."""
@@ -334,8 +334,8 @@ class MembersPart(EvidencePart):
     time: Numbers
     """Times of the readings, in seconds since 1970 UTC."""
 
-    stiffness_n_per_m: Numbers
-    """Stiffness, in N/m."""
+    stiffness: Numbers
+    """Stiffness, in the unit of the comparison."""
 
     u_random: Numbers
     """Random standard uncertainty of ln stiffness."""
@@ -353,8 +353,8 @@ class ExpectedPart(EvidencePart):
     eccentricity_ratio: Numbers
     """Eccentricity ratio."""
 
-    stiffness_n_per_m: Numbers
-    """Expected stiffness, in N/m; null if unknown."""
+    stiffness: Numbers
+    """Expected stiffness, in the unit of the comparison; null if unknown."""
 
 
 class ComparisonPart(EvidencePart):
@@ -372,8 +372,11 @@ class ComparisonPart(EvidencePart):
     time: Moment
     """Time of the reading."""
 
-    stiffness_n_per_m: float | None
-    """Measured stiffness, in N/m; null if missing."""
+    stiffness: float | None
+    """Measured stiffness; null if missing."""
+
+    stiffness_unit: Literal["N/m", "k_b"]
+    """Unit of all stiffnesses: N/m or, if it is unknown, the stiffness of the bracket."""
 
     u_random: float | None
     """Random standard uncertainty of ln stiffness; null if unknown."""
@@ -387,8 +390,8 @@ class ComparisonPart(EvidencePart):
     attitude_deg: float | None
     """Attitude angle of the reading, in degrees; null if unknown."""
 
-    expected_n_per_m: float | None
-    """Expected stiffness by the baseline, in N/m; null if unknown for this condition."""
+    expected_stiffness: float | None
+    """Expected stiffness by the baseline; null if unknown for this condition."""
 
     baseline: BaselinePart | None
     """Baseline; null if the bearing had none."""

@@ -87,7 +87,7 @@ def _trend(found: FilmHistory) -> "pa.Table":
         f"{name}_{axis}": column[row]
         for row, axis in enumerate(AXES)
         for name, column in (
-            ("stiffness_n_per_m", np.exp(history.ln_k)),
+            ("stiffness", np.exp(history.ln_k)),
             ("u_random", history.u_random),
             ("shaft_um_pk", history.shaft_um_pk),
             ("bearing_um_pk", history.bearing_um_pk),

@@ -24,7 +24,10 @@ def recorded_unit(unit: UnitSettings) -> RecordedUnit:
             RecordedChannel(id=channel.id, measurand=channel.measurand, **channel.scale)
             for channel in unit.channel
         ),
-        slow_channels=tuple(RecordedSlowChannel(**slow.model_dump()) for slow in unit.slow_channel),
+        slow_channels=tuple(
+            RecordedSlowChannel(**slow.model_dump(include=set(RecordedSlowChannel.model_fields)))
+            for slow in unit.slow_channel
+        ),
         block_samples=unit.block_samples,
     )
 

@@ -10,6 +10,7 @@ from service.settings.limits import (
     DelayS,
     EccentricityLimitSettings,
     GapLimitSettings,
+    PadExcessLimitSettings,
     SpanLimitSettings,
     TemperatureLimitSettings,
     VectorChangeLimitSettings,
@@ -54,6 +55,9 @@ class BearingAlarmSettings(Settings):
 
     oil_temperature_c: TemperatureLimitSettings | None = None
     """Limits of the oil temperature."""
+
+    pad_temperature_excess_k: PadExcessLimitSettings | None = None
+    """Limits of the temperature of the hottest pad above the mean of the pads."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -22,6 +22,13 @@ GAP_KEYS = ("gap_x", "gap_y", "opposite_gap_x", "opposite_gap_y")
 """Keys of a bearing whose values are ids of slow channels of gaps."""
 
 
+OF_KNOWN_BRACKETS = {
+    *("bracket_stiffness_uncertainty", "bracket_mass_kg", "bracket_mass_uncertainty"),
+    "bracket_damping_n_s_per_m",
+}
+"""Keys of a bearing that require the stiffness of its bracket."""
+
+
 class BearingSettings(Settings):
     """Settings of a guide bearing: bracket, clearance, channels and alarm limits."""
 
@@ -32,9 +39,11 @@ class BearingSettings(Settings):
     name: Annotated[str, StringConstraints(min_length=1, max_length=80)] | None = None
     """Display name of the bearing beside its id; none by default; example: "upper guide"."""
 
-    bracket_stiffness_n_per_m: Annotated[float, Field(ge=1e7, le=1e12)]
-    """Radial stiffness of the bracket in N/m, between 1e7 and 1e12; example: 1.18e9. Every result
-    of equation (5) of Brito et al. is proportional to the bracket stiffness."""
+    bracket_stiffness_n_per_m: Annotated[float, Field(ge=1e7, le=1e12)] | None = None
+    """Radial stiffness of the bracket in N/m, between 1e7 and 1e12; example: 1.18e9. Every film
+    coefficient is proportional to the bracket stiffness. If it is unknown, leave it out: films are
+    then reported, and compared with their baselines, as ratios to it. A baseline that was learned
+    before the stiffness was given or left out must be renewed."""
 
     clearance_um: Annotated[float, Field(ge=20.0, le=5000.0)]
     """Radial clearance in operation in µm, 20 to 5000; example: 200.0."""
@@ -148,6 +157,9 @@ class BearingSettings(Settings):
                 "must be given if opposite_x or opposite_y is given, and only then",
                 "opposite_reference_um",
             )
+        if self.bracket_stiffness_n_per_m is None:
+            for key in OF_KNOWN_BRACKETS & self.model_fields_set:
+                raise MisfitError("applies only with bracket_stiffness_n_per_m", key)
         if self.alarms.oil_temperature_c is not None and self.oil_temperature is None:
             raise MisfitError(
                 "requires oil_temperature, the slow channel of the bearing's oil temperature",

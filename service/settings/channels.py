@@ -3,14 +3,17 @@
 import cmath
 import math
 from enum import StrEnum
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import AwareDatetime, Field, StringConstraints, model_validator
 
 from core.checks.channels import COUNTS_FULL_SCALE
 from core.machine.channel import Measurand, SlowRollVector
+from core.machine.slow_channel import PAD_TEMPERATURE, SLOW_QUANTITIES, SlowChannel
+from core.monitor.catalogue import BY_NAME
 from core.units import NS_PER_S, STANDARD_GRAVITY_M_S2
 from service.settings.base import Identifier, MisfitError, MissingError, Settings
+from service.settings.limits import SlowLimitSettings
 from service.settings.transducers import ResponseSettings
 
 ProbeName = Annotated[str, StringConstraints(min_length=1, max_length=80)]
@@ -115,7 +118,7 @@ SCALE_KEYS_COUNTS = ("unit_per_count", "ok_min", "ok_max")
 VOLTAGE_KEYS = ("sensitivity", "sensitivity_unit")
 NO_KEY_PHASE_KEYS = (
     *("sensitivity", "sensitivity_unit", "response", "delay_s", "line_floor", "probe"),
-    "slow_roll",
+    *("slow_roll", "angle_deg"),
 )
 """Keys that do not apply to a key_phase channel, because the height of its pulses has no
 meaning."""
@@ -183,6 +186,12 @@ class ChannelSettings(Settings):
     """Sign of the channel: +1 if the reading increases with motion along the positive bearing axis,
     -1 if it decreases. Default: -1 for a proximity probe, which is mounted on the positive axis;
     otherwise +1. For a key_phase, -1 if the pulses are negative."""
+
+    angle_deg: Annotated[float, Field(ge=-360.0, le=360.0)] | None = None
+    """Angle from x towards y of the axis that the transducer measures along, degrees; by default 0
+    or 90, the axis of the bearing's key that names the channel. A positive ``direction`` then means
+    motion along this axis. The signals of both transducers are resolved into x and y. Example:
+    45.0."""
 
     probe: ProbeName | None = None
     """Serial number or mark of the installed shaft probe, the same as in slow_roll; example:
@@ -291,6 +300,15 @@ class ChannelSettings(Settings):
         return -1 if self.transducer is Transducer.PROXIMITY_PROBE else 1
 
 
+SlowUnit = Literal["r/min", "MW", "degC", "mm", "m", "%", "A", "V"]
+
+if TYPE_CHECKING:
+    SlowQuantityName = str
+else:
+    SlowQuantityName = Literal[tuple(SLOW_QUANTITIES)]
+"""Name of a recorded slow quantity, validated by pydantic."""
+
+
 class SlowChannelSettings(Settings):
     """Settings of a slow channel, which has single values instead of a waveform.
 
@@ -300,8 +318,9 @@ class SlowChannelSettings(Settings):
     id: Identifier
     """Id of the slow channel, unique within the unit; example: "ujb_oil_temperature"."""
 
-    unit: Literal["r/min", "MW", "degC", "mm"]
-    """Unit of the values that the device sends: "r/min", "MW", "degC" or "mm"."""
+    unit: SlowUnit
+    """Unit of the values that the device sends: "r/min", "MW", "degC", "mm", "m", "%", "A" or
+    "V"."""
 
     minimum: float
     """Lower limit of valid values, in `unit`; lower values are rejected as out of range. Example:
@@ -311,8 +330,50 @@ class SlowChannelSettings(Settings):
     """Upper limit of valid values, in `unit`; higher values are rejected as out of range. Example:
     120.0."""
 
+    quantity: SlowQuantityName | None = None
+    """Quantity that the channel measures. Its values are then recorded with the results of the
+    bearing, or of all bearings of the unit, and shown as trends. No default; a channel that a key
+    of the unit or of a bearing names needs no quantity. Example: "pad_temperature"."""
+
+    bearing: Identifier | None = None
+    """Bearing that the quantity belongs to; by default the unit. Required for a pad_temperature.
+    Example: "UJB"."""
+
+    position: Annotated[str, StringConstraints(pattern=r"^[a-z0-9]+(_[a-z0-9]+)*$")] | None = None
+    """Number or word, in lower case, that distinguishes the channels of one quantity; example:
+    "3"."""
+
+    angle_deg: Annotated[float, Field(ge=-360.0, le=360.0)] | None = None
+    """Angle of the pad around the bearing, degrees from x towards y; only for a pad_temperature.
+    The first harmonic of the pad temperatures requires the angles of all pads. Example: 45.0."""
+
+    limits: SlowLimitSettings | None = None
+    """Alarm limits of the quantity; none by default. Example: { alert = 80.0, danger = 90.0 }."""
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         if not self.minimum < self.maximum:
             raise MisfitError(f"must be below maximum = {self.maximum:g}", "minimum")
+        if self.quantity is None:
+            for key in ("bearing", "position", "angle_deg", "limits"):
+                if getattr(self, key) is not None:
+                    raise MisfitError("requires quantity", key)
+            return self
+        unit, is_pad = SLOW_QUANTITIES[self.quantity].setting, self.quantity == PAD_TEMPERATURE
+        if self.unit != unit:
+            raise MisfitError(f'must be "{unit}" for a {self.quantity}', "unit")
+        if is_pad and self.bearing is None:
+            raise MissingError(f"is missing; a {self.quantity} belongs to a bearing", "bearing")
+        if self.angle_deg is not None and not is_pad:
+            raise MisfitError("applies only to a pad_temperature", "angle_deg")
+        if self.recorded is not None and self.recorded.reading in BY_NAME:
+            raise MisfitError("is the name of a computed value; use another word", "position")
         return self
+
+    @property
+    def recorded(self) -> SlowChannel | None:
+        """The channel as a `SlowChannel` of the machine; None without a quantity."""
+        if self.quantity is None:
+            return None
+        place = (self.bearing, self.position or "", self.angle_deg)
+        return SlowChannel(self.id, self.quantity, *place)

@@ -1,5 +1,7 @@
 """Conversion of settings to the objects of the analysis: machine, calibration, alarm rules."""
 
+from collections.abc import Sequence
+
 from core.alarms.judgements import OrderVector, VectorReference
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.statistics import ChatterRule
@@ -10,6 +12,7 @@ from core.machine.channel import Channel
 from core.machine.unit import Bearing, BearingAccuracy, Estimator, GapAccuracy, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
+from core.spectra.resolution import angles_of, error_factor
 from core.stiffness.dynamic_lines import DynamicSettings
 from core.units import ns_from_s
 from service.settings.alarms import AlarmSettings
@@ -18,8 +21,8 @@ from service.settings.channels import ChannelSettings
 from service.settings.films import FilmAlarmSettings
 from service.settings.limits import (
     LIMITS,
-    GapLimitSettings,
     LimitSettings,
+    TwoSidedLimitSettings,
     ZoneSettings,
     ZoneTableSettings,
     states_of,
@@ -37,6 +40,7 @@ def machine_of(settings: UnitSettings) -> Unit:
         **settings.values_for(Unit),
         channels=tuple(_channel(channel) for channel in settings.channel),
         bearings=tuple(_bearing(bearing, settings) for bearing in settings.bearing),
+        slow_channels=tuple(filter(None, (slow.recorded for slow in settings.slow_channel))),
         rotation_sense=1 if settings.rotation == "x_to_y" else -1,
         has_vortex=settings.turbine == "francis",
     )
@@ -55,18 +59,27 @@ def _channel(settings: ChannelSettings) -> Channel:
         ok_limits=calibration.ok_limits,
         probe=settings.probe or "",
         slow_roll=settings.slow_roll.vector(settings.id) if settings.slow_roll else None,
+        angle_deg=settings.angle_deg,
     )
 
 
 def _bearing(settings: BearingSettings, unit: UnitSettings) -> Bearing:
-    gain = {channel.id: channel.gain_uncertainty for channel in unit.channel}
-    shaft_gain = max(gain[settings.shaft_x], gain[settings.shaft_y])
+    given = {channel.id: channel for channel in unit.channel}
+    shaft, bearing = (
+        [given[getattr(settings, f"{part}_{axis}")] for axis in "xy"]
+        for part in ("shaft", "bearing")
+    )
+    grown = _error_factor(shaft)
+    shaft_gain = grown * max(probe.gain_uncertainty for probe in shaft)
+    values = settings.values_for(Bearing) | {"runout_um_pk": grown * settings.runout_um_pk}
     return Bearing(
-        **settings.values_for(Bearing),
+        **values,
         accuracy=BearingAccuracy(
             shaft_gain=shaft_gain,
-            bearing_gain=max(gain[settings.bearing_x], gain[settings.bearing_y]),
-            bracket_stiffness=settings.bracket_stiffness_uncertainty,
+            bearing_gain=_error_factor(bearing) * max(each.gain_uncertainty for each in bearing),
+            bracket_stiffness=0.0
+            if settings.bracket_stiffness_n_per_m is None
+            else settings.bracket_stiffness_uncertainty,
             bracket_mass=settings.bracket_mass_uncertainty,
             bracket_damping=settings.bracket_damping_uncertainty,
             delay_s=settings.delay_uncertainty_s,
@@ -80,6 +93,12 @@ def _bearing(settings: BearingSettings, unit: UnitSettings) -> Bearing:
             clearance=settings.clearance_uncertainty,
         ),
     )
+
+
+def _error_factor(pair: Sequence[ChannelSettings]) -> float:
+    """Return the factor of the errors of two transducers when they are resolved into x and y."""
+    first_deg, second_deg = angles_of(pair[0].angle_deg, pair[1].angle_deg)
+    return error_factor(second_deg - first_deg)
 
 
 def calibration_of(settings: UnitSettings) -> UnitCalibration:
@@ -124,6 +143,7 @@ def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitR
         channel=rule_of(alarms.channel_on_delay_s, alarms.channel_off_delay_s),
         slow_channel=rule_of(alarms.slow_channel_on_delay_s, alarms.channel_off_delay_s),
         bearings={bearing.id: _bearing_rules(bearing) for bearing in unit.bearing},
+        slow_limits={s.id: rule for s in unit.slow_channel if (rule := _limits(s.limits))},
         clock_offset=_clock_limit(alarms.max_clock_offset_s, 30.0) if is_judged else None,
         clock_drift=_clock_limit(alarms.max_clock_drift_ppm, 60.0) if is_judged else None,
         time_stamps=rule_of(0.0, 600.0) if is_judged else None,
@@ -155,6 +175,7 @@ def _bearing_rules(bearing: BearingSettings) -> BearingRules:
     return {
         "shaft_order1": _limits(alarms.shaft_order1_um_pk),
         "oil_temperature": _limits(alarms.oil_temperature_c),
+        "pad_temperatures": _limits(alarms.pad_temperature_excess_k),
         "shaft_overall": _limits(alarms.shaft_overall_um_pp),
         "bearing_overall": _limits(alarms.bearing_overall_mm_s_rms),
         "eccentricity": _limits(alarms.eccentricity_ratio),
@@ -178,7 +199,7 @@ def _limits(found: LimitSettings | None) -> LimitRule | None:
 
 
 def _values(found: LimitSettings) -> Limits:
-    if isinstance(found, GapLimitSettings):
+    if isinstance(found, TwoSidedLimitSettings):
         return Limits(**found.model_dump(include=set(LIMITS)))
     return Limits(found.alert, found.danger, found.deadband)
 

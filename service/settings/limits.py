@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from itertools import combinations, pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -105,18 +105,18 @@ class LimitTableSettings(RegionSettings):
     """Danger limit in this region; by default `danger` of the main table."""
 
     alert_below: float | None = None
-    """Lower alert limit in this region, for gaps only; by default `alert_below` of the main
-    table."""
+    """Lower alert limit in this region, where the main table may have one; by default
+    `alert_below` of the main table."""
 
     danger_below: float | None = None
-    """Lower danger limit in this region, for gaps only; by default that of the main table."""
+    """Lower danger limit in this region, as alert_below."""
 
     deadband: float | None = None
     """Deadband in this region; by default `deadband` of the main table."""
 
 
 LIMITS = ("alert", "danger", "alert_below", "danger_below", "deadband")
-"""Keys of the limits of a table; all but gaps lack the keys of lower limits."""
+"""Keys of the limits of a table; only some quantities have lower limits."""
 
 
 class LimitSettings(WatchSettings):
@@ -262,11 +262,51 @@ class TemperatureLimitSettings(LimitSettings):
     too hot at standstill."""
 
 
+class PadExcessLimitSettings(LimitSettings):
+    """Alarm limits of the temperature of a bearing's hottest pad above the mean of its pads."""
+
+    alert: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
+    """Value above which the alarm is an alert, K; example: 8.0."""
+
+    danger: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
+    """Value above which the alarm is a danger, K; must be above alert; example: 15.0."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=100.0)] = 0.5
+    """Amount by which the value must fall below a limit for the alarm to return, K."""
+
+
+class TwoSidedLimitSettings(LimitSettings):
+    """Alarm limits above and below; at least one of the four must be given."""
+
+    alert_below: float | None
+    danger_below: float | None
+
+    unit_words: ClassVar[str] = ""
+
+    def _check_limits(self) -> None:
+        named = ("danger_below", "alert_below", "alert", "danger")
+        given = [(key, limit) for key in named if (limit := getattr(self, key)) is not None]
+        if not given:
+            keys = "alert, danger, alert_below and danger_below"
+            raise MisfitError(f"at least one of {keys} must be given", "alert")
+        for (lower, low), (upper, high) in pairwise(given):
+            if low >= high:
+                raise MisfitError(f"must be above {lower} = {low:g}", upper)
+        low_side = [limit for key, limit in given if key.endswith("below")]
+        high_side = [limit for key, limit in given if not key.endswith("below")]
+        half_range = (high_side[0] - low_side[-1]) / 2.0 if low_side and high_side else math.inf
+        if self.deadband >= half_range:
+            words = f"must be below half the allowed range, {half_range:g} {self.unit_words}"
+            raise MisfitError(words.rstrip(), "deadband")
+
+
 GapUm = Annotated[float, Field(gt=0.0, le=10_000.0)]
 
 
-class GapLimitSettings(LimitSettings):
+class GapLimitSettings(TwoSidedLimitSettings):
     """Upper and lower alarm limits of the mean gap of each probe."""
+
+    unit_words: ClassVar[str] = "µm"
 
     alert: GapUm | None = None
     """Gap above which the alarm is an alert, µm; example: 2400.0."""
@@ -284,23 +324,32 @@ class GapLimitSettings(LimitSettings):
     """Amount by which the gap must be within a limit for the alarm to return, µm."""
 
     def _check_limits(self) -> None:
-        named = ("danger_below", "alert_below", "alert", "danger")
-        given = [(key, limit) for key in named if (limit := getattr(self, key)) is not None]
-        if not given:
-            keys = "alert, danger, alert_below and danger_below"
-            raise MisfitError(f"at least one of {keys} must be given", "alert")
-        for (lower, low), (upper, high) in pairwise(given):
-            if low >= high:
-                raise MisfitError(f"must be above {lower} = {low:g}", upper)
-        low_side = [limit for key, limit in given if key.endswith("below")]
-        high_side = [limit for key, limit in given if not key.endswith("below")]
-        half_range = (high_side[0] - low_side[-1]) / 2.0 if low_side and high_side else math.inf
-        if self.deadband >= half_range:
-            raise MisfitError(
-                f"must be below half the allowed range, {half_range:g} µm", "deadband"
-            )
-        if high_side and self.deadband >= high_side[0]:
-            raise MisfitError(f"must be below the lowest limit, {high_side[0]:g} µm", "deadband")
+        super()._check_limits()
+        lowest = self.alert if self.alert is not None else self.danger
+        if lowest is not None and self.deadband >= lowest:
+            raise MisfitError(f"must be below the lowest limit, {lowest:g} µm", "deadband")
+
+
+class SlowLimitSettings(TwoSidedLimitSettings):
+    """Upper and lower alarm limits of a recorded slow channel, in the unit of the channel."""
+
+    alert: float | None = None
+    """Value above which the alarm is an alert; example: 80.0."""
+
+    danger: float | None = None
+    """Value above which the alarm is a danger; must be above alert; example: 90.0."""
+
+    alert_below: float | None = None
+    """Value below which the alarm is an alert; example: 50.0."""
+
+    danger_below: float | None = None
+    """Value below which the alarm is a danger; must be below alert_below; example: 45.0."""
+
+    deadband: Annotated[float, Field(ge=0.0)] = 0.0
+    """Amount by which the value must be within a limit for the alarm to return; example: 1.0."""
+
+    states: StateNames = EVERY_STATE
+    """Operating states in which the limits apply; all states by default."""
 
 
 Boundary = Annotated[float, Field(gt=0.0, le=10_000.0)]

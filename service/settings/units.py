@@ -1,5 +1,6 @@
 """Settings of a generating unit; checks that source, channels and alarms are consistent."""
 
+import math
 from collections.abc import Iterable
 from typing import Annotated, Literal, Self
 
@@ -7,6 +8,7 @@ from pydantic import Field, StringConstraints, model_validator
 
 from core.alarms.alarm import PLANT
 from core.samples.calibration import BLOCK_SAMPLES
+from core.spectra.resolution import USUAL_DEG, angles_of
 from service.settings.alarms import BearingAlarmSettings
 from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
 from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS, BearingSettings
@@ -57,6 +59,12 @@ def _require_no_waveforms(alarms: BearingAlarmSettings, at: tuple[str | int, ...
         for key in keys:
             if getattr(table, key) is not None:
                 raise MisfitError(words, *place, key)
+
+
+MIN_BETWEEN_DEG = 30.0
+MIN_SINE = math.sin(math.radians(MIN_BETWEEN_DEG)) - 1e-9
+"""Smallest angle between two transducers, and its sine; below it, errors grow more than 2.7 times
+in the resolution into x and y."""
 
 
 class UnitSettings(Settings):
@@ -144,6 +152,7 @@ class UnitSettings(Settings):
             self._check_slow(bearing.oil_temperature, "degC", "bearing", n, "oil_temperature")
             for key in GAP_KEYS:
                 self._check_slow(getattr(bearing, key), "mm", "bearing", n, key)
+        self._check_recorded()
         self._check_key_phase()
         self._check_slow(self.speed_channel, "r/min", "speed_channel")
         self._check_slow(self.power_channel, "MW", "power_channel")
@@ -175,6 +184,39 @@ class UnitSettings(Settings):
                     "must be a vibration channel, not a key_phase channel", "bearing", number, key
                 )
         refuse_twice(("bearing", number, key, id_) for key, id_ in used)
+        for pair in (CHANNEL_KEYS[:2], CHANNEL_KEYS[2:]):
+            self._check_angles(bearing, pair)
+        for key in OPTIONAL_CHANNEL_KEYS:
+            if id_ := getattr(bearing, key):
+                row = self._row(id_)
+                if self.channel[row].angle_deg is not None:
+                    words = f"does not apply to {key} of {bearing.id}, opposite another probe"
+                    raise MisfitError(words, "channel", row, "angle_deg")
+
+    def _row(self, id_: str) -> int:
+        return [channel.id for channel in self.channel].index(id_)
+
+    def _check_angles(self, bearing: BearingSettings, keys: tuple[str, ...]) -> None:
+        """Check that two transducers at other angles than 0° and 90° can be resolved into x, y."""
+        rows = [self._row(getattr(bearing, key)) for key in keys]
+        first, second = (self.channel[row] for row in rows)
+        angles_deg = angles_of(first.angle_deg, second.angle_deg)
+        if angles_deg == USUAL_DEG:
+            return
+        place, between_deg = f"{keys[1]} of {bearing.id}", angles_deg[1] - angles_deg[0]
+        at = ("channel", rows[0] if second.angle_deg is None else rows[1], "angle_deg")
+        if abs(math.sin(math.radians(between_deg))) < MIN_SINE:
+            raise MisfitError(
+                f"makes {keys[0]} and {place} nearly parallel, {between_deg:g}° apart; at least"
+                f" {MIN_BETWEEN_DEG:g}° are needed to find x and y",
+                *at,
+            )
+        if first.transducer is not second.transducer:
+            words = f"requires transducers of one kind as {keys[0]} and {place}"
+            raise MisfitError(words, *at)
+        if isinstance(self.source, ModbusVectorSettings):
+            words = 'does not apply to a source of kind "modbus_vector"'
+            raise MisfitError(f"{words}, whose amplitudes cannot be resolved into x and y", *at)
 
     def _key_phases(self) -> list[str]:
         return [c.id for c in self.channel if c.transducer is Transducer.KEY_PHASE]
@@ -191,6 +233,28 @@ class UnitSettings(Settings):
             raise MisfitError(_not_among(units), *at)
         if id_ is not None and units[id_] != unit:
             raise MisfitError(f"must be a slow channel in {unit}, not {units[id_]}", *at)
+
+    def _check_recorded(self) -> None:
+        """Check that the slow channels with a quantity name bearings, and differ in position."""
+        taken: list[tuple[str, str | None]] = []
+        angles: set[tuple[str | None, float]] = set()
+        for n, channel in enumerate(self.slow_channel):
+            slow, at = channel.recorded, ("slow_channel", n)
+            if slow is None:
+                continue
+            if slow.bearing not in (None, *(bearing.id for bearing in self.bearing)):
+                raise MisfitError("is not a bearing of the unit", *at, "bearing")
+            owners = [owner for reading, owner in taken if reading == slow.reading]
+            if owners and (slow.bearing is None or {None, slow.bearing} & set(owners)):
+                words = f"has the quantity and position of another channel, {slow.reading}"
+                raise MisfitError(f"{words}; give each its own position", *at, "position")
+            taken.append((slow.reading, slow.bearing))
+            if slow.angle_deg is not None:
+                angle = (slow.bearing, slow.angle_deg % 360.0)
+                if angle in angles:
+                    words = "is the angle of another pad of this bearing"
+                    raise MisfitError(words, *at, "angle_deg")
+                angles.add(angle)
 
     def _check_alarms(self) -> None:
         if self.id == PLANT:

@@ -123,7 +123,7 @@ def _delete_rollups(width_s: int, writer: Connection, series: int, before_ns: in
     span = _next_cells(writer, series, width_s, (deleted.of(width_s), limit_ns))
     if span[0] >= span[1] or writer.execute(REDONE, (series, *span)).fetchone():
         return Step.NONE  # late readings are merged first
-    fine = select_cells(writer, series, width_ns, span, rolled_columns())
+    fine = select_cells(writer, series, width_ns, span, rolled_columns(writer))
     wider_ns = [wider for wider in WIDTHS_NS if wider > width_ns]
     if fine is None or not all(_agrees(writer, series, fine, w, span) for w in wider_ns):
         return Step.BLOCKED
@@ -275,7 +275,7 @@ def _verified_until(writer: Connection, series: int, span: Span) -> int:
 
 def _agrees(writer: Connection, series: int, fine: Cells, width_ns: int, span: Span) -> bool:
     wanted = fine.gathered(width_ns)
-    found = select_cells(writer, series, width_ns, span, rolled_columns())
+    found = select_cells(writer, series, width_ns, span, rolled_columns(writer))
     return found is not None and _is_same(found, wanted)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.monitor.catalogue import Quantity
+from core.monitor.catalogue import BY_NAME, CATALOGUE, Quantity, quantity_named
 from core.quality import Level, Quality, Reading, Reason
 from service.store.database import Connection
 
@@ -70,6 +70,16 @@ def columns_of(quantities: Iterable[Quantity]) -> tuple[str, ...]:
     """Return the column names of quantities and of their stored uncertainties."""
     suffixes = {False: ("",), True: ("", U_RANDOM, U_SYSTEMATIC)}
     return tuple(q.name + suffix for q in quantities for suffix in suffixes[q.keeps_uncertainty])
+
+
+FIXED_COLUMNS = columns_of(CATALOGUE)
+"""Columns of the quantities that every bearing has."""
+
+
+def other_columns(names: Iterable[str]) -> tuple[str, ...]:
+    """Return the columns of the quantities among `names` that not every bearing has, in order."""
+    found = {name: quantity_named(name) for name in names if name not in BY_NAME}
+    return columns_of(quantity for _, quantity in sorted(found.items()) if quantity is not None)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from pathlib import Path
 from core.alarms.alarm import Alarm, AlarmNews
 from core.change.film_judge import FilmNews
 from core.monitor.assessment import Assessment
-from core.monitor.catalogue import CATALOGUE
 from core.samples.gaps import Gap, Reach
 from service.store.alarms import insert_alarms, select_alarms, select_events
 from service.store.audit import AuditChain, AuditStore
@@ -29,7 +28,14 @@ from service.store.references import GapReferenceStore, VectorReferenceStore
 from service.store.retention import RetentionStore
 from service.store.rollups.coverage import read_trend
 from service.store.rollups.gathering import RollupStore
-from service.store.series import Layout, columns_of, remember_layout, series_of, unique_time_ns
+from service.store.series import (
+    FIXED_COLUMNS,
+    Layout,
+    other_columns,
+    remember_layout,
+    series_of,
+    unique_time_ns,
+)
 from service.store.sharing import (
     Commands,
     StreamPosition,
@@ -118,10 +124,9 @@ class Store:
         self.waveforms = WaveformStore(database.writing, self._reader)
         self.commands = Commands(database.writing, self._reader)
         self.integrity = Integrity(self._chain)
-        self._layout = Layout.of(columns_of(CATALOGUE))
+        self._layouts: dict[tuple[str, ...], tuple[Layout, int]] = {}
         if not is_read_only:
-            with database.writing() as writer:
-                self._layout_id = remember_layout(writer, self._layout)
+            self._layout_of(())
 
     @property
     def kind(self) -> str:
@@ -156,9 +161,10 @@ class Store:
         StoreError
             If the results were not written, or the outcome is unknown.
         """
+        layouts = [self._layout_of(other_columns(each.readings)) for each in assessments]
         with self._writing() as writer:
-            for assessment in assessments:
-                writer.execute(INSERT_ASSESSMENT, self._row(writer, assessment))
+            for assessment, layout in zip(assessments, layouts, strict=True):
+                writer.execute(INSERT_ASSESSMENT, self._row(writer, assessment, *layout))
             insert_spectra(writer, assessments, self._spectra_limits)
             writer.executemany(INSERT_GAP, [_gap_row(gap) for gap in gaps])
             insert_alarms(writer, alarms, self._chain, self._address)
@@ -232,8 +238,18 @@ class Store:
         with self._reader() as reader:
             return select_events(reader, query)
 
-    def _row(self, writer: Connection, assessment: Assessment) -> tuple[object, ...]:
-        values, qualities = self._layout.encode(assessment.readings)
+    def _layout_of(self, others: tuple[str, ...]) -> tuple[Layout, int]:
+        """Return the layout of the fixed and `others` columns, and its stored number."""
+        if others not in self._layouts:
+            layout = Layout.of((*FIXED_COLUMNS, *others))
+            with self.database.writing() as writer:
+                self._layouts[others] = layout, remember_layout(writer, layout)
+        return self._layouts[others]
+
+    def _row(
+        self, writer: Connection, assessment: Assessment, layout: Layout, layout_id: int
+    ) -> tuple[object, ...]:
+        values, qualities = layout.encode(assessment.readings)
         condition, window = assessment.condition, assessment.window
         series = series_of(writer, assessment.unit, assessment.bearing)
         measured = (window.epoch, window.first_index, window.stop_index)
@@ -246,7 +262,7 @@ class Store:
             assessment.speed_source.value,
             assessment.readings["eccentricity_ratio"].value,
             assessment.readings["oil_temperature_c"].value,
-            self._layout_id,
+            layout_id,
             values,
             qualities,
             assessment.estimators["xx"],

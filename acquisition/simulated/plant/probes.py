@@ -20,6 +20,14 @@ from core.machine.channel import Channel, Measurand
 from core.machine.unit import Unit
 
 
+def along(channel: Channel, axis: int) -> FloatArray:
+    """Return the weights (2,) of x and y in the reading of a channel, by default on `axis`."""
+    if channel.angle_deg is None:
+        return np.array([1.0 - axis, axis])
+    theta = np.deg2rad(channel.angle_deg)
+    return np.array([np.cos(theta), np.sin(theta)])
+
+
 @dataclass(frozen=True)
 class Probe:
     """Proximity probe at the shaft, which measures gap or displacement.
@@ -53,8 +61,8 @@ class Probe:
 
     def gap_um(self, now: Conditions) -> float:
         """Return the mean gap in µm under given conditions, including the position error."""
-        place = self.bearing, self.axis
-        shift_um = float(now.centre_um[place] + now.position_error_um[place])
+        centre_um = now.centre_um[self.bearing] + now.position_error_um[self.bearing]
+        shift_um = float(along(self.channel, self.axis) @ centre_um)
         growth_um = float(now.gap_growth_um[self.bearing])
         return self.reference_um + self.channel.direction * shift_um + growth_um
 
@@ -155,7 +163,9 @@ def output_map(machine: Unit, parameters: RotorParameters, matrices: RotorMatric
             raise ConfigError(
                 f"channel {channel.id!r} of the {part} cannot measure {channel.measurand.value}"
             )
-        rows.append(channel.direction * maps[part, channel.measurand][row])
+        row -= (axis := row % 2)
+        weights = along(channel, axis)
+        rows.append(channel.direction * weights @ maps[part, channel.measurand][row : row + 2])
     return np.stack(rows)
 
 

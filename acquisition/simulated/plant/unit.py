@@ -1,5 +1,6 @@
 """Sample feed of a simulated generating unit, with its slow values and its true state."""
 
+import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,10 +14,32 @@ from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.plant import CHUNK_SAMPLES, SimulatedPlant
 from acquisition.simulated.plant.probes import probes
 from acquisition.simulated.plant.scenario import Course, Scenario
+from core.machine.slow_channel import PAD_TEMPERATURE
 from core.machine.unit import Unit
 from core.samples.blocks import SampleBlock, SideValues
 from core.samples.calibration import UnitCalibration
 from core.units import NS_PER_S, rad_s_from_rpm
+
+SLOW_VALUES = {
+    PAD_TEMPERATURE: (12.0, 3.0),  # above the oil
+    "oil_inlet_temperature": (38.0, 2.0),
+    "oil_outlet_temperature": (44.0, 3.0),
+    "cooling_water_inlet_temperature": (22.0, 0.0),
+    "cooling_water_outlet_temperature": (24.0, 3.0),
+    "cold_air_temperature": (30.0, 5.0),
+    "hot_air_temperature": (35.0, 25.0),
+    "stator_temperature": (40.0, 45.0),
+    "rotor_temperature": (42.0, 48.0),
+    "head": (119.0, -1.5),
+    "gate_opening": (12.0, 72.0),
+    "excitation_current": (1600.0, 1900.0),
+    "excitation_voltage": (140.0, 190.0),
+}
+"""Value of each slow quantity without load, and its change up to `RATED_POWER_MW`."""
+
+RATED_POWER_MW = 700.0
+PAD_LOAD_K = 10.0
+"""Rise of the temperature of a pad at an eccentricity ratio of 1 towards it."""
 
 
 def slow_values(machine: Unit, now: Conditions, speed_rpm: float) -> dict[str, float]:
@@ -27,6 +50,14 @@ def slow_values(machine: Unit, now: Conditions, speed_rpm: float) -> dict[str, f
     }
     oil_c = now.oil_temperature_c + now.oil_temperature_error_c
     values |= {b.oil_temperature: float(c) for b, c in zip(machine.bearings, oil_c, strict=True)}
+    for index, bearing in enumerate(machine.bearings):
+        load = complex(*now.centre_um[index]) / bearing.clearance_um
+        for slow in machine.slow_channels_of(bearing.id):
+            at_rest, at_rated = SLOW_VALUES[slow.quantity]
+            values[slow.id] = at_rest + at_rated * now.active_power_mw / RATED_POWER_MW
+            if slow.quantity == PAD_TEMPERATURE:
+                side = cmath.rect(1.0, -math.radians(slow.angle_deg or 0.0))
+                values[slow.id] += float(oil_c[index]) + PAD_LOAD_K * (load * side).real
     for probe in probes(machine):
         from_reference_um = probe.gap_um(now) - probe.reference_um
         shown_um = probe.reference_um + float(now.gain[probe.row]) * from_reference_um

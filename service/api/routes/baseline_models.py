@@ -187,8 +187,12 @@ class BaselineCellsModel(ApiModel):
     n_days: list[int]
     """Number of days with readings in the cell."""
 
-    stiffness_n_per_m: list[float]
-    """Median stiffness of the readings, or of the fitted surface without readings, N/m."""
+    stiffness_n_per_m: list[float | None]
+    """Median stiffness of the readings, or of the fitted surface without readings, N/m; null if the
+    bracket stiffness was unknown."""
+
+    stiffness_of_kb: list[float | None]
+    """The same stiffness as a ratio to the bracket stiffness; null if the latter was known."""
 
     scatter_percent: list[float]
     """Robust standard deviation of single readings about the fitted stiffness surface, %."""

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Path, Response
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import CellStatistics
+from core.baseline.history import absolute_and_ratio
 from core.condition.cells import CellGrid
 from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
@@ -30,7 +31,7 @@ from service.api.routes.baseline_models import (
     RenewModel,
 )
 from service.api.routes.films import watched_place
-from service.api.values import bounds
+from service.api.values import bounds, listed
 from service.live.commands import (
     Accept,
     BaselineAction,
@@ -122,6 +123,8 @@ def _cells(cells: list[CellStatistics], grid: CellGrid) -> BaselineCellsModel:
     attitude = (
         None if grid.attitude_width_deg is None else _bounds(cells, 2, grid.attitude_width_deg)
     )
+    ln_k = np.array([cell.location for cell in cells])
+    k, of_kb = absolute_and_ratio(np.exp(ln_k), ln_k)
     return BaselineCellsModel.of(
         eccentricity_low=low_e,
         eccentricity_high=high_e,
@@ -129,7 +132,8 @@ def _cells(cells: list[CellStatistics], grid: CellGrid) -> BaselineCellsModel:
         oil_temperature_high_c=high_c,
         attitude_low_deg=attitude[0] if attitude else None,
         attitude_high_deg=attitude[1] if attitude else None,
-        stiffness_n_per_m=np.exp([cell.location for cell in cells]).tolist(),
+        stiffness_n_per_m=listed(k),
+        stiffness_of_kb=listed(of_kb),
         scatter_percent=[100.0 * cell.scatter for cell in cells],
         surface_std_percent=[100.0 * cell.surface_std for cell in cells],
         **{name: [getattr(cell, name) for cell in cells] for name in CELL_FIELDS},

@@ -8,7 +8,8 @@ from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
 from core.monitor.assessment import Assessment
-from core.monitor.catalogue import BY_NAME
+from core.monitor.catalogue import quantity_named, quantity_of
+from core.stiffness.bracket_ratio import reported_name
 from core.stiffness.estimators import ESTIMATORS
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, QuantityName, UnitId
@@ -72,8 +73,9 @@ class BearingModel(ApiModel):
     name: str | None
     """Display name of the bearing; null without a name."""
 
-    bracket_stiffness_n_per_m: float
-    """Radial stiffness of the bearing bracket, N/m."""
+    bracket_stiffness_n_per_m: float | None
+    """Radial stiffness of the bearing bracket, N/m; null if unknown. Film coefficients are then
+    reported as ratios to it."""
 
     clearance_um: float
     """Radial clearance in operation, µm."""
@@ -275,7 +277,8 @@ def bearing_router(context: Context) -> APIRouter:
     ) -> Response:
         """Return the uncertainty budget of a quantity in the newest result."""
         context.bearing(unit, bearing)
-        if quantity not in BY_NAME or not BY_NAME[quantity].has_uncertainty:
+        known = quantity_named(quantity)
+        if known is None or not known.has_uncertainty:
             detail = f"quantity {quantity!r} has no uncertainty budget; see /api/v1/quantities"
             raise ProblemError(404, "No uncertainty budget", detail)
 
@@ -316,14 +319,14 @@ def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
         axes = quantity.split("_")[1]
         estimator = assessment.estimators[axes]
         source = ESTIMATORS[estimator].stiffness.format(axes=axes) if estimator else quantity
-    budget = assessment.budgets.get(source)
+    budget = assessment.budgets.get(reported_name(assessment.budgets, source))
     if budget is None:
         return None
-    low, high = budget.interval
+    quantity, (low, high) = reported_name(assessment.readings, quantity), budget.interval
     lines = sorted(budget.lines, key=lambda line: line.contribution, reverse=True)
     return BudgetModel.of(
         budget,
-        BY_NAME[quantity],
+        quantity_of(quantity),
         quantity=quantity,
         time=assessment.time_ns,
         uncertainty=UncertaintyModel.of(budget, low_95=low, high_95=high),

@@ -21,7 +21,7 @@ from service.live.current_state import LiveUnits
 from service.live.samples import SampleWindow, newest_blocks, sample_window
 from service.live.status import HELD_S
 from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS
-from service.settings.channels import ChannelSettings, SlowChannelSettings
+from service.settings.channels import ChannelSettings, SlowChannelSettings, SlowUnit
 from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.units import UnitSettings
 
@@ -101,8 +101,14 @@ class SlowChannelModel(ApiModel):
     id: Annotated[str, Field(examples=["ujb_oil_temperature"])]
     """Identifier of the channel within the unit."""
 
-    unit: Literal["r/min", "MW", "degC", "mm"]
+    unit: SlowUnit
     """Unit of the readings."""
+
+    reading: str | None
+    """Name of the quantity in results and trends; null if the channel is not recorded as one."""
+
+    angle_deg: float | None
+    """Angle of a pad around the bearing, degrees from x towards y; null if unknown."""
 
     minimum: float
     """Lowest valid reading, in the unit of the readings."""
@@ -260,7 +266,9 @@ def _slow(
 ) -> SlowChannelModel:
     why = why if block is None else Reason.NOT_MEASURED
     reading = (None if block is None else block.slow.get(channel.id)) or missing(why)
-    return SlowChannelModel.of(channel, reading, used_by=used_by)
+    recorded = channel.recorded
+    name = None if recorded is None else recorded.reading
+    return SlowChannelModel.of(channel, reading, used_by=used_by, reading=name)
 
 
 def _uses(settings: UnitSettings) -> dict[str, list[str]]:

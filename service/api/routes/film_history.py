@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from fastapi import APIRouter, Query, Request, Response
 
-from core.baseline.history import ReadingOutcome
+from core.baseline.history import ReadingOutcome, absolute_and_ratio
 from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
 from service.api.answers import in_thread
@@ -45,10 +45,16 @@ class FilmSeriesModel(ApiModel):
     """Readings of a film in x or y; every list has one value per time, null if unknown."""
 
     stiffness_n_per_m: list[float | None]
-    """Stiffness, N/m."""
+    """Stiffness, N/m; null while the bracket stiffness was unknown."""
+
+    stiffness_of_kb: list[float | None]
+    """Stiffness as a ratio to the bracket stiffness; null while the latter was known."""
 
     u_random_n_per_m: list[float | None]
     """Random standard uncertainty of the stiffness, N/m."""
+
+    u_random_of_kb: list[float | None]
+    """Random standard uncertainty of this ratio."""
 
     shaft_um_pk: list[float | None]
     """1× amplitude of the shaft relative to the bearing, µm zero-to-peak."""
@@ -176,10 +182,14 @@ def _series(found: FilmHistory, direction: int, rows: Rows) -> FilmSeriesModel:
     def column(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         return np.asarray(values[direction, rows])
 
-    stiffness = np.exp(column(history.ln_k))
+    ln_k = column(history.ln_k)
+    k, of_kb = absolute_and_ratio(np.exp(ln_k), ln_k)
+    u_k, u_of_kb = absolute_and_ratio(np.exp(ln_k) * column(history.u_random), ln_k)
     return FilmSeriesModel(
-        stiffness_n_per_m=listed(stiffness),
-        u_random_n_per_m=listed(stiffness * column(history.u_random)),
+        stiffness_n_per_m=listed(k),
+        stiffness_of_kb=listed(of_kb),
+        u_random_n_per_m=listed(u_k),
+        u_random_of_kb=listed(u_of_kb),
         shaft_um_pk=listed(column(history.shaft_um_pk)),
         bearing_um_pk=listed(column(history.bearing_um_pk)),
         evidence=[EVIDENCE_NAMES[ReadingOutcome(code)] for code in column(history.outcome)],
@@ -192,6 +202,7 @@ def _series(found: FilmHistory, direction: int, rows: Rows) -> FilmSeriesModel:
 
 UNITS = {
     "_n_per_m": "N/m",
+    "_of_kb": "1",
     "_um_pk": "µm 0-pk",
     "_percent": "%",
     "_rpm": "r/min",

@@ -3,13 +3,14 @@
 import math
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from typing import Annotated, Literal, cast
 
 from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
-from core.baseline.history import DIRECTIONS
+from core.baseline.history import DIRECTIONS, are_ratios
 from core.change.decision import Decision, Verdict
 from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading
@@ -128,6 +129,12 @@ class FilmDirectionModel(ApiModel):
     """Stiffness that the baseline expects under the condition of the newest reading, N/m; null if
     this reading was not compared."""
 
+    stiffness_of_kb: float | None
+    """Stiffness as a ratio to the bracket stiffness; null if the latter is known."""
+
+    expected_of_kb: float | None
+    """Expected stiffness as such a ratio; null if the bracket stiffness is known."""
+
     cause: FilmCauseModel | None
     """Cause of the change while a level is in force; otherwise null."""
 
@@ -202,6 +209,12 @@ class FilmWordModel(ApiModel):
     expected_n_per_m: float | None
     """Stiffness that the baseline expects, N/m; null if this reading was not compared."""
 
+    stiffness_of_kb: float | None
+    """Stiffness as a ratio to the bracket stiffness; null if the latter is known."""
+
+    expected_of_kb: float | None
+    """Expected stiffness as such a ratio; null if the bracket stiffness is known."""
+
 
 class FilmBriefModel(ApiModel):
     """Summary of the oil film of a bearing."""
@@ -221,6 +234,12 @@ class FilmBriefModel(ApiModel):
 
 CURRENT_PERIODS = 2.5
 """Maximum time from a current reading to the newest result, in reading periods."""
+
+STIFFNESS_NAMES = (
+    ("stiffness_n_per_m", "expected_n_per_m"),
+    ("stiffness_of_kb", "expected_of_kb"),
+)
+"""Fields of stiffness and expected stiffness, for known and for unknown bracket stiffness."""
 
 NOT_LEARNED, ATTITUDE_NOT_LEARNED = "condition_not_learned", "attitude_not_learned"
 
@@ -353,9 +372,7 @@ def _directions(seen: WatchedFilm) -> tuple[FilmDirectionModel, FilmDirectionMod
 
 def _unread(reason: str, level: LevelHeldName | None) -> FilmDirectionModel:
     """Return the state in a direction without a current reading: a reason and the alarm level."""
-    unknown = dict.fromkeys(
-        ("change", "deviation", "stiffness_n_per_m", "expected_n_per_m", "cause")
-    )
+    unknown = dict.fromkeys(("change", "deviation", *chain(*STIFFNESS_NAMES), "cause"))
     return FilmDirectionModel.of(verdict="no_reading", reason=reason, level=level, **unknown)
 
 
@@ -368,14 +385,16 @@ def _direction(seen: WatchedFilm, news: FilmNews, row: int) -> FilmDirectionMode
         level=level_name(finding.level),
         change=_change(finding, news.decisions[row], seen.rules),
         deviation=_deviation(finding),
-        stiffness_n_per_m=_stiffness(ln_k),
-        expected_n_per_m=_stiffness(ln_expected),
+        **_stiffness(ln_k, ln_expected),
         cause=finding.attribution,
     )
 
 
-def _stiffness(ln_k: float) -> float | None:
-    return None if math.isnan(ln_k) else math.exp(ln_k)
+def _stiffness(ln_k: float, ln_expected: float) -> dict[str, float | None]:
+    """Return stiffness and expected stiffness; ratios to an unknown k_b under their own names."""
+    found = [None if math.isnan(each) else math.exp(each) for each in (ln_k, ln_expected)]
+    names = STIFFNESS_NAMES[bool(are_ratios(ln_k))]
+    return dict.fromkeys(chain(*STIFFNESS_NAMES)) | dict(zip(names, found, strict=True))
 
 
 def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding, row: int) -> str:

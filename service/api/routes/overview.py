@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
 from core.quality import Level, Reading
+from core.stiffness.bracket_ratio import reported_name
 from core.stiffness.estimators import is_reversed
 from service.api.auth.declared import subject_router
 from service.api.context import Context
@@ -34,7 +35,7 @@ SHOWN = (
     "eccentricity_ratio",
     "oil_temperature_c",
 )
-"""Quantities that the overview contains."""
+"""Quantities that the overview contains; stiffness is a ratio where the bracket is unknown."""
 
 Revision = Annotated[str, Field(examples=["9f86d081-412"])]
 
@@ -224,7 +225,8 @@ class Overview:
     def _bearing(self, unit: str, settings: BearingSettings) -> TileModel:
         bearing = settings.id
         current = self._context.live.current(unit, bearing)
-        readings = {name: _brief(name, current.readings[name]) for name in SHOWN}
+        shown = [reported_name(current.readings, name) for name in SHOWN]
+        readings = {name: _brief(name, current.readings[name]) for name in shown}
         bad = (r.quality for r in current.readings.values() if r.quality.level is Level.BAD)
         return TileModel.of(
             result_model(current, bearing, readings),

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from core.monitor.catalogue import CATALOGUE
+from core.monitor.catalogue import CATALOGUE, quantity_named
 from core.samples.gaps import Gap
 from core.units import ns_from_s
 from service.api.auth.declared import Reach, needs, subject_router
@@ -255,8 +255,14 @@ def plant_router(context: Context) -> APIRouter:
         dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
     )
     async def quantities() -> list[QuantityModel]:
-        """List name, unit and description of all quantities of a bearing."""
-        return [QuantityModel.of(quantity) for quantity in CATALOGUE]
+        """List name, unit and description of all quantities of a bearing.
+
+        The slow quantities that the plant file records come last.
+        """
+        recorded = (slow.recorded for unit in context.units.values() for slow in unit.slow_channel)
+        names = dict.fromkeys(slow.reading for slow in recorded if slow is not None)
+        others = filter(None, map(quantity_named, names))
+        return [QuantityModel.of(quantity) for quantity in (*CATALOGUE, *others)]
 
     @router.get("/sources", summary="Health of each source")
     async def sources() -> list[SourceHealthModel]:

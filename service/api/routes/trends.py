@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
 from core.condition.cells import CellGrid
-from core.monitor.catalogue import BY_NAME
+from core.monitor.catalogue import Quantity, quantity_named
 from core.units import NS_PER_S, ns_from_s
 from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
@@ -51,13 +51,18 @@ def trend_table(
     if groups is not None:
         names = [group.name for group in groups for _ in group.trend.time_ns]
         columns.insert(0, Column("group", "text", names))
-    for name in filter(BY_NAME.__contains__, trend.series):
-        columns += _columns(name, [part.series for part in parts])
+    for quantity in _quantities(trend.series):
+        columns += _columns(quantity, [part.series for part in parts])
     return columns
 
 
-def _columns(name: str, parts: Sequence[Mapping[str, TrendSeries]]) -> Iterator[Column]:
-    unit, own = BY_NAME[name].unit, [part[name] for part in parts]
+def _quantities(names: Iterable[str]) -> Iterator[Quantity]:
+    """Yield the quantities among column names, which also name uncertainties."""
+    yield from filter(None, map(quantity_named, names))
+
+
+def _columns(quantity: Quantity, parts: Sequence[Mapping[str, TrendSeries]]) -> Iterator[Column]:
+    name, unit, own = quantity.name, quantity.unit, [part[quantity.name] for part in parts]
     for kind in ("minimum", "maximum", "mean"):
         values = _joined(getattr(series, kind) for series in own)
         yield Column(f"{name}_{kind}", "number", values, unit)
@@ -187,21 +192,21 @@ def _group(group: TrendGroup) -> dict[str, object]:
 
 
 def _columns_of(trend: Trend) -> dict[str, object]:
-    series = {name: _series(name, trend.series) for name in trend.series if name in BY_NAME}
+    series = {each.name: _series(each, trend.series) for each in _quantities(trend.series)}
     bucket_s = trend.bucket_ns and trend.bucket_ns / NS_PER_S
     return {"bucket_s": bucket_s, "time": [*map(rfc3339, trend.time_ns)], "series": series}
 
 
 def trend_columns(quantities: Iterable[str]) -> tuple[str, ...]:
     """Return the names of the stored columns of quantities: values, and uncertainties if any."""
-    return columns_of(BY_NAME[name] for name in quantities)
+    return columns_of(_quantities(quantities))
 
 
-def _series(name: str, columns: Mapping[str, TrendSeries]) -> dict[str, object]:
-    series = columns[name]
+def _series(quantity: Quantity, columns: Mapping[str, TrendSeries]) -> dict[str, object]:
+    name, series = quantity.name, columns[quantity.name]
     random, systematic = columns.get(name + U_RANDOM), columns.get(name + U_SYSTEMATIC)
     return {
-        "unit": BY_NAME[name].unit,
+        "unit": quantity.unit,
         "minimum": series.minimum,
         "maximum": series.maximum,
         "mean": series.mean,
@@ -346,7 +351,7 @@ def _page_start_ns(cursor: str | None, group_by: GroupName | None, start_ns: int
 
 def _known(quantities: list[str]) -> tuple[str, ...]:
     for name in quantities:
-        if name not in BY_NAME:
+        if quantity_named(name) is None:
             detail = f"quantity {name!r} is not in the catalogue; see /api/v1/quantities"
             raise ProblemError(422, "Wrong parameter", detail, "quantity")
     return tuple(dict.fromkeys(quantities))

@@ -276,6 +276,7 @@ def rules_of(
             (unit.id, bearing.id): bearing.bracket_stiffness_n_per_m
             for unit in units
             for bearing in unit.bearing
+            if bearing.bracket_stiffness_n_per_m is not None
         },
         events=events,
         author=author,

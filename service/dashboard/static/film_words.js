@@ -1,6 +1,6 @@
 /** Films compared with their baselines, in words for people, and how each verdict looks. */
 
-import { formatFixed, formatQuantity } from "./format.js";
+import { formatFixed, stiffnessShown } from "./format.js";
 import { reasonSentence } from "./words.js";
 
 const VERDICTS = {
@@ -71,10 +71,17 @@ export function signedPercent(percent, decimals = 1) {
 }
 
 /** `Now 0.231, expected 0.330 GN/m (−30.0 %).`; nothing without a reading. */
-export function nowSentence({ stiffness_n_per_m: stiffness, expected_n_per_m: expected, deviation_percent: deviation }) {
-  if (stiffness === null) return "";
-  const gn = (value) => formatQuantity("stiffness_xx_n_per_m", value);
-  return deviation === null ? `Now ${gn(stiffness)} GN/m.` : `Now ${gn(stiffness)}, expected ${gn(expected)} GN/m (${signedPercent(deviation)}).`;
+export function nowSentence(film) {
+  const { value, unit } = stiffnessShown(film.stiffness_n_per_m, film.stiffness_of_kb);
+  if (value === null) return "";
+  const now = `Now ${formatFixed(value, 3)}`;
+  return film.deviation_percent === null ? `${now} ${unit}.` : `${now}, ${expectedWords(film)} (${signedPercent(film.deviation_percent)}).`;
+}
+
+/** `expected 0.330 GN/m`; nothing where nothing is. */
+export function expectedWords({ expected_n_per_m: expected, expected_of_kb: ratio }) {
+  const { value, unit } = stiffnessShown(expected, ratio);
+  return value === null ? "" : `expected ${formatFixed(value, 3)} ${unit}`;
 }
 
 /** `Confirmed −12.4 %, mean over 4 running hours.`; of the past while it cannot be judged. */

@@ -6,6 +6,8 @@ import { amplitudeFactor, amplitudeUnit } from "./amplitudes.js";
 const AMPLITUDE = /_um_pk$/;
 
 const KINDS = [
+  { name: /_of_kb$/, scale: 1, decimals: 3, unit: "k_b" },
+  { name: /_of_kb_s$/, scale: 1e-3, decimals: 2, unit: "ms·k_b" },
   { name: /_n_per_m$/, scale: 1e9, decimals: 3, unit: "GN/m" },
   { name: /_n_s_per_m$/, scale: 1e6, decimals: 2, unit: "MN·s/m" },
   { name: /^overall_shaft_um_pk$/, scale: 1, decimals: 1, unit: "µm 0-pk" },
@@ -16,6 +18,11 @@ const KINDS = [
   { name: /_rpm$/, scale: 1, decimals: 1, unit: "r/min" },
   { name: /_mw$/, scale: 1, decimals: 1, unit: "MW" },
   { name: /_c$/, scale: 1, decimals: 1, unit: "°C" },
+  { name: /_k$/, scale: 1, decimals: 1, unit: "K" },
+  { name: /_m$/, scale: 1, decimals: 1, unit: "m" },
+  { name: /_percent$/, scale: 1, decimals: 1, unit: "%" },
+  { name: /_a$/, scale: 1, decimals: 0, unit: "A" },
+  { name: /_v$/, scale: 1, decimals: 0, unit: "V" },
   { name: /_deg$/, scale: 1, decimals: 0, unit: "°" },
   { name: /_hz$/, scale: 1, decimals: 3, unit: "Hz" },
   { name: /_coherence_/, scale: 1, decimals: 3, unit: "" },
@@ -28,6 +35,12 @@ export function kindOf(quantity) {
   const kind = KINDS.find((candidate) => candidate.name.test(quantity));
   if (!kind) throw new Error(`no number format for the quantity ${quantity}`);
   return kind.name === AMPLITUDE ? { ...kind, scale: 1 / amplitudeFactor(), unit: amplitudeUnit() } : kind;
+}
+
+/** Stiffness in GN/m, or as a ratio to a bracket stiffness that is unknown: `{ value, unit }`. */
+export function stiffnessShown(absolute, ratio) {
+  if (ratio != null) return { value: ratio, unit: "k_b" };
+  return { value: absolute == null ? null : absolute / 1e9, unit: "GN/m" };
 }
 
 /** Fixed decimals, a true minus sign, and no minus before a rounded zero. */

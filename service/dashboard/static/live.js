@@ -90,7 +90,7 @@ function agedLatest(tile, latest, timeMs, current) {
   return current ? shown : { ...shown, ...NOTHING_KNOWN, bad_reasons: [], doubtful_signs: [], readings: withheld(told.readings) };
 }
 
-const UNREAD = { verdict: "no_reading", change_percent: null, deviation_percent: null, stiffness_n_per_m: null, expected_n_per_m: null };
+const UNREAD = { verdict: "no_reading", change_percent: null, deviation_percent: null, stiffness_n_per_m: null, expected_n_per_m: null, stiffness_of_kb: null, expected_of_kb: null };
 
 function withheldFilm(film) {
   return film.why_not === null ? { ...film, x: { ...film.x, ...UNREAD }, y: { ...film.y, ...UNREAD } } : film;

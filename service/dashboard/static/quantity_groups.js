@@ -3,15 +3,16 @@
 import { kindOf } from "./format.js";
 
 const GROUPS = [
-  ["Film stiffness", /_n_per_m$/],
-  ["Film damping", /_n_s_per_m$/],
+  ["Film stiffness", /_n_per_m$|_of_kb$/],
+  ["Film damping", /_n_s_per_m$|_of_kb_s$/],
   ["Vibration at 1×", /^order1_\w+_um_pk$/],
   ["Phase at 1×", /_phase_deg$/],
   ["Vibration of the vortex", /^vortex_\w+_um_pk$/],
   ["Broad-band vibration", /^overall_/],
   ["Shaft position", /^shaft_centre_|^eccentricity_|^attitude_/],
   ["Probe gaps", /gap_/],
-  ["Operation", /^speed_rpm$|^power_mw$|^oil_temperature_c$/],
+  ["Operation", /^speed_rpm$|^power_mw$|^oil_temperature_c$|^head_|^gate_opening_|^excitation_/],
+  ["Temperatures", /_temperature_/],
   ["Frequencies and shape of orbits", /_frequency_hz$|_roundness$/],
   ["How sure the estimates are", /./],
 ];

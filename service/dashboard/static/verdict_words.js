@@ -2,8 +2,8 @@
 
 import { ALARM_KINDS } from "./alarm_kinds.js";
 import { kindWords } from "./alarm_words.js";
-import { signedPercent, verdictMark } from "./film_words.js";
-import { formatQuantity, formatTime } from "./format.js";
+import { expectedWords, signedPercent, verdictMark } from "./film_words.js";
+import { formatTime } from "./format.js";
 
 const CAUSES = {
   all_films_changed: "all films alike: oil or cooling",
@@ -66,7 +66,7 @@ export function confirmedWords(film) {
   const held = [film.x, film.y].filter((one) => one?.level && one.change_percent !== null);
   if (held.length === 0) return "";
   const worst = held.reduce((a, b) => (Math.abs(b.change_percent) > Math.abs(a.change_percent) ? b : a));
-  const { expected_n_per_m: expected, change_percent: change } = worst;
-  const before = expected === null ? "" : `${worst === film.x ? "x" : "y"} expected ${formatQuantity("stiffness_xx_n_per_m", expected)} GN/m; `;
-  return `${before}confirmed ${signedPercent(change, 0)}`;
+  const expected = expectedWords(worst);
+  const before = expected && `${worst === film.x ? "x" : "y"} ${expected}; `;
+  return `${before}confirmed ${signedPercent(worst.change_percent, 0)}`;
 }

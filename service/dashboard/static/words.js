@@ -29,6 +29,7 @@ const REASONS = {
   non_stationary: ["operation changing", "Speed or load moved during the averaged window."],
   power_unknown: ["power unknown", "The power is not known, so that the load may have changed during the averaged window."],
   reduced_probes: ["fewer probes", "A probe has failed; the shaft centre comes from the remaining ones, less certain."],
+  bracket_unknown: ["bracket unknown", "The bracket’s stiffness is not in the plant file, so only ratios to it are known."],
   service_not_reachable: ["service not reachable", "The padwatch service does not answer this browser."],
 };
 
@@ -45,6 +46,7 @@ const ORDINARY = new Set([
   "insufficient_excitation",
   "switched_off",
   "non_stationary",
+  "bracket_unknown",
 ]);
 
 /** How a quality looks: `good`, `uncertain`, `bad`, or a quiet `absent` for an ordinary absence. */

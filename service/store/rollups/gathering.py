@@ -32,7 +32,7 @@ def merge_late(writer: Connection, series: int, hour_ns: int, deleted: DeletedUn
         return
     for width_ns in deleted.kept_ns(hour_ns):
         late = minutes.gathered(width_ns)
-        before = select_cells(writer, series, width_ns, hour, rolled_columns())
+        before = select_cells(writer, series, width_ns, hour, rolled_columns(writer))
         forget_width(writer, series, width_ns, hour)
         all_ = late if before is None else together(before, late).gathered(width_ns)
         insert_cells(writer, series, width_ns, all_)
@@ -106,7 +106,7 @@ def _gather(writer: Connection, series: int, span: Span) -> None:
         insert_cells(writer, series, MINUTE_NS, minutes)
     for finer_ns, width_ns in pairwise(WIDTHS_NS):
         whole = (_floor(span[0], width_ns), _floor(span[1], width_ns))
-        cells = select_cells(writer, series, finer_ns, whole, rolled_columns())
+        cells = select_cells(writer, series, finer_ns, whole, rolled_columns(writer))
         if cells is not None:
             insert_cells(writer, series, width_ns, cells.gathered(width_ns))
 

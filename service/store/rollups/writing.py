@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from core.monitor.catalogue import CATALOGUE
 from service.store.database import Connection
 from service.store.rollups.rows import (
     NO_STATE,
@@ -16,7 +15,7 @@ from service.store.rollups.rows import (
     encoded,
     parts_of,
 )
-from service.store.series import Layout, columns_of, remember_layout
+from service.store.series import FIXED_COLUMNS, Layout, other_columns, remember_layout
 from service.store.trends import Span, decoded_rows, select_layouts
 
 MINUTE_NS = WIDTHS_NS[0]
@@ -43,7 +42,9 @@ def minutes_of(writer: Connection, series: int, span: Span) -> Cells | None:
     rows = writer.execute(SELECT_WHOLE, (series, *span)).fetchall()
     if not rows:
         return None
-    summaries = decoded_rows([row[:4] for row in rows], select_layouts(writer), rolled_columns())
+    summaries = decoded_rows(
+        [row[:4] for row in rows], select_layouts(writer), rolled_columns(writer)
+    )
     state = np.array([NO_STATE if row[4] is None else row[4] for row in rows], dtype=np.int64)
     eccentricity, oil_c = (np.array([row[i] for row in rows], dtype=np.float64) for i in (5, 6))
     return Cells(Conditions.of(state, eccentricity, oil_c), summaries).gathered(MINUTE_NS)
@@ -54,9 +55,13 @@ def insert_cells(writer: Connection, series: int, width_ns: int, cells: Cells) -
     width_s, slots = width_ns // NS_PER_S, cells.slots().tolist()
     start_ns = cells.summaries.time_ns.tolist()
     writer.executemany(INSERT_CELL, _cell_rows(series, width_s, start_ns, slots, cells.conditions))
-    for part in parts_of(rolled_columns()):
+    others = tuple(name for name in cells.summaries.names if name not in FIXED_COLUMNS)
+    for part in (*parts_of(FIXED_COLUMNS), *parts_of(others)):
+        chosen = cells.summaries.only(part)
+        if part[0] not in FIXED_COLUMNS and not chosen.count.any():
+            continue  # quantities of other bearings
         layout = remember_layout(writer, Layout.of(part))
-        numbers = encoded(cells.summaries.only(part))
+        numbers = encoded(chosen)
         rows = zip(start_ns, slots, numbers, strict=True)
         writer.executemany(INSERT_NUMBERS, [(series, width_s, layout, *row) for row in rows])
 
@@ -94,9 +99,10 @@ def forget_width(writer: Connection, series: int, width_ns: int, span: Span) -> 
     )
 
 
-def rolled_columns() -> tuple[str, ...]:
-    """Return the names of the columns that roll-ups contain."""
-    return columns_of(CATALOGUE)
+def rolled_columns(reader: Connection) -> tuple[str, ...]:
+    """Return the names of the columns that roll-ups contain: those of all stored layouts."""
+    layouts = select_layouts(reader).values()
+    return (*FIXED_COLUMNS, *other_columns(name for each in layouts for name in each.quantities))
 
 
 SINGLE_S = 0

@@ -40,7 +40,7 @@ def block() -> BlockOf:
         qualities = changes.pop("qualities", (GOOD,) * len(IDS))
         index, start_ns = second * 100, second * NS_PER_S
         samples = np.zeros((len(qualities), 100), dtype=np.float32)
-        slow = {"oil": oil if isinstance(oil, Reading) else Reading(oil)}
+        slow = {"oil": oil if isinstance(oil, Reading) else Reading(oil)} | changes.pop("slow", {})
         quality = tuple(qualities)
         return given_block("U1", 1, index, start_ns, 100.0, samples, quality, slow, **changes)
 

@@ -11,6 +11,7 @@ from core.alarms.alarm import AlarmState
 from core.alarms.rules import LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import AlarmLevel, Limits
+from core.machine.slow_channel import SlowChannel
 from core.machine.unit import Unit
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
 from core.samples.blocks import StampFault
@@ -148,6 +149,26 @@ def test_warm_oil_is_an_alert_after_its_delay_and_hot_oil_a_danger(alarms, block
 
     id_ = "U1:UJB:oil_temperature"
     assert found == [[], [], [(id_, "raised")], [], [], [], [(id_, "escalated")], []]
+
+
+def test_a_slow_quantity_has_the_alarm_of_its_kind_and_one_of_its_thermometer(unit, block):
+    pad = SlowChannel("pad", "pad_temperature", "UJB", "3")
+    rules = replace(
+        RULES,
+        bearings={"UJB": {"pad_temperatures": LimitRule(Limits(8.0), rule_of(0.0, 0.0))}},
+        slow_limits={"pad": LimitRule(Limits(80.0, alert_below=10.0), rule_of(0.0, 0.0))},
+    )
+    alarms = UnitAlarms(replace(unit, slow_channels=(pad,)), rules)
+    hot, cold = (block(n, slow={"pad": Reading(value)}) for n, value in ((1, 81.0), (2, 9.0)))
+    assert told(alarms.take(hot, [], 0)) == [("U1:pad:pad_temperature", "raised")]
+    assert alarms.alarm("U1:pad:pad_temperature").condition.limit == 80.0
+    alarms.take(cold, [], 0)
+    assert alarms.alarm("U1:pad:pad_temperature").condition.reason == "below_limit"
+    broken = block(3, slow={"pad": missing(Reason.OUT_OF_RANGE)})
+    assert ("U1:pad:channel_not_ok", "raised") in told(alarms.take(broken, [], 0))
+    uneven = assessed()
+    uneven.readings["pad_temperature_excess_k"] = Reading(9.0)
+    assert ("U1:UJB:pad_temperature_excess", "raised") in told(alarms.take(block(4), [uneven], 0))
 
 
 def test_a_broken_thermometer_is_said_and_clears_no_hot_oil(alarms, block):

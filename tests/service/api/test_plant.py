@@ -118,8 +118,16 @@ async def test_the_overview_shows_each_bearing_and_the_catalogue_every_quantity(
                 if name.startswith("stiffness_"):
                     assert reading["uncertainty"] == pytest.approx(whole["uncertainty"], rel=1e-5)
             assert bearing.items() <= latest.items()
-    assert await read_only.json("/api/v1/quantities") == [
+    quantities = await read_only.json("/api/v1/quantities")
+    assert quantities[: len(CATALOGUE)] == [
         {"name": q.name, "unit": q.unit, "label": q.label} for q in CATALOGUE
+    ]
+    pads = [f"pad_temperature_{n}_c" for n in (1, 2, 3, 4)]
+    recorded = [quantity["name"] for quantity in quantities[len(CATALOGUE) :]]
+    assert recorded == [
+        *pads,
+        "head_m",
+        "gate_opening_percent",
     ]
 
 

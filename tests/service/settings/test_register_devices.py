@@ -166,6 +166,9 @@ def test_how_long_a_connection_is_kept_reaches_the_adapter(use, keeps):
     assert link_settings(LinkSettings, device).keeps_connection is keeps
 
 
+UNIT_COMPUTED = {"channels", "bearings", "slow_channels", "rotation_sense", "has_vortex"}
+
+
 @pytest.mark.parametrize(
     ("source", "adapter", "computed"),
     [
@@ -175,7 +178,7 @@ def test_how_long_a_connection_is_kept_reaches_the_adapter(use, keeps):
         (ModbusLinkSettings, SerialTransport, set()),
         (SignatureIdentity, ExpectedRegisters, set()),
         (IdentificationIdentity, ExpectedIdentification, set()),
-        (UnitSettings, Unit, {"channels", "bearings", "rotation_sense", "has_vortex"}),
+        (UnitSettings, Unit, UNIT_COMPUTED),
         (CanSettings, CanLinkSettings, set()),
         (CanSettings, CanAdapterSettings, {"link", "dbc_text", "channels", "queue_frames"}),
     ],

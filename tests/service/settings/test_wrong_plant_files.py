@@ -17,6 +17,9 @@ KIND, HOST = 'kind = "modbus_ring"', 'host = "127.0.0.1"\nport = 0'
 SLOW, OIL = f"{UNIT_1}slow_channel", 'oil_temperature = "ujb_oil_temperature"'
 OIL_LIMIT = "alarms.oil_temperature_c = { alert = 65.0 }"
 SIMULATION = f"{UNIT_1}simulation."
+PROBE, HEAD = 'transducer = "proximity_probe"', 'quantity = "head"'
+SLOW_2, PAD = "unit[2].slow_channel", 'quantity = "pad_temperature"\n'
+PAD_1, PAD_2, HEAD_2, GATE = (f"{SLOW_2}[{n}]." for n in (6, 7, 10, 11))
 BRACKET, SOFT = "bracket_stiffness_n_per_m", "bracket_stiffnes = 'soft'"
 
 
@@ -56,6 +59,17 @@ BRACKET, SOFT = "bracket_stiffness_n_per_m", "bracket_stiffnes = 'soft'"
         ('g = "LJB"', 'g = "UJB"', f"{SIMULATION}bearing[2].bearing = 'UJB'", "used twice"),
         ('id = "UJB"', 'id = "GEN"', f"{UJB}id = 'GEN'", "UJB or LJB or TJB"),
         (f"{BRACKET} =", f"{SOFT}\n{BRACKET} =", f"{UJB}{SOFT}: unknown key", f"{BRACKET}, "),
+        (f"{BRACKET} = 1.18e9\n", "", f"{UJB}bracket_mass_kg = 45000.0", f"only with {BRACKET}"),
+        (PAD, 'quantity = "pads"\n', f"{PAD_1}quantity = 'pads'", "'pad_temperature', 'oil_"),
+        (PAD, "", f"{PAD_1}bearing = 'UJB'", "requires quantity"),
+        ('"%"', '"m"', f"{GATE}unit = 'm'", 'must be "%" for a gate_opening'),
+        ('"UJB"\nposition', '"X"\nposition', f"{PAD_1}bearing = 'X'", "of the unit"),
+        ('position = "2"', 'position = "1"', f"{PAD_2}position = '1'", "its own position"),
+        ('position = "1"', 'position = "mean"', f"{PAD_1}position = 'mean'", "computed value"),
+        ("angle_deg = 135.0", "angle_deg = 45.0", f"{PAD_2}angle_deg = 45.0", "another pad"),
+        ("alert = 85.0", "alert = 95.0", f"{PAD_1}limits.danger = 95.0", "above alert = 95"),
+        (HEAD, f"angle_deg = 1.0\n{HEAD}", f"{HEAD_2}angle_deg = 1.0", "only to a pad"),
+        (PROBE, f"angle_deg = 75.0\n{PROBE}", f"{CHANNEL_1}angle_deg = 75.0", "at least 30°"),
         ("[[unit.bearing]]", "[[unit.bearings]]", f"{UNIT_1}bearings: unknown key", "bearing, "),
         ("= 600.0", "= rated", "invalid TOML: Invalid value (column", "; text needs quotes"),
         ("= 600.0", "= = 600.0", "invalid TOML: Invalid value (column", ""),
@@ -130,7 +144,8 @@ def test_a_table_that_does_not_fit_is_refused_at_its_line_and_no_password_is_sho
 @pytest.mark.parametrize(
     ("line_of_file", "key"),
     [
-        ("bracket_stiffness_n_per_m = 1.18e9\n", f"{UJB}bracket_stiffness_n_per_m"),
+        ("clearance_um = 200.0\n", f"{UJB}clearance_um"),
+        ('bearing = "UJB"\nposition = "1"\n', f"{PAD_1}bearing"),
         ("rated_speed_rpm = 92.3\n", f"{UNIT_1}rated_speed_rpm"),
         ("full_scale_v = 12.0\n", f"{CHANNEL_1}full_scale_v"),
         ("ok_max_v = 11.0\n", f"{CHANNEL_1}ok_max_v"),

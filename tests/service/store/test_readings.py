@@ -19,7 +19,7 @@ from service.store import store as sql_store
 from service.store import trends
 from service.store.buckets import NICE_WIDTHS_NS, Summaries, bucket_width_ns, bucketed
 from service.store.port import QueryTooLargeError, RefusedRowError, StoreError, ValueRange
-from service.store.series import Layout
+from service.store.series import Layout, columns_of
 from service.store.sqlite import SqliteStore
 from service.store.sqlite import connections as readers
 
@@ -167,7 +167,7 @@ def test_a_hole_is_marked_so_that_no_line_spans_it(store):
 def test_a_quantity_that_an_older_padwatch_did_not_know_is_null_there(path, monkeypatch):
     older = tuple(q for q in reversed(CATALOGUE) if q.name != "vortex_coherence_xx")
     with monkeypatch.context() as at_that_time:
-        at_that_time.setattr(sql_store, "CATALOGUE", older)
+        at_that_time.setattr(sql_store, "FIXED_COLUMNS", columns_of(older))
         old = SqliteStore(path)  # type: ignore[arg-type]
         old.append([assessment(at(0), speed_rpm=92.3, vortex_coherence_xx=0.5)], [])
         old.close()

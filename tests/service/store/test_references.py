@@ -18,8 +18,8 @@ from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.shaft_response import ShaftResponse
 from core.condition.operating_state import OperatingState
+from core.monitor.catalogue import CATALOGUE
 from core.quality import Reading, Reason, missing, uncertain
-from service.store import store as sql_store
 from service.store.documents import baseline_from_json, response_from_json, to_json
 from service.store.port import StoreError
 from service.store.references import GapReference, ReferenceSource, SetVectorReference
@@ -133,7 +133,7 @@ def test_the_newest_readings_come_with_their_qualities(store):
     assert newest.readings["gap_x_um"] == doubtful
     assert newest.readings["gap_y_um"] == Reading(2003.1)
     assert newest.readings["speed_rpm"] == missing(Reason.NOT_MEASURED)
-    assert set(newest.readings) == {quantity.name for quantity in sql_store.CATALOGUE}
+    assert set(newest.readings) == {quantity.name for quantity in CATALOGUE}
     assert store.newest("U2", "UJB") is None
 
 

@@ -1,10 +1,10 @@
 /** The baseline as a map: eccentricity × oil temperature, colour = stiffness, support visible. */
 
-import { formatFixed } from "../format.js";
+import { formatFixed, stiffnessShown } from "../format.js";
 import { FAINT, INK, PLOT, axis, baseLayout, points } from "./style.js";
 
 const SCALE = "Cividis"; // even to the eye, also without red or green
-const GN = 1e9;
+const shownOf = (cell) => stiffnessShown(cell.stiffness_n_per_m, cell.stiffness_of_kb);
 
 /** Cells as objects; of several attitudes in one place the one with most readings. */
 export function cellsOf(columns) {
@@ -26,7 +26,7 @@ const middle = (cell) => [
 function words(cell) {
   const support = { own: "learned here", borrowed: "borrowed from around", none: "seen too seldom to judge" }[cell.support];
   return [
-    `<b>${formatFixed(cell.stiffness_n_per_m / GN, 3)} GN/m</b>, ${support}`,
+    `<b>${formatFixed(shownOf(cell).value, 3)} ${shownOf(cell).unit}</b>, ${support}`,
     `eccentricity ${formatFixed(cell.eccentricity_low, 3)} to ${formatFixed(cell.eccentricity_high, 3)}`,
     `oil ${formatFixed(cell.oil_temperature_low_c, 1)} to ${formatFixed(cell.oil_temperature_high_c, 1)} °C`,
     `${cell.n_readings} readings on ${cell.n_days} days`,
@@ -61,7 +61,7 @@ function surface(cells, [x, y], widths, name, opacity) {
   for (const cell of cells) {
     const [e, c] = middle(cell);
     const [column, row] = [Math.round((e - x[0]) / widths[0]), Math.round((c - y[0]) / widths[1])];
-    z[row][column] = cell.stiffness_n_per_m / GN;
+    z[row][column] = shownOf(cell).value;
     text[row][column] = words(cell);
   }
   return {
@@ -92,7 +92,7 @@ export function mapLayout(cells, current, revision) {
   return baseLayout(`map ${revision}`, {
     xaxis: axis("Eccentricity ratio", { range: ends("eccentricity_low", "eccentricity_high"), zeroline: false }),
     yaxis: axis("Oil temperature, °C", { range: ends("oil_temperature_low_c", "oil_temperature_high_c"), zeroline: false }),
-    coloraxis: { colorscale: SCALE, colorbar: { title: { text: "GN/m" }, thickness: 12, outlinewidth: 0 } },
+    coloraxis: { colorscale: SCALE, colorbar: { title: { text: shownOf(cells[0] ?? {}).unit }, thickness: 12, outlinewidth: 0 } },
     shapes: current ? [outline(current, PLOT, 5), outline(current, INK, 2.5)] : [],
     hovermode: "closest",
     margin: { l: 56, r: 8, t: 8, b: 40 },

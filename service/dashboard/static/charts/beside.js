@@ -2,13 +2,12 @@
 
 import { changeWords, kindWords } from "../alarm_words.js";
 import { ask } from "../api.js";
-import { formatTime } from "../format.js";
+import { formatTime, stiffnessShown } from "../format.js";
 import { DOUBT_COLOUR, FAINT, INK, curve, points } from "./style.js";
 
 const MAX_EVENTS = "1000";
 const MAX_READINGS = "500";
-const GN = 1e9;
-const DIRECTIONS = { stiffness_xx_n_per_m: "x", stiffness_yy_n_per_m: "y" };
+const DIRECTIONS = { stiffness_xx_n_per_m: "x", stiffness_yy_n_per_m: "y", stiffness_xx_of_kb: "x", stiffness_yy_of_kb: "y" };
 const LEVEL_LOOKS = {
   alert: { symbol: "triangle-up", color: DOUBT_COLOUR },
   danger: { symbol: "square", color: "var(--bad)" },
@@ -77,8 +76,8 @@ export function expectedTraces({ film, readings }, name, colour, hasLimits = tru
   return traces;
 }
 
-function expectedGn({ stiffness_n_per_m: stiffness, deviation_percent: deviation }, n) {
-  return deviation[n] === null ? null : stiffness[n] / (1 + deviation[n] / 100) / GN;
+function expectedGn({ stiffness_n_per_m: stiffness, stiffness_of_kb: ratio, deviation_percent: deviation }, n) {
+  return deviation[n] === null ? null : stiffnessShown(stiffness[n], ratio[n]).value / (1 + deviation[n] / 100);
 }
 
 /** The limits apply to the change of ln(stiffness). */

@@ -1,9 +1,8 @@
 /** Stiffness against the condition that it was read under: learned cells, history, today on top. */
 
-import { formatFixed, formatTime } from "../format.js";
+import { formatFixed, formatTime, stiffnessShown } from "../format.js";
 import { FAINT, INK, axis, baseLayout, points } from "./style.js";
 
-const GN = 1e9;
 const NORMAL_95 = 1.96;
 
 export const AXES = {
@@ -21,11 +20,11 @@ export function pointsOf(readings, direction) {
       timeS,
       eccentricity_ratio: readings.eccentricity_ratio[index],
       oil_temperature_c: readings.oil_temperature_c[index],
-      gn: series.stiffness_n_per_m[index] === null ? null : series.stiffness_n_per_m[index] / GN,
+      ...stiffnessShown(series.stiffness_n_per_m[index], series.stiffness_of_kb[index]),
       isSettled: readings.is_settled[index],
       isSimulated: readings.provenance[index] === "simulated",
     }))
-    .filter((one) => one.isSettled && one.gn !== null && one.eccentricity_ratio !== null && one.oil_temperature_c !== null);
+    .filter((one) => one.isSettled && one.value !== null && one.eccentricity_ratio !== null && one.oil_temperature_c !== null);
 }
 
 export function conditionTraces({ cells, history, today }, against) {
@@ -49,17 +48,18 @@ function cellTrace(cells, against) {
   const learned = cells.filter((cell) => cell.support !== "none" && cell.n_readings > 0);
   const other = otherOf(against);
   const x = learned.map((cell) => cell[against]);
-  return points(x, learned.map((cell) => cell.stiffness_n_per_m / GN), {
+  const shown = learned.map((cell) => stiffnessShown(cell.stiffness_n_per_m, cell.stiffness_of_kb));
+  return points(x, shown.map(({ value }) => value), {
     name: "learned cells ± 95 %",
     error_y: {
       type: "data",
-      array: learned.map((cell) => (NORMAL_95 * cell.scatter_percent * cell.stiffness_n_per_m) / 100 / GN),
+      array: learned.map((cell, n) => (NORMAL_95 * cell.scatter_percent * shown[n].value) / 100),
       thickness: 1,
       width: 0,
       color: INK,
     },
     marker: { symbol: "square", size: 7, color: learned.map((cell) => cell[other]), coloraxis: "coloraxis" },
-    text: learned.map((cell) => `learned: ${formatFixed(cell.stiffness_n_per_m / GN, 3)} GN/m, ${conditionOf(cell)}<br>${cell.n_readings} readings on ${cell.n_days} days, ${cell.support}`),
+    text: learned.map((cell, n) => `learned: ${formatFixed(shown[n].value, 3)} ${shown[n].unit}, ${conditionOf(cell)}<br>${cell.n_readings} readings on ${cell.n_days} days, ${cell.support}`),
     hovertemplate: "%{text}<extra></extra>",
   });
 }
@@ -72,21 +72,21 @@ function todayTrace(readings, against) {
 function placed(readings, against, name, marker) {
   const x = readings.map((one) => one[against]);
   const text = readings.map(pointWords);
-  return points(x, readings.map((one) => one.gn), { name, marker, text, hovertemplate: "%{text}<extra></extra>" });
+  return points(x, readings.map((one) => one.value), { name, marker, text, hovertemplate: "%{text}<extra></extra>" });
 }
 
 const conditionOf = (one) => `eccentricity ${formatFixed(one.eccentricity_ratio, 3)}, oil ${formatFixed(one.oil_temperature_c, 1)} °C`;
 
 function pointWords(one) {
   const source = one.isSimulated ? ", simulated" : "";
-  return `${formatFixed(one.gn, 3)} GN/m, ${conditionOf(one)}<br>${formatTime(one.timeS * 1000)}${source}`;
+  return `${formatFixed(one.value, 3)} ${one.unit}, ${conditionOf(one)}<br>${formatTime(one.timeS * 1000)}${source}`;
 }
 
-export function conditionLayout(against, revision) {
+export function conditionLayout(against, revision, unit = "GN/m") {
   const colour = AXES[otherOf(against)].short;
   return baseLayout(`condition ${revision}`, {
     xaxis: axis(AXES[against].title, { zeroline: false }),
-    yaxis: axis("GN/m", { zeroline: false }),
+    yaxis: axis(unit, { zeroline: false }),
     coloraxis: { colorscale: "Cividis", colorbar: { title: { text: colour }, thickness: 12, outlinewidth: 0 } },
     hovermode: "closest",
     margin: { l: 56, r: 8, t: 8, b: 40 },

@@ -1,5 +1,6 @@
 /** Every number of a bearing, in the order an engineer asks for them. */
 
+import { labelOf } from "../catalogue.js";
 import { element } from "../dom.js";
 import { budgetPanel } from "../parts/budget.js";
 import { pairView, readingOf } from "../parts/reading.js";
@@ -27,9 +28,13 @@ const MORE = [
   ["Shaft vibration, broad-band", [["overall_shaft_x_um_pp", "overall_shaft_y_um_pp"], ["x", "y"]]],
   ["Bearing velocity, broad-band", [["overall_bearing_x_mm_s_rms", "overall_bearing_y_mm_s_rms"], ["x", "y"]]],
   ["Maximum shaft displacement", [["overall_shaft_um_pk"], [""]]],
+  ["Pad temperatures: mean, hottest above it, vector", [["pad_temperature_mean_c", "pad_temperature_excess_k", "pad_temperature_vector_k", "pad_temperature_direction_deg"], ["mean", "hottest", "vector", "towards"]]],
   ["Phase of shaft vibration, 1×", [["order1_shaft_x_phase_deg", "order1_shaft_y_phase_deg"], ["x", "y"]]],
   ["Phase of bearing vibration, 1×", [["order1_bearing_x_phase_deg", "order1_bearing_y_phase_deg"], ["x", "y"]]],
 ];
+
+/** Slow quantities at the positions that the plant file records; the oil and the pattern of the pads have tiles above. */
+const SLOW = /^(?!oil_temperature|pad_temperature_(mean|excess|vector|direction)_)(\w+_temperature_|head_|gate_opening_|excitation_)/;
 
 /** What does not exist here is left out: a vortex at full load, phases without a key-phase. */
 const LEFT_OUT = ["no_vortex", "not_measured", "switched_off"];
@@ -39,9 +44,21 @@ export function keyNumbers(path) {
   return numbers(path, "tiles", KEY);
 }
 
-/** The other numbers. Returns `{ node, draw(latest), close() }`. */
+/** The other numbers, and the recorded slow quantities. Returns `{ node, draw(latest), close() }`. */
 export function moreNumbers(path) {
-  return numbers(path, "more-tiles", MORE);
+  const fixed = numbers(path, "more-tiles", MORE);
+  const recorded = new Map();
+  return {
+    ...fixed,
+    draw(latest) {
+      fixed.draw(latest);
+      for (const name of Object.keys(latest.readings).filter((one) => SLOW.test(one) && !recorded.has(one))) {
+        recorded.set(name, tile([labelOf(name), [[name], [""]]], { id: "" }));
+        fixed.node.append(recorded.get(name).node);
+      }
+      for (const one of recorded.values()) one.draw(latest, qualityOf(latest).reason);
+    },
+  };
 }
 
 function numbers(path, style, shown) {

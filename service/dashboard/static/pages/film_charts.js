@@ -110,5 +110,5 @@ async function showPlot(box, known, against, direction, spanWords) {
     box.explain(`No settled reading in the last ${spanWords}, and no baseline yet. ${known.baselines ? learningSentence(known.baselines) : ""}`);
     return;
   }
-  await box.show(traces, conditionLayout(against, `${against} ${direction}`), conditionCaption(points, against, spanWords));
+  await box.show(traces, conditionLayout(against, `${against} ${direction}`, [...points.history, ...points.today][0]?.unit), conditionCaption(points, against, spanWords));
 }

@@ -7,7 +7,7 @@ import { panel } from "../charts/panel.js";
 import { X_COLOUR, Y_COLOUR } from "../charts/style.js";
 import { doubtTrace, nOutside, piecesOf, simulatedSentence, trendCaption, trendLayout, trendTraces, valueRange } from "../charts/trend.js";
 import { element, setAttribute } from "../dom.js";
-import { formatTime } from "../format.js";
+import { formatTime, kindOf } from "../format.js";
 import { choice } from "../parts/choice.js";
 import { readingOf } from "../parts/reading.js";
 import { periodFor, poll } from "../poll.js";
@@ -76,7 +76,8 @@ export function trendPanels(path) {
 
   const questions = poll(async (signal) => {
     if (view?.serviceTimeMs == null) return;
-    const lines = [stiffnessLines(which.value()), amplitudeLines(order.value())];
+    const stiffnesses = stiffnessLines(which.value()).map(([name, ...looks]) => [readingOf(latest, name).name, ...looks]);
+    const lines = [stiffnesses, amplitudeLines(order.value())];
     const endMs = Math.ceil(view.serviceTimeMs / WHOLE_MS) * WHOLE_MS;
     const range = [endMs - span.value() * 1000, endMs];
     const names = lines[0].map(([name]) => name);
@@ -85,7 +86,7 @@ export function trendPanels(path) {
     const [newest, marked] = await Promise.all([askTrends(path, lines.flat(), range, signal), beside.answer]);
     trends = newest;
     const asked = { trends, beside: marked, view, span, scale: scale.value(), latest };
-    await showTrends(stiffness, asked, lines[0], "Film stiffness, GN/m");
+    await showTrends(stiffness, asked, lines[0], `Film stiffness, ${kindOf(names[0]).unit}`);
     await showTrends(amplitude, asked, lines[1], `Vibration amplitude, ${amplitudeUnit()}`);
   }, () => periodFor(trends?.bucket_s ?? 0), (failure) => {
     beside = null;

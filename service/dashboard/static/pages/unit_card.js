@@ -97,9 +97,9 @@ export const changeOf = (film) => (film?.deviation_percent == null ? "" : signed
 export function asCompared(latest, film) {
   const readings = { ...latest.readings };
   STIFFNESS.forEach((name, n) => {
-    const value = film["xy"[n]]?.stiffness_n_per_m ?? null;
+    const value = film["xy"[n]]?.stiffness_of_kb ?? film["xy"[n]]?.stiffness_n_per_m ?? null;
     const newest = readingOf(latest, name);
-    if (value !== null && newest.value !== null) readings[name] = { ...newest, value };
+    if (value !== null && newest.value !== null) readings[newest.name] = { ...newest, value };
   });
   return { ...latest, readings };
 }

@@ -64,7 +64,7 @@ function filmCell() {
     node: element("div", {}, verdict.node, ...lines),
     draw(latest, film) {
       verdict.draw(film, null);
-      lines.forEach((line, n) => setText(line, film["xy"[n]]?.stiffness_n_per_m == null ? "" : `${"xy"[n]}: ${nowSentence(film["xy"[n]])}`));
+      lines.forEach((line, n) => setText(line, withDirection("xy"[n], film["xy"[n]])));
     },
   };
 }
@@ -94,4 +94,9 @@ function qualityCell() {
       setText(age, latest.age_s === null ? "no data yet" : `${formatAge(latest.age_s)} old`);
     },
   };
+}
+
+function withDirection(direction, film) {
+  const now = film ? nowSentence(film) : "";
+  return now && `${direction}: ${now}`;
 }

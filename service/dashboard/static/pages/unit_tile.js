@@ -40,14 +40,14 @@ function bearingLine(unit, { bearing, name }) {
     node: element("tr", { "data-bearing": bearing }, element("th", { scope: "row" }, link), ...numbers, element("td", { class: "quality" }, state.node)),
     draw(latest, film, alarms, isSaid) {
       const shown = asCompared(latest, film);
-      const texts = [...STIFFNESS.map((one) => digits(one, readingOf(shown, one).value)), changeOf(worseOf(film))];
+      const texts = [...STIFFNESS.map((one) => digits(readingOf(shown, one))), changeOf(worseOf(film))];
       texts.forEach((text, index) => setText(numbers[index], text));
       state.draw(...stateOf(latest, film, alarms, isSaid));
     },
   };
 }
 
-const digits = (name, value) => (value === null ? DASH : formatQuantity(name, value));
+const digits = ({ name, value }) => (value === null ? DASH : formatQuantity(name, value));
 
 function worseOf({ x, y }) {
   const size = (one) => Math.abs(one?.deviation_percent ?? 0);

@@ -9,9 +9,11 @@ import { spreadView } from "./spread.js";
 const DASH = "—";
 const ABSENT = { value: null, level: "bad", reason: "not_measured", uncertainty: null };
 
-/** Readings of a bearing by name; one that the service does not report is not measured. */
+/** Reading of a bearing with its name: of the ratio where the bracket's stiffness is unknown; not measured where unreported. */
 export function readingOf(latest, name) {
-  return latest.readings[name] ?? ABSENT;
+  const ratio = name.replace(/_n_per_m$/, "_of_kb").replace(/_n_s_per_m$/, "_of_kb_s");
+  const reported = ratio in latest.readings ? ratio : name;
+  return { ...(latest.readings[reported] ?? ABSENT), name: reported };
 }
 
 /**
@@ -33,9 +35,10 @@ export function readingView(name, label, unit = kindOf(name).unit, spread = spre
     draw(latest, saidReason = null) {
       const reading = readingOf(latest, name);
       const absent = reading.value === null;
-      setText(number, absent ? DASH : formatQuantity(name, reading.value));
+      setText(number, absent ? DASH : formatQuantity(reading.name, reading.value));
       spread?.draw(reading);
-      suffix.hidden = absent || unit === "";
+      setText(suffix, reading.name === name ? unit : kindOf(reading.name).unit);
+      suffix.hidden = absent || suffix.textContent === "";
       setAttribute(node, "data-level", reading.level);
       drawReason(why, reading, saidReason);
     },

@@ -14,9 +14,9 @@ function operatingWords({ operating_state: state, is_settled: isSettled }) {
   return state === null ? "" : `${stateWords(state)}, ${isSettled ? "settled" : "not settled yet"}`;
 }
 
-/** `full load, settled; 628.2 MW, 92.3 r/min`; only what is known. */
+/** `full load, settled; 628.2 MW, 92.3 r/min, 118.0 m, 81.2 %`; only what is known. */
 export function runningWords(unit) {
-  const numbers = ["power_mw", "speed_rpm"].map((name) => {
+  const numbers = ["power_mw", "speed_rpm", "head_m", "gate_opening_percent"].map((name) => {
     const { value } = readingOf(knowing(unit, name), name);
     return value === null ? "" : `${formatQuantity(name, value)} ${kindOf(name).unit}`;
   });

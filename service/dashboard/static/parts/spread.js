@@ -9,9 +9,9 @@ export function spreadView(name, node = element("span", { class: "spread" })) {
   node.hidden = true;
   return {
     node,
-    draw({ value, uncertainty }) {
+    draw({ value, uncertainty, name: reported = name }) {
       node.hidden = value === null || !uncertainty;
-      if (!node.hidden) setText(node, formatSpread(name, value, uncertainty));
+      if (!node.hidden) setText(node, formatSpread(reported, value, uncertainty));
     },
   };
 }

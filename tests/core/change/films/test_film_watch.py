@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 
 from core.baseline.history import ReadingOutcome
+from core.baseline.learning import learn
+from core.baseline.settings import BaselineSettings
 from core.change.backtest import decide_all, last_decision, last_operation, operation_history
 from core.change.decision import JUDGED, Verdict
-from core.change.film_judge import FilmFinding, alarm_condition
+from core.change.film_judge import FilmFinding, FilmJudge, alarm_condition
 from core.change.film_reading import film_reading
+from core.change.film_watch import FilmWatch
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel
 from core.quality import Reading, Reason, missing, uncertain
+from core.stiffness.bracket_ratio import as_ratios
 
 S = 1_000_000_000
 
@@ -58,6 +62,39 @@ def test_a_restart_in_the_middle_changes_no_verdict(films, rules):
     second = films.watched(history.rows(n - 1, len(history)), after)
 
     assert [n.findings[0] for n in first + second] == [n.findings[0] for n in through]
+
+
+def test_a_baseline_of_stiffness_is_not_compared_with_ratios_to_an_unknown_bracket(films, rules):
+    ratios = FilmWatch(rules, FilmJudge(rules, {"UJB": None}))
+    ratios.judge.activate_baseline("UJB", films.baseline)
+    assert ratios.judge.baseline("UJB") is None
+    verdicts = {news.findings[0].verdict for news in films.watched(films.later(), ratios)}
+    assert Verdict.NO_BASELINE in verdicts
+    assert not verdicts & set(JUDGED)
+
+
+def test_ratios_are_judged_by_a_baseline_of_ratios_as_stiffness_is(films, rules):
+    [before, after] = films.life(3), films.later(change=loss(0.2, 106.0))
+    in_ratios = [replace(h, ln_k=h.ln_k - math.log(1.18e9)) for h in (before, after)]
+    n = int(np.searchsorted(before.time_ns, after.time_ns[0]))
+    learning = in_ratios[0].rows(0, n)
+    settled = operation_history(
+        learning.time_ns, learning.speed_rpm, learning.power_mw, rules.operating
+    ).is_settled
+    baseline = learn(learning, settled, films.baseline.origin, BaselineSettings())
+    watch = FilmWatch(rules, FilmJudge(rules, {"UJB": None}))
+    watch.judge.activate_baseline("UJB", baseline)
+    found = []
+    for result in films.results(in_ratios[1]):
+        found += watch.take([replace(result, readings=as_ratios(result.readings))])[1]
+    wanted = films.watched(after)
+    assert [f.findings[0].level for f in found] == [f.findings[0].level for f in wanted]
+    deviations = [
+        [np.nan if f.findings[0].deviation is None else f.findings[0].deviation for f in each]
+        for each in (found, wanted)
+    ]
+    np.testing.assert_allclose(*deviations, atol=1e-6)
+    assert found[-1].findings[0].level is not None
 
 
 def test_decisions_caught_up_with_are_those_that_would_have_been_made(films, rules):

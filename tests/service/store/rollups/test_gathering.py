@@ -17,7 +17,7 @@ from rigs.tiers import fast_and_long
 from rigs.varied_results import HOUR_NS, MINUTE_NS, NAMES, SECOND_NS, T0, WHOLE, N, dump
 
 from core.condition.operating_state import OperatingState
-from core.quality import Level
+from core.quality import Level, Reading
 from service.store import trends
 from service.store.loops import ROLLUP_PERIOD_S, RollupLoop
 from service.store.port import QueryTooLargeError, StoreError, TrendQuery, ValueRange
@@ -38,6 +38,33 @@ def test_pieces_are_gathered_like_what_comes_at_once(plain, rolled, results, tmp
             require_same(found.trend(WHOLE), plain.trend(WHOLE))
 
     assert dump(tmp_path / "rolled.sqlite3") == dump(tmp_path / "pieces.sqlite3")
+
+
+def test_quantities_that_only_some_bearings_have_are_gathered_like_the_others(tmp_path):
+    """Pads of one bearing, and a ratio with its uncertainty of another."""
+    pads = ("pad_temperature_1_c", "head_m")
+    ratio = "stiffness_xx_of_kb"
+    with closing(SqliteStore(tmp_path / "recorded.sqlite3")) as store:
+        for n in range(3 * 60):
+            time_ns = T0 + n * MINUTE_NS
+            value = Reading(0.5 + n, u_random=0.1, u_systematic=0.2)
+            results = [
+                assessment(time_ns, **dict.fromkeys(pads, 60.0 + n)),
+                assessment(time_ns, bearing="LJB", **{ratio: value}),
+            ]
+            store.append(results, [])
+        names = (*pads, "speed_rpm", ratio, f"{ratio}.u_random")
+        asked = [replace(WHOLE, bearing=b, quantities=names, max_points=3) for b in ("UJB", "LJB")]
+        single = [store.trend(each) for each in asked]
+        gather_all(store)
+        rolled = [store.trend(each) for each in asked]
+
+    for found, wanted in zip(rolled, single, strict=True):
+        require_same(found, wanted)
+    assert rolled[0].series["head_m"].maximum[-1] == 239.0
+    assert set(rolled[0].series[ratio].count) == {0}
+    assert rolled[1].series[ratio].minimum[0] == 0.5
+    assert set(rolled[1].series[f"{ratio}.u_random"].maximum) == {0.1}
 
 
 @pytest.mark.parametrize("at_once", [2, 50])
