@@ -75,7 +75,7 @@ class Resolution:
         return resolved
 
     def qualities(self, qualities: tuple[Quality, ...]) -> tuple[Quality, ...]:
-        """Return the qualities of the resolved signals, each of which needs both transducers."""
+        """Return the qualities of the resolved signals; each signal needs both transducers."""
         resolved = list(qualities)
         for rows, _ in self._pairs:
             for own, other in (rows, rows[::-1]):

@@ -20,7 +20,7 @@ def ratio_name(name: str) -> str | None:
 
 
 def absolute_name(name: str) -> str | None:
-    """Return the name of the quantity of which `name` is the ratio to k_b; None for others."""
+    """Return the name of the quantity whose ratio to k_b is `name`; None for others."""
     found = [(own, ratio) for own, ratio in SUFFIXES.items() if name.endswith(ratio)]
     return name.removesuffix(found[0][1]) + found[0][0] if found else None
 
