@@ -34,10 +34,10 @@ MAX_LACK_OF_FIT = 3.0
 """Largest lack of fit of a good result. Above this value, stiffness and damping of the film vary
 over the band, or the bracket is excited directly."""
 
-K_RESOLUTION, C_RESOLUTION = 0.001, 0.002
-"""Half-widths of the errors of stiffness and damping from tapering, relative to a row's direct
-coefficient. A line contains motion of neighbouring lines, which is integrated with the wrong
-frequency. Simulations without noise show 0.1 and 0.16 % at 0.07 Hz per bin."""
+RESOLUTION = 0.001
+"""Half-width of the error of `dynamic` from tapering, relative to a row's direct coefficient. A
+line contains motion of neighbouring lines, which is integrated with the wrong frequency.
+Simulations without noise show 0.03 % at 0.07 Hz per bin."""
 
 NAMES = (
     *(name for row in DYNAMIC_COEFFICIENTS for name in row),
@@ -74,7 +74,6 @@ def dynamic_budgets(
     for row, column in np.ndindex(2, 4):
         value, changes = float(found.coefficients[row, column]), found.changes[:, row, column]
         direct = float(found.coefficients[row, row + 2 * (column // 2)])
-        resolution = K_RESOLUTION if column < 2 else C_RESOLUTION
         budgets[DYNAMIC_COEFFICIENTS[row][column]] = Budget(
             value,
             (
@@ -82,7 +81,7 @@ def dynamic_budgets(
                 *gain_lines(value, accuracy),
                 *map(systematic_line, names, widths, changes.tolist()),
                 systematic_line("probe noise taken off", accuracy.probe_noise, value * left_in),
-                systematic_line("spectral resolution", resolution, direct),
+                systematic_line("spectral resolution", RESOLUTION, direct),
                 systematic_line("film over frequency", float(found.model[row, column]), 1.0),
             ),
         )
