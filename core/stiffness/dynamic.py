@@ -279,8 +279,10 @@ def _results(
     tapered = np.zeros_like(fits.unknowns)
     damping = LAG_RESOLUTION * fits.kept * np.einsum("nrr->nr", fits.unknowns[:, :, 2:])
     tapered[..., 2:] = damping[..., np.newaxis]
-    model = math.sqrt(3.0) * np.hypot(fits.parts_left(dropped), tapered)
-    covariance = fits.film_covariance(fits.through_parts())
+    of_doubt, left = fits.parts_left(dropped)
+    variance = np.maximum(np.einsum("nruu->nru", left), 0.0) + tapered**2
+    model = np.sqrt(3.0 * variance)
+    covariance = fits.film_covariance(fits.through_parts()) + of_doubt
     mass_std_kg, whole = np.zeros(len(mass_kg)), np.zeros(len(mass_kg), dtype=np.bool_)
     if seeks_mass.any():
         masses_kg, of_mass = fits.estimate([MASS])

@@ -154,20 +154,22 @@ class FilmFits(FittedFilms):
         std = np.sqrt(self.covariance(influences)[:, 0, 0, 0])
         return value[:, 0], std, self.follow(DAMPING, fitted)[:, 0]
 
-    def parts_left(self, dropped: FloatArray) -> FloatArray:
-        """Return the standard uncertainty of unknowns from `PARTS` that are not random, (n, 2, 4).
+    def parts_left(self, dropped: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return covariances of the unknowns from what of `PARTS` is left, (n, 2, 4, 4) by row.
 
-        It is the error of their prior, the doubt whether there are any, and the whole of a share
-        `dropped` (n, 1) that is not estimated.
+        The first is from the doubt whether there are any, which differs between averages; the
+        second from the error of the prior, and from a share `dropped` (n, 1) that is not estimated.
         """
         mean, covariance = self.of_parts
         of_prior = covariance @ (self._prior[..., np.newaxis] * covariance)
         whole = covariance + mean[..., np.newaxis] * mean[:, np.newaxis]
-        kept = self.kept[..., np.newaxis]
-        left = kept * of_prior + (kept * (1.0 - kept) + dropped[..., np.newaxis]) * whole
-        per = self.per[:, PARTS]
-        variance: FloatArray = np.einsum("npru,npq,nqru->nru", per, left, per)
-        return np.sqrt(np.maximum(variance, 0.0))
+        kept, per = self.kept[..., np.newaxis], self.per[:, PARTS].transpose(0, 2, 3, 1)
+        doubt = kept * (1.0 - kept) * whole
+        left = kept * of_prior + dropped[..., np.newaxis] * whole
+        of_doubt, of_rest = (
+            np.asarray(per @ each[:, np.newaxis] @ per.swapaxes(2, 3)) for each in (doubt, left)
+        )
+        return of_doubt, of_rest
 
     def through_parts(self) -> FloatArray:
         """Return weights of the influences in the unknowns through the kept `PARTS`, by row."""
