@@ -1,6 +1,7 @@
 """Parts of background loops: repetition, logging of failures, pauses with heartbeats."""
 
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
 
 import structlog
 
@@ -13,7 +14,7 @@ LOOK_S = 20.0
 """Maximum interval between heartbeats during a sleep in `rest`."""
 
 MAX_REST_S = 120.0
-"""Maximum pause of `rest_after`."""
+"""Maximum pause of `paced`."""
 
 
 class TroubleLog:
@@ -59,9 +60,16 @@ async def rest(duration_s: float, clock: Clock, pulse: Pulse) -> None:
         await clock.sleep(min(left_s, LOOK_S))
 
 
-async def rest_after(taken_s: float, share: float, clock: Clock, pulse: Pulse) -> None:
-    """Sleep for `share` times the duration `taken_s` of the last run, and send heartbeats.
+@asynccontextmanager
+async def paced(
+    share: float, clock: Clock, pulse: Pulse, min_rest_s: float = 0.0
+) -> AsyncIterator[None]:
+    """Return a context manager that sleeps after its block, and sends heartbeats.
 
-    The sleep is limited to `MAX_REST_S`, so that one slow disk access does not stall the loop.
+    The sleep takes `share` times as long as the block, at least `min_rest_s`, and at most
+    `MAX_REST_S`, so that one slow disk access does not stall the loop. An error ends it at once.
     """
-    await rest(min(share * taken_s, MAX_REST_S), clock, pulse)
+    begun_s = clock.monotonic_s()
+    yield
+    taken_s = clock.monotonic_s() - begun_s
+    await rest(min(max(share * taken_s, min_rest_s), MAX_REST_S), clock, pulse)

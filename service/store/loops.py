@@ -4,7 +4,7 @@ import asyncio
 
 from acquisition.clock import Clock
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.runtime.periodic import LOOK_S, TroubleLog, rest, rest_after
+from service.runtime.periodic import LOOK_S, TroubleLog, paced, rest
 from service.store.integrity import Integrity
 from service.store.port import StoreError
 from service.store.retention import Ages, RetentionStore
@@ -52,7 +52,10 @@ class RetentionLoop:
             now_ns = min(self._clock.now_ns(), believed_ns)
             for series in await asyncio.to_thread(self._store.series):
                 pulse.beat(LOOK_S)
-                found |= await self._rested(series, now_ns, pulse)
+                async with paced(RETENTION_REST_SHARE, self._clock, pulse):
+                    found |= await asyncio.to_thread(
+                        self._store.delete, series, self._limits, now_ns
+                    )
             found |= await asyncio.to_thread(self._store.prune, self._limits, now_ns)
             found |= await asyncio.to_thread(self._store.give_back)
         except StoreError as error:
@@ -60,13 +63,6 @@ class RetentionLoop:
             return False
         self._trouble.note(None)
         self._blocked.note(self._store.trouble)
-        return found
-
-    async def _rested(self, series: int, now_ns: int, pulse: Pulse) -> bool:
-        begun_s = self._clock.monotonic_s()
-        found = await asyncio.to_thread(self._store.delete, series, self._limits, now_ns)
-        taken_s = self._clock.monotonic_s() - begun_s
-        await rest_after(taken_s, RETENTION_REST_SHARE, self._clock, pulse)
         return found
 
 
@@ -100,10 +96,8 @@ class RollupLoop:
             due = await asyncio.to_thread(self._rollups.due, now_ns)
             for series in due:
                 pulse.beat(ROLLUP_PERIOD_S)
-                begun_s = self._clock.monotonic_s()
-                await asyncio.to_thread(self._rollups.gather, series, now_ns)
-                taken_s = self._clock.monotonic_s() - begun_s
-                await rest_after(taken_s, ROLLUP_REST_SHARE, self._clock, pulse)
+                async with paced(ROLLUP_REST_SHARE, self._clock, pulse):
+                    await asyncio.to_thread(self._rollups.gather, series, now_ns)
         except StoreError as error:
             self._trouble.note(str(error))
             return False
@@ -140,19 +134,12 @@ class ScrubLoop:
 
         An error of the store is logged; the result is then False.
         """
-        begun_s = self._clock.monotonic_s()
         try:
-            is_around = await asyncio.to_thread(self._integrity.check_some)
+            async with paced(SCRUB_REST_SHARE, self._clock, pulse, MIN_REST_S):
+                is_around = await asyncio.to_thread(self._integrity.check_some)
+                self._trouble.note(None)
         except StoreError as error:
             self._trouble.note(str(error))
             await self._clock.sleep(LOOK_S)
             return False
-        self._trouble.note(None)
-        taken_s = self._clock.monotonic_s() - begun_s
-        await rest_after(
-            max(MIN_REST_S / SCRUB_REST_SHARE, taken_s),
-            SCRUB_REST_SHARE,
-            self._clock,
-            pulse,
-        )
         return is_around

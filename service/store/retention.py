@@ -20,7 +20,10 @@ from service.settings.storage import RetentionSettings
 from service.store.database import Connect, Connection, Reading, Tables
 from service.store.rollups.rows import HOUR_NS, NS_PER_S, WIDTHS_NS, Cells, select_cells
 from service.store.rollups.writing import (
+    DELETE_READINGS,
+    NEXT_TIMES,
     SINGLE_S,
+    floored,
     forget_width,
     minutes_of,
     rolled_columns,
@@ -42,16 +45,11 @@ MAX_MESSAGES = 500
 MEAN_TOLERANCE = 1e-9
 """Tolerance of means relative to the larger extreme; rounding depends on the summation order."""
 
-NEXT_READINGS = """
-    SELECT time_ns FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?
-    ORDER BY time_ns LIMIT ?
-"""
 NEXT_CELL = """
     SELECT start_ns FROM rollup_cell
     WHERE series = ? AND width_s = ? AND start_ns >= ? AND start_ns < ?
     ORDER BY start_ns LIMIT 1
 """
-DELETE_READINGS = "DELETE FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?"
 REDONE = "SELECT start_ns FROM rollup_redo WHERE series = ? AND start_ns >= ? AND start_ns < ?"
 REDO = "INSERT INTO rollup_redo VALUES (?, ?) ON CONFLICT DO NOTHING"
 OLD_FILM_READINGS = """
@@ -100,7 +98,7 @@ class Step(Enum):
 def _delete_readings(writer: Connection, series: int, before_ns: int) -> Step:
     """Delete the next single readings of a bearing before a time, in whole hours."""
     deleted = select_deleted(writer, series)
-    limit_ns = _floor(min(before_ns, select_mark(writer, series)))
+    limit_ns = floored(min(before_ns, select_mark(writer, series)), HOUR_NS)
     span = _next_readings(writer, series, (deleted.readings_ns, limit_ns))
     end_ns = _verified_until(writer, series, span)
     if end_ns <= span[0]:
@@ -119,7 +117,7 @@ def _delete_rollups(width_s: int, writer: Connection, series: int, before_ns: in
     """
     width_ns, deleted = width_s * NS_PER_S, select_deleted(writer, series)
     finer_s = {wider // NS_PER_S: finer // NS_PER_S for finer, wider in pairwise((0, *WIDTHS_NS))}
-    limit_ns = _floor(min(before_ns, deleted.of(finer_s[width_s])))
+    limit_ns = floored(min(before_ns, deleted.of(finer_s[width_s])), HOUR_NS)
     span = _next_cells(writer, series, width_s, (deleted.of(width_s), limit_ns))
     if span[0] >= span[1] or writer.execute(REDONE, (series, *span)).fetchone():
         return Step.NONE  # late readings are merged first
@@ -239,10 +237,10 @@ class RetentionStore(Tables):
 
 def _next_readings(writer: Connection, series: int, within: Span) -> Span:
     """Return the span of the next whole hours with readings; empty span without readings."""
-    rows = writer.execute(NEXT_READINGS, (series, *within, MAX_READINGS)).fetchall()
+    rows = writer.execute(NEXT_TIMES, (series, *within, MAX_READINGS)).fetchall()
     if not rows:
         return within[0], within[0]
-    first_ns, last_ns = _floor(rows[0][0]), _floor(rows[-1][0])
+    first_ns, last_ns = (floored(row[0], HOUR_NS) for row in (rows[0], rows[-1]))
     is_cut = len(rows) == MAX_READINGS and last_ns > first_ns
     return first_ns, last_ns if is_cut else last_ns + HOUR_NS
 
@@ -251,7 +249,8 @@ def _next_cells(writer: Connection, series: int, width_s: int, within: Span) -> 
     row = writer.execute(NEXT_CELL, (series, width_s, *within)).fetchone()
     if row is None:
         return within[0], within[0]
-    return _floor(row[0]), min(_floor(row[0]) + MAX_HOURS * HOUR_NS, within[1])
+    first_ns = floored(row[0], HOUR_NS)
+    return first_ns, min(first_ns + MAX_HOURS * HOUR_NS, within[1])
 
 
 def _verified_until(writer: Connection, series: int, span: Span) -> int:
@@ -297,10 +296,6 @@ def _is_same(found: Cells, wanted: Cells) -> bool:
     with np.errstate(invalid="ignore"):
         is_off = np.abs(ours.mean - theirs.mean) > MEAN_TOLERANCE * largest
     return not bool(is_off.any())
-
-
-def _floor(time_ns: int) -> int:
-    return time_ns - time_ns % HOUR_NS
 
 
 RETENTION_TABLES = """

@@ -9,6 +9,7 @@ import psycopg
 
 from service.settings.storage import Origin
 from service.store.database import Connection, Unreadable
+from service.store.pool import Pool
 from service.store.port import StoreError
 from service.store.postgres.connection import (
     WRITING,
@@ -24,7 +25,6 @@ from service.store.postgres.connection import (
 )
 from service.store.postgres.schema import migrate
 
-N_KEPT = 4
 READER_SETTINGS = """
     SET default_transaction_read_only = on; SET statement_timeout = '30s';
 """
@@ -36,9 +36,8 @@ class Readers:
 
     def __init__(self, address: PostgresAddress) -> None:
         self._address = address
-        self._lock = Lock()
-        self._idle: list[Session] = []
-        self._is_closed = False
+        self._pool = Pool[Session]()
+        self.close = self._pool.close
 
     @contextmanager
     def reading(self) -> Iterator[PostgresConnection]:
@@ -55,18 +54,12 @@ class Readers:
             except BaseException:
                 session.close()
                 raise
-            self._put_back(session)
-
-    def close(self) -> None:
-        """Close idle sessions now, and sessions in use when their transactions end."""
-        with self._lock:
-            self._is_closed = True
-            idle, self._idle = self._idle, []
-        for session in idle:
-            session.close()
+            self._pool.put_back(session)
 
     def _begun(self) -> Session:
-        while (idle := self._taken()) is not None:
+        if self._pool.is_closed:
+            raise StoreError(f"{self._address.name} is closed")
+        while (idle := self._pool.take()) is not None:
             try:
                 idle.execute(BEGIN_READING)
             except psycopg.OperationalError:  # the server has been restarted since
@@ -76,19 +69,6 @@ class Readers:
         session = connected(self._address, "reader", READER_SETTINGS)
         session.execute(BEGIN_READING)
         return session
-
-    def _taken(self) -> Session | None:
-        with self._lock:
-            if self._is_closed:
-                raise StoreError(f"{self._address.name} is closed")
-            return self._idle.pop() if self._idle else None
-
-    def _put_back(self, session: Session) -> None:
-        with self._lock:
-            if not self._is_closed and len(self._idle) < N_KEPT:
-                self._idle.append(session)
-                return
-        session.close()
 
 
 WRITER_SETTINGS = """

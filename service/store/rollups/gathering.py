@@ -5,8 +5,11 @@ from itertools import pairwise
 from service.store.database import Connection, Tables
 from service.store.rollups.rows import HOUR_NS, WIDTHS_NS, select_cells, together
 from service.store.rollups.writing import (
+    DELETE_READINGS,
     MINUTE_NS,
+    NEXT_TIMES,
     DeletedUntil,
+    floored,
     forget_width,
     insert_cells,
     minutes_of,
@@ -15,8 +18,6 @@ from service.store.rollups.writing import (
     select_mark,
 )
 from service.store.trends import Span
-
-DELETE_HOUR = "DELETE FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?"
 
 
 def merge_late(writer: Connection, series: int, hour_ns: int, deleted: DeletedUntil) -> None:
@@ -36,7 +37,7 @@ def merge_late(writer: Connection, series: int, hour_ns: int, deleted: DeletedUn
         forget_width(writer, series, width_ns, hour)
         all_ = late if before is None else together(before, late).gathered(width_ns)
         insert_cells(writer, series, width_ns, all_)
-    writer.execute(DELETE_HOUR, (series, *hour))
+    writer.execute(DELETE_READINGS, (series, *hour))
 
 
 MAX_READINGS = 2000
@@ -45,10 +46,6 @@ MAX_READINGS = 2000
 MAX_REDONE = 24
 """Maximum number of hours that are aggregated again per step."""
 
-NEXT_TIMES = """
-    SELECT time_ns FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?
-    ORDER BY time_ns LIMIT ?
-"""
 SET_MARK = """
     INSERT INTO rollup_mark VALUES (?, ?)
     ON CONFLICT (series) DO UPDATE SET until_ns = excluded.until_ns
@@ -94,7 +91,7 @@ def _until(writer: Connection, series: int, mark_ns: int, now_ns: int) -> int:
     times = writer.execute(NEXT_TIMES, (series, mark_ns, end_ns, MAX_READINGS)).fetchall()
     if not times:
         return mark_ns
-    first_ns, last_ns = (_floor(time[0], MINUTE_NS) for time in (times[0], times[-1]))
+    first_ns, last_ns = (floored(time[0], MINUTE_NS) for time in (times[0], times[-1]))
     is_one_minute = len(times) == MAX_READINGS and last_ns == first_ns
     return first_ns + MINUTE_NS if is_one_minute else max(mark_ns, last_ns)
 
@@ -105,14 +102,10 @@ def _gather(writer: Connection, series: int, span: Span) -> None:
     if minutes is not None:
         insert_cells(writer, series, MINUTE_NS, minutes)
     for finer_ns, width_ns in pairwise(WIDTHS_NS):
-        whole = (_floor(span[0], width_ns), _floor(span[1], width_ns))
+        whole = (floored(span[0], width_ns), floored(span[1], width_ns))
         cells = select_cells(writer, series, finer_ns, whole, rolled_columns(writer))
         if cells is not None:
             insert_cells(writer, series, width_ns, cells.gathered(width_ns))
-
-
-def _floor(time_ns: int, width_ns: int) -> int:
-    return time_ns - time_ns % width_ns
 
 
 DUE = """

@@ -25,8 +25,18 @@ SELECT_WHOLE = """
     operating_state, eccentricity_ratio, oil_temperature_c
     FROM whole_assessment WHERE series = ? AND time_ns >= ? AND time_ns < ? ORDER BY time_ns
 """
+NEXT_TIMES = """
+    SELECT time_ns FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?
+    ORDER BY time_ns LIMIT ?
+"""
+DELETE_READINGS = "DELETE FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?"
 INSERT_CELL = "INSERT INTO rollup_cell VALUES (?,?,?,?,?,?,?,?,?,?)"
 INSERT_NUMBERS = "INSERT INTO rollup_numbers VALUES (?,?,?,?,?,?)"
+
+
+def floored(time_ns: int, width_ns: int) -> int:
+    """Return a time rounded down to a multiple of a width."""
+    return time_ns - time_ns % width_ns
 
 
 def select_mark(reader: Connection, series: int) -> int:

@@ -9,10 +9,10 @@ from threading import Lock
 from acquisition.clock import SystemClock
 from service.runtime.asker import ASKER
 from service.store.highwater.commits import CommitMarks
+from service.store.pool import Pool
 from service.store.sqlite.file import leaves_in_doubt
 
 BUSY_TIMEOUT_S = 5.0
-N_KEPT = 4
 LOOK_AFTER_STEPS = 20_000
 """Number of SQLite instructions, some tens of microseconds, between two checks whether a query has
 timed out or its client has disconnected."""
@@ -44,9 +44,8 @@ class Readers:
     ) -> None:
         self._prepare, self._now_s, self._require = prepare, now_s, require
         self._uri = f"{path.absolute().as_uri()}?mode=ro"
-        self._lock = Lock()
-        self._idle: list[sqlite3.Connection] = []
-        self._is_closed = False
+        self._pool = Pool[sqlite3.Connection]()
+        self.close = self._pool.close
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
@@ -54,7 +53,8 @@ class Readers:
 
         Raises `sqlite3.Error`, and the error of `require`.
         """
-        reader = self._taken()
+        self._require()
+        reader = self._pool.take() or self._opened()
         try:
             reader.set_progress_handler(self._should_end(), LOOK_AFTER_STEPS)
             reader.execute("BEGIN")  # one consistent state for the whole block
@@ -65,27 +65,12 @@ class Readers:
         except BaseException:
             reader.close()
             raise
-        self._put_back(reader)
-
-    def close(self) -> None:
-        """Close idle connections now, and connections in use when their transactions end."""
-        with self._lock:
-            self._is_closed = True
-            idle, self._idle = self._idle, []
-        for reader in idle:
-            reader.close()
+        self._pool.put_back(reader)
 
     def _should_end(self) -> Callable[[], bool]:
         """Return a callback that is true when a query has timed out or its client is gone."""
         asker, end_s = ASKER.get(), self._now_s() + LONGEST_S
         return lambda: self._now_s() > end_s or (asker is not None and asker.has_gone)
-
-    def _taken(self) -> sqlite3.Connection:
-        self._require()
-        with self._lock:
-            if self._idle:
-                return self._idle.pop()
-        return self._opened()
 
     def _opened(self) -> sqlite3.Connection:
         reader = sqlite3.connect(
@@ -97,13 +82,6 @@ class Readers:
             reader.close()
             raise
         return reader
-
-    def _put_back(self, reader: sqlite3.Connection) -> None:
-        with self._lock:
-            if not self._is_closed and len(self._idle) < N_KEPT:
-                self._idle.append(reader)
-                return
-        reader.close()
 
 
 MAX_LOG_BYTES = 67_108_864

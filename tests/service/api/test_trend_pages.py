@@ -65,6 +65,7 @@ def stored(serve, plant, database_file, assessment) -> Any:
             shaft_centre_y_um=-5.0,
             eccentricity_ratio=0.2,
             attitude_angle_deg=30.0,
+            pad_temperature_3_c=60.0 + n,
         )
         for n in range(N)
     ]
@@ -111,6 +112,12 @@ async def test_a_trend_is_the_same_numbers_as_csv(stored):
     assert {float(row[f"{K}_u_random [N/m]"]) for row in rows} == {2e6}
     assert {row[f"{K}_worst_level"] for row in rows} == {"good"}
     assert {row["is_simulated"] for row in rows} == {"False"}
+    pad = {"quantity": "pad_temperature_3_c", "format": "csv"}
+    rows = list(
+        csv.DictReader(io.StringIO((await stored.get(f"{UJB}/trends", **WHOLE, **pad)).text))
+    )
+    assert float(rows[-1]["pad_temperature_3_c_maximum [°C]"]) == 60.0 + N - 1
+    await stored.problem(f"{UJB}/trends", 422, **WHOLE, quantity="pad_temperature_3_m")
     assert rows[-1]["time_utc"] == "2026-01-01T00:00:24.000Z"
     page = {"quantity": K, "max_points": 10, "cursor": "first", "format": "csv"}
     first = await stored.get(f"{UJB}/trends", **WHOLE, **page)
