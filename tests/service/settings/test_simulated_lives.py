@@ -12,6 +12,7 @@ from acquisition.errors import ConfigError
 from core.change.film_reading import film_reading
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
+from core.condition.pad_temperatures import DIRECTION, VECTOR, pad_pattern
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
@@ -124,3 +125,16 @@ def test_a_wrong_life_is_refused_with_key_and_value(tmp_path, old, new, said):
     with pytest.raises(TomlFileError) as refusal:
         plant_with(LIFE.replace(old, new, 1), tmp_path)
     assert said in str(refusal.value)
+
+
+def test_the_simulated_pads_are_hottest_on_the_side_of_the_shaft(stepped_clock):
+    """Unit 2 of the demo: centre of UJB at (60, -35) µm of 200, full load."""
+    unit = load_plant_file(DEMO).unit[1]
+    slow = simulated_feed(unit, stepped_clock).advance(50).slow
+    pads = [(slow[s.id], s.angle_deg) for s in unit.slow_channel if s.angle_deg is not None]
+    pattern = pad_pattern(pads)
+    assert len(pads) == 4
+    assert pattern[DIRECTION].value == pytest.approx(-30.0, abs=15.0)
+    assert pattern[VECTOR].value == pytest.approx(10.0 * 69.5 / 200.0, rel=0.4)
+    assert slow["head"].value == pytest.approx(117.5, abs=0.1)
+    assert slow["gate_opening"].value == pytest.approx(84.0, abs=1.0)
