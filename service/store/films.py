@@ -206,8 +206,6 @@ DIRECTION_COLUMNS = """
 """SQL columns of a film reading in one direction, as created by this migration."""
 
 FILM_TABLES = f"""
-    ALTER TABLE assessment ADD COLUMN operating_state INTEGER;
-    ALTER TABLE assessment ADD COLUMN is_settled INTEGER;
     CREATE TABLE film_reading (
         series INTEGER NOT NULL REFERENCES series (id),
         estimator TEXT NOT NULL,

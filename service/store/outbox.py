@@ -273,8 +273,8 @@ OUTBOX_TABLES = """
         FOREIGN KEY (alarm, number) REFERENCES alarm_event (alarm, number)
     ) STRICT;
     CREATE INDEX outbox_of_receiver ON outbox (receiver, state, id);
-    CREATE TRIGGER outbox_kept BEFORE DELETE ON outbox
-    BEGIN SELECT RAISE(ABORT, 'messages are kept'); END;
+    CREATE TRIGGER outbox_kept BEFORE DELETE ON outbox WHEN OLD.state = 'waiting'
+    BEGIN SELECT RAISE(ABORT, 'waiting messages are kept'); END;
     CREATE TRIGGER outbox_kept_as_queued
     BEFORE UPDATE OF receiver, event_id, alarm, number, body ON outbox
     BEGIN SELECT RAISE(ABORT, 'messages are kept as they were queued'); END;

@@ -305,9 +305,6 @@ RETENTION_TABLES = """
         until_ns INTEGER NOT NULL,
         PRIMARY KEY (series, width_s)
     ) STRICT, WITHOUT ROWID;
-    DROP TRIGGER outbox_kept;
-    CREATE TRIGGER outbox_kept BEFORE DELETE ON outbox WHEN OLD.state = 'waiting'
-    BEGIN SELECT RAISE(ABORT, 'waiting messages are kept'); END;
 """
 """Migration that creates the table of the times up to which data were deleted.
 

@@ -9,7 +9,7 @@ file has the tables of accounts, sessions and keys, the other file has the table
 file has its own audit trail.
 """
 
-from service.store.access.tables import ACCESS_TABLES, MUST_CHANGE
+from service.store.access.tables import ACCESS_TABLES
 from service.store.audit import AUDIT_TABLES
 from service.store.films import FILM_TABLES
 from service.store.outbox import OUTBOX_TABLES
@@ -48,6 +48,10 @@ MIGRATIONS = (
         layout INTEGER NOT NULL REFERENCES layout (id),
         reading_values BLOB NOT NULL,
         reading_qualities BLOB NOT NULL,
+        estimator_xx TEXT,
+        estimator_yy TEXT,
+        operating_state INTEGER,
+        is_settled INTEGER,
         PRIMARY KEY (series, time_ns)
     ) STRICT, WITHOUT ROWID;
     CREATE TABLE gap (
@@ -56,12 +60,10 @@ MIGRATIONS = (
         first_index INTEGER NOT NULL,
         n_samples INTEGER NOT NULL,
         stop_ns INTEGER NOT NULL,
+        start_ns INTEGER,
+        is_estimated INTEGER NOT NULL DEFAULT 0 CHECK (is_estimated IN (0, 1)),
         PRIMARY KEY (unit, epoch, first_index, stop_ns)
     ) STRICT, WITHOUT ROWID;
-    """,
-    """
-    ALTER TABLE assessment ADD COLUMN estimator_xx TEXT;
-    ALTER TABLE assessment ADD COLUMN estimator_yy TEXT;
     """,
     """
     CREATE TABLE gap_reference (
@@ -108,7 +110,12 @@ MIGRATIONS = (
         shelf_until_ns INTEGER,
         outage_actor TEXT,
         outage_reason TEXT,
-        outage_since_ns INTEGER
+        outage_since_ns INTEGER,
+        operating_state INTEGER,
+        eccentricity_ratio REAL,
+        attitude_deg REAL,
+        oil_temperature_c REAL,
+        directions TEXT NOT NULL DEFAULT ''
     ) STRICT, WITHOUT ROWID;
     CREATE TABLE alarm_event (
         id INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -127,6 +134,11 @@ MIGRATIONS = (
         limit_value REAL,
         actor TEXT NOT NULL,
         reason TEXT NOT NULL,
+        operating_state INTEGER,
+        eccentricity_ratio REAL,
+        attitude_deg REAL,
+        oil_temperature_c REAL,
+        directions TEXT NOT NULL DEFAULT '',
         UNIQUE (alarm, number)
     ) STRICT;
     CREATE INDEX alarm_event_of_unit ON alarm_event (unit, id);
@@ -143,36 +155,14 @@ MIGRATIONS = (
     SPECTRA_TABLES,
     ROLLUP_TABLES,
     UNIT_STATUS_TABLES + COMMAND_TABLES,
-    """
-    ALTER TABLE gap ADD COLUMN start_ns INTEGER;
-    ALTER TABLE gap ADD COLUMN is_estimated INTEGER NOT NULL DEFAULT 0
-        CHECK (is_estimated IN (0, 1));
-    """,
     WAVEFORM_TABLES,
     RETENTION_TABLES,
     POSITION_TABLES,
-    MUST_CHANGE,
-    "".join(
-        f"ALTER TABLE {table} ADD COLUMN operating_state INTEGER;"
-        f" ALTER TABLE {table} ADD COLUMN eccentricity_ratio REAL;"
-        f" ALTER TABLE {table} ADD COLUMN attitude_deg REAL;"
-        f" ALTER TABLE {table} ADD COLUMN oil_temperature_c REAL;"
-        for table in ("alarm", "alarm_event")
-    ),
-    """
-    ALTER TABLE alarm ADD COLUMN directions TEXT NOT NULL DEFAULT '';
-    ALTER TABLE alarm_event ADD COLUMN directions TEXT NOT NULL DEFAULT '';
-    """,
 )
 """SQL script of each migration; item n migrates a database from schema n to schema n + 1."""
-
-OF_ACCESS = frozenset({ACCESS_TABLES, MUST_CHANGE})
-"""Migrations of the access file alone."""
-
-OF_BOTH = frozenset({AUDIT_TABLES})
 
 
 def migration_of(number: int, *, is_access: bool) -> str:
     """Return the script of a migration for one of the two SQLite files; empty if it has none."""
     script = MIGRATIONS[number]
-    return script if script in OF_BOTH or (script in OF_ACCESS) == is_access else ""
+    return script if script == AUDIT_TABLES or (script == ACCESS_TABLES) == is_access else ""

@@ -422,12 +422,6 @@ def _key(row: tuple[Any, ...]) -> ApiKey:
     return ApiKey(id_, name, bytes(digest), Role(role), tuple(json.loads(units)), *times)
 
 
-MUST_CHANGE = """
-    ALTER TABLE account ADD COLUMN must_change INTEGER NOT NULL DEFAULT 0
-        CHECK (must_change IN (0, 1));
-"""
-"""Migration that adds a flag to each account: the owner must change the password."""
-
 ACCESS_TABLES = """
     CREATE TABLE account (
         name TEXT PRIMARY KEY,
@@ -435,7 +429,8 @@ ACCESS_TABLES = """
         password_hash TEXT NOT NULL,
         password_number INTEGER NOT NULL CHECK (password_number > 0),
         created_ns INTEGER NOT NULL,
-        password_ns INTEGER NOT NULL
+        password_ns INTEGER NOT NULL,
+        must_change INTEGER NOT NULL DEFAULT 0 CHECK (must_change IN (0, 1))
     ) STRICT;
     CREATE TABLE session (
         digest BLOB PRIMARY KEY CHECK (length(digest) = 32),

@@ -19,7 +19,6 @@ _TRIGGER = re.compile(
     r"\s+(?:WHEN (?P<condition>.+?)\s+)?BEGIN\s+(?P<body>.+?)\s*END;",
     re.S,
 )
-_DROPPED = re.compile(r"DROP TRIGGER (\w+);")
 _REFUSAL = re.compile(r"SELECT RAISE\(ABORT, ('(?:[^']|'')*')\)")
 _WORDS = (
     (r"\bid INTEGER PRIMARY KEY(?: AUTOINCREMENT)?(?=\s*,)", "id BIGINT {identity} PRIMARY KEY"),
@@ -49,11 +48,6 @@ def for_postgres(migration: str) -> list[str]:
 def _written(statement: str) -> list[str]:
     if statement.startswith("CREATE TRIGGER"):
         return _trigger(statement)
-    if (dropped := _DROPPED.fullmatch(statement)) is not None:
-        return [
-            f"DROP FUNCTION IF EXISTS {name}() CASCADE;"
-            for name in (dropped[1], f"{dropped[1]}_all")
-        ]
     for old, new in _WORDS:
         statement = re.sub(old, new.replace("{identity}", _IDENTITY), statement)
     return [statement]
