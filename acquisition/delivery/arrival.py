@@ -7,6 +7,7 @@ between device clock and host clock, and the delay of each sample is relative to
 import math
 from collections import deque
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -144,8 +145,8 @@ class ArrivalModel:
         n_faults
             Number of faults of the device's time stamps, for the result.
         """
-        offsets_ns = [ns for *_, ns in self._bins if ns is not None]
-        offset_ns = max(offsets_ns[-_MIN_BINS:], default=None)
+        offsets_ns = (bin_[2] for bin_ in reversed(self._bins) if bin_[2] is not None)
+        offset_ns = max(islice(offsets_ns, _MIN_BINS), default=None)
         drift = None if self._drift is None else -1e6 * self._drift[0]
         return DeviceClock(
             offset_s=None if offset_ns is None else offset_ns / NS_PER_S,

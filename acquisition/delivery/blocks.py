@@ -94,7 +94,7 @@ def _in_cells(block: SampleBlock, length: int) -> SampleBlock:
     side, first_cut = block.side, -block.first_index % length or length
     starts = np.concatenate([[0], np.arange(first_cut, block.n_samples, length)])
     start_ns, ok, slow = side.start_ns, side.ok, side.slow
-    if not np.array_equal(starts, side.starts):
+    if len(starts) != side.n_cells or (starts != side.starts).any():
         at = np.searchsorted(side.starts, starts, side="right") - 1
         passed_ns = (starts - side.starts[at]) * NS_PER_S / block.rate_hz
         start_ns, slow = start_ns[at] + np.rint(passed_ns).astype(np.int64), slow[:, at]
@@ -136,22 +136,21 @@ class StampCheck:
         self._doubted: _Stamp | None = None
         self.n_faults = 0
 
-    def check(self, block: SampleBlock) -> tuple[SampleBlock, StampFault | None]:
-        """Return the block with corrected stamps, and the fault of the first wrong one or None."""
+    def check(self, block: SampleBlock) -> tuple[SideValues, StampFault | None]:
+        """Return the side values with corrected stamps, and the fault of the first wrong stamp."""
         side, index = block.side, block.first_index + block.side.starts
         if block.epoch != self._epoch:  # the first stamp of an epoch has nothing to disagree with
             self._epoch, self._rate_hz = block.epoch, block.rate_hz
             self._good, self._doubted = (block.first_index, block.start_ns), None
         if side.n_cells > 16 and self._all_fit(index, side.start_ns):  # arrays pay for many cells
-            return block, None
+            return side, None
         stamps = zip(index.tolist(), side.start_ns.tolist(), strict=True)
         found = [self._checked(stamp) for stamp in stamps]
         faults = [fault for _, fault in found if fault]
         if not faults:
-            return block, None
+            return side, None
         self.n_faults += len(faults)
-        side = replace(side, start_ns=np.array([start_ns for start_ns, _ in found]))
-        return replace(block, side=side), faults[0]
+        return replace(side, start_ns=np.array([start_ns for start_ns, _ in found])), faults[0]
 
     def _checked(self, stamp: _Stamp) -> tuple[int, StampFault | None]:
         """Return the corrected time of a stamp, ns, and the fault of the stamp or None."""
@@ -247,13 +246,30 @@ class BlockAssembler:
         has_stamp
             Whether these blocks have device stamps, if the device provides stamps.
         """
-        checked: list[SampleBlock] = []
+        checked = [self._stamps.check(block) for block in blocks]
+        if arrived is None:
+            return self._joiner.put(
+                replace(block, side=side, stamp_fault=fault) if fault else block
+                for block, (side, fault) in zip(blocks, checked, strict=True)
+            )
+        for block, (_, fault) in zip(blocks, checked, strict=True):
+            stop_ns = block.stop_ns if self._stamped and has_stamp and not fault else None
+            self._arrivals.add(block.epoch, block.stop_index, stop_ns, arrived)
+        clock, found = self._clock(), []
         n_after = sum(block.n_samples for block in blocks)
-        for block in blocks:
+        for block, (side, fault) in zip(blocks, checked, strict=True):
             n_after -= block.n_samples
-            late_s = held_s + n_after / block.rate_hz
-            checked.append(self._checked(block, arrived, late_s, has_stamp))
-        return self._with_clock(self._joiner.put(checked))
+            found.append(
+                replace(
+                    block,
+                    side=side,
+                    sampled_s=arrived.steady_s - held_s - n_after / block.rate_hz,
+                    stamp_fault=fault or self._fault,
+                    clock=clock,
+                )
+            )
+            self._fault = None
+        return self._joiner.put(found)
 
     @property
     def holds_whole_cells(self) -> bool:
@@ -262,26 +278,11 @@ class BlockAssembler:
 
     def release(self) -> list[SampleBlock]:
         """Return the complete cells held so far; for a pause of the device or a lost link."""
-        return self._with_clock(self._joiner.release())
+        return self._joiner.release()
 
     def flush(self) -> list[SampleBlock]:
         """Return all held samples, with an incomplete last cell; for the end of a recording."""
         return self._joiner.flush()
-
-    def _checked(
-        self, block: SampleBlock, arrived: Arrival | None, held_s: float, has_stamp: bool
-    ) -> SampleBlock:
-        block, own_fault = self._stamps.check(block)
-        if arrived is not None:
-            is_stamped = self._stamped and has_stamp and not own_fault
-            stop_ns = block.stop_ns if is_stamped else None
-            self._arrivals.add(block.epoch, block.stop_index, stop_ns, arrived)
-            block = replace(block, sampled_s=arrived.steady_s - held_s)
-        fault, self._fault = own_fault or self._fault, None
-        return replace(block, stamp_fault=fault) if fault else block
-
-    def _with_clock(self, done: Sequence[SampleBlock]) -> list[SampleBlock]:
-        return [b if b.sampled_s is None else replace(b, clock=self._clock()) for b in done]
 
     def _clock(self) -> DeviceClock:
         clock = self._arrivals.device_clock(self._stamps.n_faults)

@@ -6,7 +6,7 @@ pymodbus is used for the simulated devices only; decision record 31 states the r
 import asyncio
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
-from itertools import count
+from itertools import count, repeat
 
 from acquisition.delivery.network import KnownAddresses
 from acquisition.errors import ConfigError, FrameError, LinkError
@@ -42,7 +42,7 @@ _N_IDENTITY_TRIES = 2
 """Identity reads before a mismatch is an error; one reply may be corrupted in transmission."""
 
 _MAX_SILENCE_TRIES = 5
-_MAX_CLOSED_BURSTS = 2
+_MAX_INTERRUPTED = 2
 _BUSY_WAIT_S = 0.05
 """Delay before a request to a busy device is repeated; shorter than a poll period."""
 
@@ -60,8 +60,9 @@ class ModbusClient:
     ----------
     requests_in_flight
         Maximum number of requests sent before the first reply: the configured number, reduced to 1
-        after several requests in flight had a wrong or missing reply, or after the device has
-        closed the connection twice in succession while several requests were in flight.
+        after several requests in flight had a wrong reply, or were interrupted twice in succession
+        because the device closed the connection or did not reply. A device that has never replied
+        to several requests in flight is given no second try after a missing reply.
     """
 
     def __init__(self, settings: LinkSettings) -> None:
@@ -69,7 +70,8 @@ class ModbusClient:
         self._protocol = ReplyProtocol(settings.transport)
         self._addresses: KnownAddresses | None = None
         self._transactions = (1 + n % _N_TRANSACTIONS for n in count())
-        self._n_closed_bursts = 0
+        self._n_interrupted = 0
+        self._has_answered_several = False
         self.requests_in_flight = settings.requests_in_flight
 
     @property
@@ -204,17 +206,21 @@ class ModbusClient:
         found = await self.read(identity.address, len(identity.words), identity.function)
         return identity.misfit(found)
 
-    async def _replies(self, requests: Sequence[ReadRequest]) -> list[memoryview]:
+    async def _replies(self, requests: Sequence[ReadRequest]) -> list[bytes]:
         """Return the PDUs of the replies to requests; repeat requests to a busy device."""
-        replies: list[memoryview] = []
+        is_line = isinstance(self._settings.transport, SerialTransport)
+        n_at_once = len(requests) if self.is_kept and not is_line else 1
+        replies: list[bytes] = []
         while len(replies) < len(requests):
-            burst = requests[len(replies) : len(replies) + self.requests_in_flight]
-            for request, reply in zip(burst, await self._exchange(burst), strict=True):
-                is_refusal = reply[0] & EXCEPTION_BIT
-                replies.append(await self._retry_busy(request, reply) if is_refusal else reply)
+            asked = requests[len(replies) : len(replies) + n_at_once]
+            found = await self._exchange(asked)
+            for n, reply in enumerate(found):
+                if reply[0] & EXCEPTION_BIT:
+                    found[n] = await self._retry_busy(asked[n], reply)
+            replies += found
         return replies
 
-    async def _retry_busy(self, request: ReadRequest, reply: memoryview) -> memoryview:
+    async def _retry_busy(self, request: ReadRequest, reply: bytes) -> bytes:
         """Repeat a request while the device is busy, for at most `timeout_s`; return the reply."""
         for _ in range(int(self._settings.timeout_s / _BUSY_WAIT_S)):
             if reply[1] != BUSY:
@@ -225,7 +231,7 @@ class ModbusClient:
                 return reply
         raise exception_error(self.where, reply[1], request)
 
-    async def _exchange(self, burst: Sequence[ReadRequest]) -> list[memoryview]:
+    async def _exchange(self, requests: Sequence[ReadRequest]) -> list[bytes]:
         """Send requests once and return the replies; first connect if connections are not kept."""
         unit, transport = self._settings.device_id, self._settings.transport
         try:
@@ -233,8 +239,11 @@ class ModbusClient:
                 await self._connect()
             if isinstance(transport, SerialTransport):
                 await asyncio.sleep(transport.frame_gap_s)
-            pending = [PendingRequest(request, unit, next(self._transactions)) for request in burst]
-            replies = await self._protocol.exchange(pending, self._settings.timeout_s)
+            replies = await self._protocol.exchange(
+                list(map(PendingRequest, requests, repeat(unit), self._transactions)),
+                self.requests_in_flight,
+                self._settings.timeout_s,
+            )
         except (ConfigError, asyncio.CancelledError):
             self.close()
             raise
@@ -246,21 +255,24 @@ class ModbusClient:
                 if is_wrong
                 else str(error)
             )
-            if len(burst) > 1 and self._shows_too_many(error):
+            n_in_flight = self._protocol.n_in_flight
+            if n_in_flight > 1 and self._shows_too_many(error):
                 self.requests_in_flight = 1
-                words += f"; {len(burst)} requests were in flight, from now on one at a time"
+                words += f"; {n_in_flight} requests were in flight, from now on one at a time"
             raise LinkError(words) from error
-        self._n_closed_bursts = 0
+        if min(len(requests), self.requests_in_flight) > 1:
+            self._n_interrupted, self._has_answered_several = 0, True
         if not self.is_kept:
             self.close()
         return replies
 
     def _shows_too_many(self, error: LinkError | FrameError) -> bool:
         """Return whether an error shows that a device cannot handle several requests in flight."""
-        if isinstance(error, SilenceError | FrameError):
+        if isinstance(error, FrameError):
             return True
-        self._n_closed_bursts += 1
-        return self._n_closed_bursts >= _MAX_CLOSED_BURSTS
+        self._n_interrupted += 1
+        is_new = isinstance(error, SilenceError) and not self._has_answered_several
+        return is_new or self._n_interrupted >= _MAX_INTERRUPTED
 
     async def _connect(self) -> None:
         self._protocol.close()

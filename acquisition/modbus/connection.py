@@ -35,6 +35,8 @@ class ReplyProtocol(asyncio.Protocol):
 
     Attributes
     ----------
+    n_in_flight
+        Number of requests in the last burst, which were sent together.
     unsolicited
         Description of bytes received while no request was in flight; empty if there were none.
     """
@@ -45,10 +47,13 @@ class ReplyProtocol(asyncio.Protocol):
         self._where = str(transport)
         self._transport: asyncio.Transport | None = None
         self._in_flight: deque[PendingRequest] = deque()
+        self._unsent: Sequence[PendingRequest] = ()
+        self._max_in_flight = 1
         self._received = b""
-        self._replies: list[memoryview] = []
-        self._done: asyncio.Future[list[memoryview]] | None = None
+        self._replies: list[bytes] = []
+        self._done: asyncio.Future[list[bytes]] | None = None
         self._watch: asyncio.TimerHandle
+        self.n_in_flight = 0
         self.unsolicited = ""
 
     @property
@@ -61,8 +66,13 @@ class ReplyProtocol(asyncio.Protocol):
         if self._transport is not None:
             self._transport.close()
 
-    async def exchange(self, burst: Sequence[PendingRequest], timeout_s: float) -> list[memoryview]:
-        """Send requests in one write; return the PDUs of their replies in the same order.
+    async def exchange(
+        self, requests: Sequence[PendingRequest], max_in_flight: int, timeout_s: float
+    ) -> list[bytes]:
+        """Send requests in bursts; return the PDUs of their replies in the same order.
+
+        Each burst of up to `max_in_flight` requests is sent in one write, after all replies to the
+        burst before it.
 
         Raises
         ------
@@ -72,22 +82,31 @@ class ReplyProtocol(asyncio.Protocol):
         FrameError
             If the received bytes are not the next reply, or arrived before any request.
         """
-        transport = self._transport
+        transport, self.n_in_flight = self._transport, 0
         if transport is None or transport.is_closing():
             raise LinkError(f"{self._where}: {CLOSED}")
         if self.unsolicited:
             raise FrameError(f"{self._where}: {self.unsolicited}")
         loop = asyncio.get_running_loop()
         self._done, self._replies, self._received = loop.create_future(), [], b""
-        self._in_flight.extend(burst)
+        self._unsent, self._max_in_flight = requests, max_in_flight
         self._watch_for(timeout_s)
-        transport.write(b"".join([self._framing.frame(pending) for pending in burst]))
+        self._send_burst()
         try:
             return await self._done
         finally:
             self._watch.cancel()
             self._in_flight.clear()
+            self._unsent = ()
             self._done = None
+
+    def _send_burst(self) -> None:
+        """Send the next requests together."""
+        burst = self._unsent[: self._max_in_flight]
+        self._unsent, self.n_in_flight = self._unsent[len(burst) :], len(burst)
+        self._in_flight.extend(burst)
+        if self._transport is not None:
+            self._transport.write(b"".join(map(self._framing.frame, burst)))
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Store the transport of the new connection."""
@@ -103,18 +122,22 @@ class ReplyProtocol(asyncio.Protocol):
         if not self._in_flight:
             self.unsolicited = f"{len(data)} unsolicited bytes: {data[:_SHOWN_BYTES].hex()}"
             return
-        received = memoryview(self._received + data if self._received else data)
+        received = self._received + data if self._received else data
         try:
-            self._received = bytes(received[self._take(received) :])
+            self._received = received[self._take(received) :]
         except FrameError as fault:
-            shown = bytes(received[:_SHOWN_BYTES]).hex()
+            shown = received[:_SHOWN_BYTES].hex()
             self._fail(FrameError(f"{self._where}: {fault}: {shown}"))
 
-    def _take(self, received: memoryview) -> int:
+    def _take(self, received: bytes) -> int:
         """Store the complete replies in received bytes; return the number of bytes they occupy."""
-        at = 0
+        at, view = 0, memoryview(received)
+        if replies := self._framing.take_all(received, self._in_flight):
+            at = len(received)
+            self._replies += replies
+            self._in_flight.clear()
         while self._in_flight:
-            found = self._framing.take(received[at:], self._in_flight[0])
+            found = self._framing.take(view[at:], self._in_flight[0])
             if found is None:
                 return at
             n_bytes, reply = found
@@ -123,7 +146,9 @@ class ReplyProtocol(asyncio.Protocol):
             self._replies.append(reply)
         if at < len(received):
             raise FrameError(f"{len(received) - at} excess bytes after the reply")
-        if self._done is not None and not self._done.done():
+        if self._unsent:
+            self._send_burst()
+        elif self._done is not None and not self._done.done():
             self._done.set_result(self._replies)
         return at
 
@@ -143,6 +168,7 @@ class ReplyProtocol(asyncio.Protocol):
 
     def _fail(self, error: LinkError | FrameError) -> None:
         self._in_flight.clear()
+        self._unsent = ()
         if self._done is not None and not self._done.done():
             self._done.set_exception(error)
 

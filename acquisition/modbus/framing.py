@@ -5,6 +5,7 @@ stops at the first error, because the start of the next reply is then unknown.
 """
 
 import struct
+from collections.abc import Iterable
 from typing import NamedTuple, TypeAlias
 
 from acquisition.errors import FrameError
@@ -30,7 +31,24 @@ class TcpFraming:
         pdu = pending.request.pdu
         return _MBAP.pack(pending.transaction, 0, len(pdu) + 1, pending.unit) + pdu
 
-    def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, memoryview] | None:
+    def take_all(self, data: bytes, burst: Iterable[PendingRequest]) -> list[bytes]:
+        """Return the PDUs of the replies if the bytes are exactly the usual replies to a burst.
+
+        Empty if any reply needs `take`: an incomplete or wrong one, an exception, or one of
+        variable length.
+        """
+        pdus, at = [], 0
+        for request, unit, transaction in burst:
+            if not (n_bytes := request.n_reply_bytes):
+                return []
+            head = _MBAP.pack(transaction, 0, n_bytes + 1, unit) + request.reply_start
+            if not data.startswith(head, at):
+                return []
+            at += _MBAP.size + n_bytes
+            pdus.append(data[at - n_bytes : at])
+        return pdus if at == len(data) else []
+
+    def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, bytes] | None:
         """Extract the reply to a request from received bytes.
 
         Returns
@@ -55,7 +73,7 @@ class TcpFraming:
         # the two lengths of a reply of variable length must agree
         if n_stated < n_min or n_stated > MAX_PDU_BYTES or (n_arrived >= n_min < n_stated):
             raise FrameError(f"length is {length} bytes, expected {n_min + 1}")
-        return (_MBAP.size + n_stated, pdu) if n_arrived == n_stated else None
+        return (_MBAP.size + n_stated, pdu.tobytes()) if n_arrived == n_stated else None
 
 
 class RtuFraming:
@@ -66,7 +84,11 @@ class RtuFraming:
         body = bytes((pending.unit,)) + pending.request.pdu
         return body + crc16(body).to_bytes(2, "little")
 
-    def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, memoryview] | None:
+    def take_all(self, _data: bytes, _burst: Iterable[PendingRequest]) -> list[bytes]:
+        """Return no PDUs: one request at a time is in flight, and `take` checks its reply."""
+        return []
+
+    def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, bytes] | None:
         """Extract the reply to a request; results and errors are as those of `TcpFraming.take`."""
         if len(data) < 2:
             return None
@@ -78,7 +100,7 @@ class RtuFraming:
         found, expected = int.from_bytes(data[end : end + 2], "little"), crc16(data[:end])
         if found != expected:
             raise FrameError(f"CRC is {found:#06x}, expected {expected:#06x}")
-        return end + 2, data[1:end]
+        return end + 2, data[1:end].tobytes()
 
 
 Framing: TypeAlias = TcpFraming | RtuFraming

@@ -5,7 +5,7 @@ Requests and replies are PDUs: the bytes from the function code on, identical ov
 
 import struct
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkError
 
@@ -97,7 +97,7 @@ class Span:
         return -(-self.count // 8) if self.function in BIT_FUNCTIONS else 2 * self.count
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ReadRequest:
     """Modbus read request, given by its PDU.
 
@@ -130,6 +130,18 @@ class ReadRequest:
         function, address, count = _SPAN_REQUEST.unpack(self.pdu)
         return f"a read of {count} at {address}, function {function}"
 
+    @cached_property
+    def n_reply_bytes(self) -> int:
+        """Length of the reply to a read of registers or bits; 0 for other requests."""
+        count = self.pdu[-2] << 8 | self.pdu[-1]
+        n_bytes = 2 * count if self.pdu[0] in REGISTER_FUNCTIONS else -(-count // 8)
+        return 2 + n_bytes if self.pdu[0] in SPAN_FUNCTIONS else 0
+
+    @cached_property
+    def reply_start(self) -> bytes:
+        """Function code and byte count of the reply to a read of registers or bits."""
+        return bytes((self.pdu[0], self.n_reply_bytes - 2))
+
     def min_bytes(self, reply: memoryview) -> int:
         """Return the minimum length of the reply in bytes, given the bytes received so far.
 
@@ -152,11 +164,10 @@ class ReadRequest:
             return _fifo_bytes(reply)
         if function == READ_IDENTIFICATION:
             return _identification_bytes(reply, self.pdu[1:3])
-        count = self.pdu[3] << 8 | self.pdu[4]
-        n_bytes = 2 * count if function in REGISTER_FUNCTIONS else -(-count // 8)
-        if len(reply) > 1 and reply[1] != n_bytes:
-            raise FrameError(f"byte count is {reply[1]}, expected {n_bytes}")
-        return 2 + n_bytes
+        n_bytes = self.n_reply_bytes
+        if len(reply) > 1 and reply[1] != n_bytes - 2:
+            raise FrameError(f"byte count is {reply[1]}, expected {n_bytes - 2}")
+        return n_bytes
 
 
 def _fifo_bytes(reply: memoryview) -> int:
@@ -220,12 +231,12 @@ def identification_request(first_object: int = 0) -> ReadRequest:
     return ReadRequest(bytes((READ_IDENTIFICATION, _MEI, _READ_BASIC, first_object)))
 
 
-def fifo_registers(reply: memoryview) -> bytes:
+def fifo_registers(reply: bytes) -> bytes:
     """Return the registers of a FIFO reply as big-endian words."""
-    return bytes(reply[_FIFO_HEAD.size :])
+    return reply[_FIFO_HEAD.size :]
 
 
-def identification_objects(reply: memoryview) -> tuple[dict[int, bytes], int | None]:
+def identification_objects(reply: bytes) -> tuple[dict[int, bytes], int | None]:
     """Return the objects in an identification reply by number, and the next object to request.
 
     The next object is None if the identification is complete.
@@ -234,7 +245,7 @@ def identification_objects(reply: memoryview) -> tuple[dict[int, bytes], int | N
     objects, at = {}, _IDENTIFICATION_HEAD.size
     for _ in range(n_objects):
         number, n_bytes = reply[at], reply[at + 1]
-        objects[number] = bytes(reply[at + 2 : at + 2 + n_bytes])
+        objects[number] = reply[at + 2 : at + 2 + n_bytes]
         at += 2 + n_bytes
     return objects, next_object if more_follows else None
 

@@ -14,13 +14,17 @@ from acquisition.modbus.ring_profile import (
     RingHeader,
     RingLayout,
     Slot,
+    SlotRecords,
+    damages_of,
     decode_header,
     decode_slots,
+    slot_records,
 )
-from acquisition.modbus.timeline import Refusal, Timeline, ahead
+from acquisition.modbus.timeline import US_PER_S, Refusal, Timeline, ahead
 from core.samples.axis import Epochs
 from core.samples.blocks import Rejection, SampleBlock, SideValues
 from core.samples.calibration import UnitCalibration
+from core.units import NS_PER_S
 
 _N_TRIES = 4
 """Maximum number of attempts to read a valid header; the device may be writing the header."""
@@ -57,12 +61,12 @@ class RingReader:
         kind = ConfigError if isinstance(fault, ConfigError) else LinkError
         raise kind(f"{self.where}: {fault}") from fault
 
-    async def slots(self, layout: RingLayout, sequences: Sequence[int]) -> list[Slot]:
+    async def slots(self, layout: RingLayout, sequences: Sequence[int]) -> SlotRecords:
         """Read the slots at the ring positions of sequence numbers, without checking the slots.
 
         Returns
         -------
-        list
+        (n_sequences,)
             Slot found at the ring position of each sequence number; it may be another slot.
         """
         spans: list[Span] = []
@@ -71,7 +75,7 @@ class RingReader:
             if spans and spans[-1].stop == start:  # no padding between slots
                 start, count = spans[-1].address, spans.pop().count + count
             spans.append(Span(start, count, self._header.function))
-        return decode_slots(await self._client.read_spans(spans), layout)
+        return slot_records(await self._client.read_spans(spans), layout)
 
 
 _N_REREADS = 3
@@ -155,9 +159,40 @@ class RingFollower:
         wanted = self._unread(header)
         if not wanted:
             return []
-        found = await self._read(header.layout, wanted)
+        records = await self._reader.slots(header.layout, wanted)
+        block = self._block_of_sound(records, wanted, header)
+        if block is not None:
+            self._handled = wanted[-1]
+            return [block]
+        records, slots = await self._reread(records, header.layout, wanted)
         self._handled = wanted[-1]
-        return self._placed(list(zip(wanted, found, strict=True)), header)
+        return self._placed(records, list(zip(wanted, slots, strict=True)), header)
+
+    def _block_of_sound(
+        self, records: SlotRecords, wanted: Sequence[int], header: RingHeader
+    ) -> SampleBlock | None:
+        """Return the block of slots that are all sound and continue the axis, as is the rule.
+
+        None if any slot needs `_judge`. The slots are checked together, which costs a fifth.
+        """
+        heads, n_samples = records["head"].astype(np.int64), header.layout.samples_per_slot
+        indices = heads[0, 1] + np.arange(0, len(wanted) * n_samples, n_samples)
+        is_sound = (
+            (heads[:, 0] == wanted).all()
+            and (records["trailer"] == heads[:, 0] & 0xFFFF).all()
+            and ((heads[:, 1] - indices) % U32 == 0).all()
+            and (heads[:, 3] < US_PER_S).all()
+            and (heads[:, 5] == header.epoch).all()
+            and not any(damages_of(records))
+        )
+        index = None
+        if is_sound:
+            [newest] = decode_slots(records[-1:])
+            index = self._timeline.place_run(newest, len(wanted))
+        if index is None:
+            return None
+        rejected, self._rejected = self._rejected, Counter()
+        return self._block(self._epochs.number, index, rejected, records)
 
     async def _enter(self, header: RingHeader) -> None:
         """Set the read position at the start, after a restart, or if the sequence went back."""
@@ -210,25 +245,32 @@ class RingFollower:
         return [(header.newest - n_there + 1 + n) % U32 for n in range(n_wanted)]
 
     async def _newest_slot(self, header: RingHeader) -> Slot | None:
-        [slot] = await self._read(header.layout, [header.newest])
+        wanted = [header.newest]
+        records = await self._reader.slots(header.layout, wanted)
+        _, [slot] = await self._reread(records, header.layout, wanted)
         known = slot.epoch == header.epoch and slot.sequence == header.newest
         return slot if known and slot.whole and not slot.blank else None
 
-    async def _read(self, layout: RingLayout, wanted: Sequence[int]) -> list[Slot]:
-        """Read slots; repeat the read of inconsistent slots, which the device may be writing."""
-        slots = await self._reader.slots(layout, wanted)
-        for i, sequence in enumerate(wanted):
+    async def _reread(
+        self, records: SlotRecords, layout: RingLayout, wanted: Sequence[int]
+    ) -> tuple[SlotRecords, list[Slot]]:
+        """Repeat the read of inconsistent slots, which the device may be writing; return all."""
+        records, slots = records.copy(), decode_slots(records)
+        for n, sequence in enumerate(wanted):
             for _ in range(_N_REREADS):
-                if not _doubtful(slots[i], sequence, layout):
+                if not _doubtful(slots[n], sequence, layout):
                     break
-                [slots[i]] = await self._reader.slots(layout, [sequence])
-        return slots
+                records[n : n + 1] = await self._reader.slots(layout, [sequence])
+                [slots[n]] = decode_slots(records[n : n + 1])
+        return records, slots
 
-    def _placed(self, found: Sequence[tuple[int, Slot]], header: RingHeader) -> list[SampleBlock]:
+    def _placed(
+        self, records: SlotRecords, found: Sequence[tuple[int, Slot]], header: RingHeader
+    ) -> list[SampleBlock]:
         """Return the accepted slots, with consecutive slots joined to one block."""
-        runs: list[tuple[int, int, Counter[Refusal], list[Slot]]] = []
+        runs: list[tuple[int, int, Counter[Refusal], list[int]]] = []
         n_samples, follows = header.layout.samples_per_slot, (-1, -1)
-        for sequence, slot in found:
+        for row, (sequence, slot) in enumerate(found):
             index = self._judge(sequence, slot, header)
             if isinstance(index, Refusal):
                 self._rejected[index] += n_samples
@@ -237,9 +279,12 @@ class RingFollower:
                 if self._rejected or (epoch, index) != follows:
                     runs.append((epoch, index, self._rejected, []))
                     self._rejected = Counter()
-                runs[-1][-1].append(slot)
+                runs[-1][-1].append(row)
                 follows = (epoch, index + n_samples)
-        return [self._block(*run) for run in runs]
+        return [
+            self._block(epoch, index, rejected, records[rows])
+            for epoch, index, rejected, rows in runs
+        ]
 
     def _judge(self, sequence: int, slot: Slot, header: RingHeader) -> int | Refusal | None:
         """Return the index of a slot's first sample, or the reason for refusing the slot.
@@ -259,20 +304,22 @@ class RingFollower:
         return self._timeline.place(slot)
 
     def _block(
-        self, epoch: int, index: int, rejected: Counter[Refusal], slots: Sequence[Slot]
+        self, epoch: int, index: int, rejected: Counter[Refusal], records: SlotRecords
     ) -> SampleBlock:
-        n_channels, n_samples = slots[0].counts.shape
-        ok_bits = np.array([slot.ok_bits for slot in slots])
+        n_slots, n_channels, n_samples = records["counts"].shape
+        counts = np.empty((n_channels, n_slots, n_samples), dtype=np.int16)
+        counts[:] = records["counts"].transpose(1, 0, 2)
+        heads = records["head"].astype(np.int64)
         return SampleBlock(
             calibration=self._calibration,
             epoch=epoch,
             first_index=index,
-            counts=np.concatenate([slot.counts for slot in slots], axis=1),
+            counts=counts.reshape(n_channels, -1),
             side=SideValues(
-                starts=np.arange(0, len(slots) * n_samples, n_samples),
-                start_ns=np.array([slot.start_ns for slot in slots]),
-                ok=(ok_bits >> np.arange(n_channels)[:, np.newaxis] & 1).astype(np.bool_),
-                slow=np.array([slot.slow for slot in slots], dtype=np.float64).T,
+                starts=np.arange(0, n_slots * n_samples, n_samples),
+                start_ns=heads[:, 2] * NS_PER_S + heads[:, 3] * 1000,
+                ok=(heads[:, 4] >> np.arange(n_channels)[:, np.newaxis] & 1).astype(np.bool_),
+                slow=records["slow"].T.astype(np.float64),
             ),
             rejected=tuple(Rejection(str(reason), n) for reason, n in rejected.items()),
         )

@@ -19,14 +19,18 @@ import struct
 import zlib
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.requests import ADDRESS_SPACE
 from core.arrays import CountArray
 from core.units import NS_PER_S
+
+SlotRecords: TypeAlias = npt.NDArray[np.void]
+"""(n_slots,) slots as read, of type `RingLayout.slot_type`."""
 
 MAGIC = 0x5057
 VERSION = 2
@@ -217,15 +221,28 @@ class Slot:
         return not self.torn and not self.damage
 
 
-def decode_slots(content: bytes, layout: RingLayout) -> list[Slot]:
-    """Return the slots in the concatenated registers of consecutive slots."""
-    records, view = np.frombuffer(content, layout.slot_type), memoryview(content)
-    counts, n_bytes = records["counts"].astype(np.int16), records.itemsize
-    columns = (records[name].tolist() for name in ("head", "slow", "trailer", "crc"))
+def slot_records(content: bytes, layout: RingLayout) -> SlotRecords:
+    """Return the registers of consecutive slots as records of `RingLayout.slot_type`, unchecked."""
+    return np.frombuffer(content, layout.slot_type)
+
+
+def damages_of(records: SlotRecords) -> list[int]:
+    """Return `Slot.damage` of each record."""
+    n_bytes, content = records.itemsize, records.tobytes()
+    view = memoryview(content)
+    starts = range(0, len(content), n_bytes)
+    return [
+        zlib.crc32(view[start : start + n_bytes - 2 * _CRC_REGISTERS]) ^ crc
+        for start, crc in zip(starts, records["crc"].tolist(), strict=True)
+    ]
+
+
+def decode_slots(records: SlotRecords) -> list[Slot]:
+    """Return records of slots as values."""
+    counts, damages = records["counts"].astype(np.int16), damages_of(records)
+    heads, slow, trailers = (records[name].tolist() for name in ("head", "slow", "trailer"))
     slots = []
-    for n, (head, slow, trailer, crc) in enumerate(zip(*columns, strict=True)):
-        data = view[n * n_bytes : (n + 1) * n_bytes]
-        sequence, first_index, seconds, microseconds, ok_bits, epoch = head
+    for n, (sequence, first_index, seconds, microseconds, ok_bits, epoch) in enumerate(heads):
         slots.append(
             Slot(
                 sequence,
@@ -234,11 +251,11 @@ def decode_slots(content: bytes, layout: RingLayout) -> list[Slot]:
                 microseconds,
                 ok_bits,
                 counts[n],
-                trailer,
+                trailers[n],
                 epoch,
-                slow=tuple(slow),
-                damage=zlib.crc32(data[: -2 * _CRC_REGISTERS]) ^ crc,
-                blank=not any(data),
+                slow=tuple(slow[n]),
+                damage=damages[n],
+                blank=not any(records[n].tobytes()),
             )
         )
     return slots

@@ -1,6 +1,7 @@
 """Snapshots of units, built from the parts of the measuring process, and the reports on them."""
 
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 from acquisition.clock import Clock
@@ -56,6 +57,7 @@ class SnapshotBuilder:
         self._units = {unit.id: unit for unit in units}
         self._live, self._alarms, self._films, self._clock = live, alarms, films, clock
         self._built: dict[str, _Built] = {}
+        self._owned: tuple[object, Mapping[str, list[Alarm]]] = (None, {})
 
     def report(self, unit: str) -> UnitReport:
         """Return the present state of a unit, or of the alarms of `PLANT` or `SHARED`."""
@@ -64,19 +66,19 @@ class SnapshotBuilder:
 
     def _newest(self, unit: str) -> _Built:
         round_ = self._clock.monotonic_s() // REBUILT_EVERY_S
-        own = self._live.revision(unit) if unit in self._units else 0
-        key = (own, self._alarms.revision, self._films.revision, round_)
+        is_unit, alarms = unit in self._units, self._alarms_of(unit, round_)
+        own = (self._live.revision(unit), self._alarms.is_connected(unit)) if is_unit else ()
+        key = (own, alarms, self._films.revision, round_)
         built = self._built.get(unit)
         if built is not None and built.key == key:
             return built
-        snapshot = self._snapshot(unit)
+        snapshot = self._snapshot(unit, alarms)
         if built is None or built.snapshot != snapshot:
             built = _Built(key, 1 if built is None else built.revision + 1, snapshot)
         self._built[unit] = built = replace(built, key=key)
         return built
 
-    def _snapshot(self, unit: str) -> UnitSnapshot:
-        own = [alarm for alarm in self._alarms.alarms if self._owner(alarm) == unit]
+    def _snapshot(self, unit: str, own: Sequence[Alarm]) -> UnitSnapshot:
         bearings = [each.id for each in self._units[unit].bearing] if unit in self._units else []
         found = {bearing: self._live.assessment(unit, bearing) for bearing in bearings}
         seen = {bearing: self._films.newest(unit, bearing) for bearing in bearings}
@@ -89,6 +91,16 @@ class SnapshotBuilder:
             films={b: FilmSnapshot(**vars(news)) for b, news in seen.items() if news},
             baselines={b: found.origin.version for b, found in in_force.items() if found},
         )
+
+    def _alarms_of(self, unit: str, round_: float) -> Sequence[Alarm]:
+        """Return the alarms that a report on a unit contains; all alarms are sorted at once."""
+        key = (self._alarms.revision, round_)
+        if self._owned[0] != key:
+            owned: dict[str, list[Alarm]] = defaultdict(list)
+            for alarm in self._alarms.alarms:
+                owned[self._owner(alarm)].append(alarm)
+            self._owned = key, owned
+        return self._owned[1].get(unit, ())
 
     def _owner(self, alarm: Alarm) -> str:
         unit = reporting_unit(alarm.identity)

@@ -94,10 +94,10 @@ class ModbusLinkSettings(Settings):
     "identification" (function 43/14). By default only the format of the data is checked."""
 
     requests_in_flight: Annotated[int, Field(ge=1, le=16)] | None = None
-    """Maximum number of pending requests over TCP, 1 to 16; by default six for a block ring and one
-    for other devices, because some devices support only one. If replies arrive out of order,
-    requests are sent one at a time from then on. `padwatch probe in-flight` measures the number
-    that a device supports."""
+    """Maximum number of pending requests over TCP, 1 to 16; by default 16 for a block ring and one
+    for other devices, because some devices support only one. After a wrong reply, or two
+    interruptions in succession, requests are sent one at a time from then on. `padwatch probe
+    in-flight` measures the number that a device supports."""
 
     @model_validator(mode="after")
     def _check_link(self) -> Self:

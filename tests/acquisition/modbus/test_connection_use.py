@@ -298,6 +298,29 @@ async def test_a_device_that_cannot_is_asked_one_at_a_time_and_told_once(behave,
         link.close()
 
 
+async def test_one_silence_of_a_device_that_can_answer_many_costs_nothing_and_two_do():
+    behaviour = [in_order, nothing, in_order, nothing, nothing]
+    async with device(lambda asked: behaviour.pop(0)(asked)) as port:
+        link = client(port)
+        for complaint in (
+            None,
+            "within 0.2 s$",
+            None,
+            "within 0.2 s$",
+            "from now on one at a time",
+        ):
+            await link.open()
+            assert await link.read(0, 1) == bytes(2)
+            if complaint is None:
+                assert await link.read_spans(SPANS) == RIGHT
+            else:
+                with pytest.raises(LinkError, match=complaint):
+                    await link.read_spans(SPANS)
+        await link.open()
+        assert await link.read_spans(SPANS) == RIGHT
+        link.close()
+
+
 async def test_a_device_that_hangs_up_twice_running_is_asked_one_at_a_time():
     async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         while len(data := await reader.read(4096)) == 12:
