@@ -22,6 +22,7 @@ DRAWN_WITHOUT_A_SIZE = """async (files) => {
   orbitPicture().draw(clip, 2, { turns: 1, whole: true, alone: false, inClearance: true });
 }"""
 
+STIFFNESS = "stiffness_xx_n_per_m"
 CONNECTED = {"state": "connected", "reason": None, "data_age_s": 0.2}
 DRIFT = {"kind": "clock_drift", "level": "alert", "is_active": True, "value": 300.0}
 DRIFT |= {"limit": 200.0, "value_unit": "ppm"}
@@ -35,11 +36,12 @@ async def test_an_alarm_leads_to_where_most_is_told_about_it(plant, page):
     await page.goto(plant.url + EMPTY)
     bearing = ("order1_shaft_x", "zone_bearing_y", "oil_temperature", "gap_x", "opposite_gap_y")
     alarms = [("film_stiffness", "UJB"), ("channel_not_ok", "a"), ("link_lost", "link")]
-    alarms += [(kind, "UJB") for kind in bearing]
+    alarms += [("pad_temperature", "ujb_pad_1"), *((kind, "UJB") for kind in bearing)]
     told = [{"unit": "U1", "subject": subject, "kind": kind} for kind, subject in alarms]
     found = [await page.evaluate(CALL, ["alarm_place", "alarmPlace", alarm]) for alarm in told]
     place = "#/units/U1/bearings/UJB"
-    assert found == [f"{place}/film", "#/units/U1", "#/sources", *([place] * len(bearing))]
+    unit = "#/units/U1"
+    assert found == [f"{place}/film", unit, "#/sources", unit, *([place] * len(bearing))]
     at = {"operating_state": "full_load", "eccentricity_ratio": 0.37, "attitude_deg": None}
     raised = {"raised_at": at | {"oil_temperature_c": 46.2}}
     words = await page.evaluate(CALL, ["alarm_words", "raisedWords", raised])
@@ -120,6 +122,15 @@ async def test_a_verdict_says_since_when_and_in_which_directions(plant, page):
     assert confirmed == "x expected 0.330 GN/m; confirmed −12 %"
     now = await page.evaluate(CALL, ["film_words", "nowSentence", words])
     assert now == "Now 0.231, expected 0.330 GN/m (−29.8 %)."
+    ratio = words | dict.fromkeys(("stiffness_n_per_m", "expected_n_per_m"))
+    ratio |= {"stiffness_of_kb": 0.41, "expected_of_kb": 0.584}
+    now = await page.evaluate(CALL, ["film_words", "nowSentence", ratio])
+    assert now == "Now 0.410, expected 0.584 k_b (−29.8 %)."
+    unknown = {"value": None, "level": "bad", "reason": "bracket_unknown", "uncertainty": None}
+    known = unknown | {"value": 0.41, "level": "good", "reason": "ok"}
+    latest = {"readings": {"stiffness_xx_n_per_m": unknown, "stiffness_xx_of_kb": known}}
+    found = await page.evaluate(CALL, ["parts/reading", "readingOf", latest, STIFFNESS])
+    assert (found["name"], found["value"]) == ("stiffness_xx_of_kb", 0.41)
     ahead = words | {"verdict": "normal", "level": None}
     limits = {"alert_percent": 3.5, "danger_percent": 15.0}
     film = {"why_not": None, "limits": limits, "x": ahead, "y": ahead}

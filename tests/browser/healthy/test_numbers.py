@@ -1,9 +1,10 @@
 """What a page says is what the API says, to the last digit shown; nothing else passes for it."""
 
 from on_screen import A_NUMBER, freeze
-from playwright.async_api import Page, expect
+from playwright.async_api import Page, Route, expect
 
 BEARING = "#/units/U1/bearings/UJB"
+PREFERRED = "stiffness_xx_n_per_m"
 N_NUMBERS = 57
 """Two preferred, seven of operation and gaps, four of the shaft centre, 13 for each of two orders
 (amplitudes, coherence, frequency, equation (5), transfer), four phases, five broad-band, and
@@ -86,6 +87,26 @@ async def test_every_number_of_a_bearing_equals_the_api_to_the_last_digit(plant,
     for name in ("dynamic_k_xx_n_per_m", "dynamic_c_yy_n_s_per_m", "dynamic_n_lines"):
         number = page.locator(f".film [data-reading={name}] .number")
         await expect(number).to_have_text(A_NUMBER)
+
+
+async def test_recorded_quantities_and_ratios_to_the_bracket_are_on_the_page(plant, page):
+    known = {"level": "good", "reason": "ok", "uncertainty": None}
+    added = {"pad_temperature_2_c": 58.34, "head_m": 118.0, "stiffness_xx_of_kb": 0.585}
+
+    async def with_more(route: Route) -> None:
+        response = await route.fetch(headers={})
+        body = await response.json()
+        body["readings"] |= {name: known | {"value": value} for name, value in added.items()}
+        await route.fulfill(json=body)
+
+    await page.route("**/bearings/UJB/latest", with_more)
+    await page.goto(plant.url + BEARING)
+    await page.locator("details.fold summary").click()
+    for name, text in (("pad_temperature_2_c", "58.3"), ("head_m", "118.0")):
+        await expect(page.locator(f"[data-reading={name}] .number")).to_have_text(text)
+    stiffness = page.locator(f".tiles [data-reading={PREFERRED}]")
+    await expect(stiffness.locator(".number")).to_have_text("0.585")
+    await expect(stiffness.locator(".suffix")).to_have_text("k_b")
 
 
 async def test_the_overview_shows_the_numbers_of_every_bearing(plant, page):
