@@ -53,7 +53,9 @@ const STATES = {
 export const stateWords = (state) => STATES[state] ?? state.replaceAll("_", " ");
 
 /** Look and word of a verdict; a level that is held shows, whether or not it can be judged now. */
-export function verdictMark({ verdict, level }) {
+export function verdictMark({ verdict, level, deviation_percent: deviation }, { danger_percent: limit }) {
+  // the newest reading is beyond the limit of danger, and the mean that is judged is not yet
+  if (verdict === "normal" && level === null && Math.abs(deviation ?? 0) > limit) return ["quiet", "Change not confirmed yet"];
   const [look, word] = VERDICTS[verdict] ?? ["quiet", verdict.replaceAll("_", " ")];
   return level === null || verdict === level ? [look, word] : [level, `${word}, ${level} held`];
 }

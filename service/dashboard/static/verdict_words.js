@@ -35,14 +35,9 @@ export function bearingVerdict(film, alarms) {
 /** The worse verdict of x and y, without alarms. */
 function filmVerdict(film) {
   if (film.why_not !== null) return ["quiet", "Not watched", "not watched"];
-  const marks = [film.x, film.y].map((one) => (isAhead(one, film.limits) ? ["quiet", "Change not confirmed yet"] : verdictMark(one)));
+  const marks = [film.x, film.y].map((one) => verdictMark(one, film.limits));
   const [look, words] = marks.toSorted(([a], [b]) => RANKS.indexOf(a) - RANKS.indexOf(b))[0];
   return [look, words, words.toLowerCase()];
-}
-
-/** Whether the newest reading is beyond the limit of danger, and the mean that the verdict is about is not yet. */
-function isAhead({ verdict, level, deviation_percent: deviation }, { danger_percent: limit }) {
-  return verdict === "normal" && level === null && Math.abs(deviation ?? 0) > limit;
 }
 
 function changeWords(film, { directions, value, condition_reason: reason }) {

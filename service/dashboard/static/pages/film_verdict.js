@@ -47,8 +47,9 @@ function directionRow(direction) {
   return {
     node: element("div", { class: "verdict", "data-direction": direction }, element("span", { class: "axis" }, direction), verdict.node, element("span", {}, change, " ", said)),
     draw(found, limits) {
-      verdict.draw(...verdictMark(found));
-      setText(change, nowSentence({ ...found, deviation_percent: found.deviation?.percent ?? null }));
+      const now = { ...found, deviation_percent: found.deviation?.percent ?? null };
+      verdict.draw(...verdictMark(now, limits));
+      setText(change, nowSentence(now));
       setText(said, [whyUnjudged(found), changeSentence(found), pendingSentence(found, limits), causeSentence(found.cause)].filter(Boolean).join(" "));
     },
   };
