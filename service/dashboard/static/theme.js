@@ -6,7 +6,7 @@ const KEY = "padwatch-theme";
 const CHANGED = "padwatch-theme";
 
 /** Value and words of each choice; the first is what a new browser shows. */
-export const THEMES = [["system", "as the system"], ["light", "light"], ["dark", "dark"]];
+export const THEMES = [["system", "System"], ["light", "Light"], ["dark", "Dark"]];
 
 const systemIsDark = matchMedia("(prefers-color-scheme: dark)");
 let chosen = kept(KEY, THEMES.map(([value]) => value));

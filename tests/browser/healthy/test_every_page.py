@@ -107,7 +107,7 @@ async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembe
     await page.emulate_media(color_scheme="dark")
     await page.goto(plant.url + BEARING)
     dark = await page.evaluate(BAND)
-    await page.get_by_label("Look").select_option("light")
+    await page.get_by_label("Theme").select_option("light")
     light = await page.evaluate(BAND)
     assert light != dark
     await page.reload()
@@ -116,7 +116,7 @@ async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembe
     await expect(grid).to_be_attached()
     stroke = "node => node.style.stroke"
     drawn = await grid.evaluate(stroke)
-    await page.get_by_label("Look").select_option("system")
+    await page.get_by_label("Theme").select_option("system")
     assert await page.evaluate(BAND) == dark
     await page.wait_for_function(REDRAWN, arg=drawn)
 

@@ -37,7 +37,7 @@ async def test_a_film_is_told_in_words_and_its_charts_say_what_they_show(plant, 
         caption = page.locator(f"[data-chart={name}] figcaption")
         assert len(await caption.inner_text()) > 40
     await expect(page.locator("[data-chart=baseline-map] figcaption")).to_contain_text(
-        "borrowed from around"
+        "interpolated"
     )
     await page.get_by_role("radio", name="y", exact=True).check()
     await expect(page.locator("[data-chart=baseline-map] figcaption")).to_contain_text(

@@ -24,7 +24,7 @@ const middle = (cell) => [
 
 /** What there is to say of one cell. */
 function words(cell) {
-  const support = { own: "learned here", borrowed: "borrowed from around", none: "seen too seldom to judge" }[cell.support];
+  const support = { own: "learned here", borrowed: "interpolated", none: "too few readings" }[cell.support];
   return [
     `<b>${formatFixed(shownOf(cell).value, 3)} ${shownOf(cell).unit}</b>, ${support}`,
     `eccentricity ${formatFixed(cell.eccentricity_low, 3)} to ${formatFixed(cell.eccentricity_high, 3)}`,
@@ -49,9 +49,9 @@ export function mapTraces(cells, widths) {
   const grid = [middles(cells, "eccentricity_low", widths[0]), middles(cells, "oil_temperature_low_c", widths[1])];
   return [
     surface(own, grid, widths, "learned here", 1),
-    surface(borrowed, grid, widths, "borrowed from around", 0.5),
-    marks(borrowed, "borrowed from around", { symbol: "line-ne", size: 13, line: { color: INK, width: 1 } }),
-    marks(seldom, "seen too seldom to judge", { symbol: "x-thin", size: 7, line: { color: FAINT, width: 1.2 } }),
+    surface(borrowed, grid, widths, "interpolated", 0.5),
+    marks(borrowed, "interpolated", { symbol: "line-ne", size: 13, line: { color: INK, width: 1 } }),
+    marks(seldom, "too few readings", { symbol: "x-thin", size: 7, line: { color: FAINT, width: 1.2 } }),
   ].filter((trace) => trace.x.length > 0);
 }
 
@@ -112,7 +112,7 @@ function outline(cell, color, width) {
 
 export function mapCaption(cells, current) {
   const n = (support) => cells.filter((cell) => cell.support === support).length;
-  const counted = `${n("own")} cells learned (solid), ${n("borrowed")} borrowed from around (pale, struck through), ${n("none")} seen too seldom (cross).`;
+  const counted = `${n("own")} cells learned (solid), ${n("borrowed")} interpolated (pale, struck through), ${n("none")} with too few readings (cross).`;
   if (!current) return `${counted} The rest has never been seen. No current cell.`;
   const here = cells.find((cell) => cell.eccentricity_low === current.eccentricity_low && cell.oil_temperature_low_c === current.oil_temperature_low_c);
   const where = here && here.support !== "none" ? "Outlined: where the bearing runs now." : "Outlined: where the bearing runs now, which has not been learned.";

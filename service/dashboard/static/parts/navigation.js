@@ -9,7 +9,7 @@ import { THEMES, chooseTheme, theme } from "../theme.js";
 export function navigation(pages) {
   const links = pages.filter((page) => page.nav).map((page) => [page, element("a", { href: page.pattern }, page.nav)]);
   const list = element("ul", {}, ...links.map(([, link]) => element("li", {}, link)));
-  const look = select("Look", THEMES, theme(), chooseTheme);
+  const look = select("Theme", THEMES, theme(), chooseTheme);
   const amplitude = select("Amplitudes", AMPLITUDES, amplitudes(), chooseAmplitudes);
   const node = element("div", { id: "menu", class: "menu" }, element("nav", { "aria-label": "Pages" }, list), look, amplitude);
   const isOpen = () => opener.getAttribute("aria-expanded") === "true";
