@@ -107,8 +107,9 @@ def unit_truth(machine: Unit, scenario: Scenario, now: Conditions, speed_rpm: fl
     brackets = {b.bearing: b.stiffness_n_per_m for b in scenario.true_rotor.brackets}
     bearings = {}
     for index, bearing in enumerate(machine.bearings):
-        film = scenario.bearings[bearing.id].film
-        k_eff = film.effective_stiffness_n_per_m(rad_s_from_rpm(speed_rpm))
+        film, turn_rad_s = scenario.bearings[bearing.id].film, rad_s_from_rpm(speed_rpm)
+        k_eff = film.effective_stiffness_n_per_m(turn_rad_s)
+        film = film.at(turn_rad_s) if film.lags and turn_rad_s > 0.0 else film
         centre_x_um, centre_y_um = (float(c) for c in now.centre_um[index])
         bearings[bearing.id] = BearingTruth(
             film=film,

@@ -24,6 +24,7 @@ from acquisition.simulated.plant.rotor import (
 )
 from benchmarks.accuracy_plant import machine
 from core.machine.channel import Measurand
+from core.units import rad_s_from_rpm
 
 Life = Callable[..., UnitLife]
 
@@ -127,7 +128,8 @@ def test_a_scenario_holds_what_was_so_at_that_moment(two_years, day_ns):
     row, scenario = row_at(life, moment_ns), scenario_at(life, moment_ns, MACHINE)
     truth, bearing = life.truth["UJB"], scenario.bearings["UJB"]
 
-    assert math.log(bearing.film.k_yy_n_per_m) == pytest.approx(truth.ln_k[1, row])
+    film = bearing.film.at(rad_s_from_rpm(scenario.speed_rpm))
+    assert math.log(film.k_yy_n_per_m) == pytest.approx(truth.ln_k[1, row])
     assert bearing.centre_x_um == truth.centre_um[0, row]
     assert bearing.oil_temperature_c == truth.oil_temperature_c[row]
     assert scenario.active_power_mw == life.operation.power_mw[row]
