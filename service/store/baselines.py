@@ -10,7 +10,7 @@ from core.machine.unit import Estimator
 from service.store.access.audit_entries import AuditAction, acting
 from service.store.audit import AuditedTables
 from service.store.database import Connection, insert, upsert
-from service.store.documents import baseline_from_json, response_from_json, to_json
+from service.store.documents import from_json, to_json
 from service.store.port import StoreError
 
 PADWATCH = "padwatch"
@@ -171,7 +171,7 @@ class BaselineTables(AuditedTables):
         with self._reading() as reader:
             found = reader.execute(SELECT_DOCUMENT, (unit, bearing, version)).fetchone()
         try:
-            return None if found is None else baseline_from_json(found[0])
+            return None if found is None else from_json(BearingBaseline, found[0])
         except ValueError as error:
             name = f"baseline {version} of unit {unit} bearing {bearing}"
             raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
@@ -203,7 +203,7 @@ class BaselineTables(AuditedTables):
         with self._reading() as reader:
             rows = reader.execute("SELECT unit, document FROM shaft_response").fetchall()
         try:
-            return {unit: response_from_json(document) for unit, document in rows}
+            return {unit: from_json(ShaftResponse, document) for unit, document in rows}
         except ValueError as error:
             raise StoreError(f"a shaft response is invalid: {error}; restore a backup") from error
 

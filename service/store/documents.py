@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import asdict
-from typing import Any, Literal, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -10,33 +10,25 @@ from core.baseline.baseline import BearingBaseline
 from core.change.decision import Decision
 from core.change.shaft_response import ShaftResponse
 
-BASELINE, RESPONSE, DECISION = "padwatch-baseline", "padwatch-shaft-response", "padwatch-decision"
+BASELINE = "padwatch-baseline"
+FORMATS: dict[type, str] = {
+    BearingBaseline: BASELINE,
+    ShaftResponse: "padwatch-shaft-response",
+    Decision: "padwatch-decision",
+}
 FORMAT_VERSION = 1
 
-_Model = TypeVar("_Model", bound=BaseModel)
+T = TypeVar("T")
 
 
-class _Document(BaseModel):
+class _Document(BaseModel, Generic[T]):
     """Envelope of a JSON document; its pydantic configuration also applies to `content`."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
+    format: str
     format_version: Literal[1]
-
-
-class _BaselineDocument(_Document):
-    format: Literal["padwatch-baseline"]
-    content: BearingBaseline
-
-
-class _ResponseDocument(_Document):
-    format: Literal["padwatch-shaft-response"]
-    content: ShaftResponse
-
-
-class _DecisionDocument(_Document):
-    format: Literal["padwatch-decision"]
-    content: Decision
+    content: T
 
 
 def to_json(value: BearingBaseline | ShaftResponse | Decision) -> str:
@@ -47,13 +39,12 @@ def to_json(value: BearingBaseline | ShaftResponse | Decision) -> str:
     ValueError
         If a number in the value is not finite.
     """
-    names = {BearingBaseline: BASELINE, ShaftResponse: RESPONSE, Decision: DECISION}
-    whole = {"format": names[type(value)], "format_version": FORMAT_VERSION}
+    whole = {"format": FORMATS[type(value)], "format_version": FORMAT_VERSION}
     return json.dumps(whole | {"content": asdict(value)}, allow_nan=False)
 
 
-def baseline_from_json(text: str) -> BearingBaseline:
-    """Return the baseline in a JSON document.
+def from_json(kind: type[T], text: str) -> T:
+    """Return the value of type `kind` in a JSON document.
 
     Raises
     ------
@@ -61,29 +52,17 @@ def baseline_from_json(text: str) -> BearingBaseline:
         If the text is not JSON or has another format, or a key is missing, unknown or repeated, or
         its value has the wrong type; the message names the key.
     """
-    return _read(_BaselineDocument, text).content
-
-
-def response_from_json(text: str) -> ShaftResponse:
-    """Return the shaft response in a JSON document; raises like `baseline_from_json`."""
-    return _read(_ResponseDocument, text).content
-
-
-def decision_from_json(text: str) -> Decision:
-    """Return the decision in a JSON document; raises like `baseline_from_json`."""
-    return _read(_DecisionDocument, text).content
-
-
-def _read(model: type[_Model], text: str) -> _Model:
     try:
-        found = model.model_validate_json(text)
+        found: _Document[T] = _Document[kind].model_validate_json(text)  # type: ignore[valid-type]
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"]) or "document"
         words = first["msg"].removeprefix("Value error, ")
         raise ValueError(f"{where}: {words} (found {first['input']!r:.50})") from error
+    if found.format != FORMATS[kind]:
+        raise ValueError(f"format: must be {FORMATS[kind]!r} (found {found.format!r:.50})")
     json.loads(text, object_pairs_hook=_refuse_repeated_keys)  # pydantic accepts repeated keys
-    return found
+    return found.content
 
 
 def _refuse_repeated_keys(pairs: list[tuple[str, Any]]) -> None:

@@ -17,7 +17,7 @@ from core.change.film_reading import FilmValue
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
 from service.store.database import Connection, insert, upsert
-from service.store.documents import decision_from_json, to_json
+from service.store.documents import from_json, to_json
 from service.store.port import StoreError, ValueRange
 from service.store.series import series_of, unique_time_ns
 from service.store.trends import BETWEEN_BOUNDS, IN_STATES, condition_arguments, storable
@@ -224,7 +224,7 @@ def select_decisions(reader: Connection, unit: str, bearing: str) -> list[Stored
     )
     try:
         return [
-            StoredDecision(direction, Estimator(estimator), version, decision_from_json(document))
+            StoredDecision(direction, Estimator(estimator), version, from_json(Decision, document))
             for direction, estimator, version, document in rows
         ]
     except ValueError as error:

@@ -1,7 +1,7 @@
 """Retention: rules for the deletion of old results and roll-ups.
 
-A new rule consists of a setting in `RetentionSettings` and an entry in `BEARING_RULES` or
-`PLANT_RULES`.
+A new rule of a bearing consists of a setting in `RetentionSettings` and an entry in
+`BEARING_RULES`.
 
 Readings and roll-ups are deleted in small steps. Before a deletion, all wider roll-ups are compared
 with roll-ups recomputed from the data. An hour that differs is aggregated again if its readings are
@@ -136,12 +136,6 @@ def _delete_films(writer: Connection, series: int, before_ns: int) -> Step:
     return Step.DONE if old else Step.NONE
 
 
-def _delete_messages(writer: Connection, before_ns: int) -> Step:
-    old = writer.execute(OLD_MESSAGES, (before_ns, before_ns, MAX_MESSAGES)).fetchall()
-    writer.executemany(DELETE_MESSAGE, old)
-    return Step.DONE if len(old) == MAX_MESSAGES else Step.NONE
-
-
 BEARING_RULES: Mapping[str, Callable[[Connection, int, int], Step]] = {
     "readings_days": _delete_readings,
     "minutes_days": partial(_delete_rollups, 60),
@@ -149,9 +143,6 @@ BEARING_RULES: Mapping[str, Callable[[Connection, int, int], Step]] = {
     "films_days": _delete_films,
 }
 """Functions that delete data of a bearing older than a time, by age setting; finest first."""
-
-PLANT_RULES: Mapping[str, Callable[[Connection, int], Step]] = {"messages_days": _delete_messages}
-"""Functions that delete data of the whole plant older than a time, by age setting."""
 
 Ages = Mapping[str, int]
 """Maximum age of data in ns, by name of the setting; data without an entry are never deleted."""
@@ -226,13 +217,14 @@ class RetentionStore(Tables):
         return found
 
     def prune(self, ages: Ages, now_ns: int) -> bool:
-        """Delete a limited part of the old data of the whole plant; otherwise as `delete`."""
-        found = False
-        for setting, rule in PLANT_RULES.items():
-            if setting in ages:
-                with self._writing() as writer:
-                    found |= rule(writer, now_ns - ages[setting]) is Step.DONE
-        return found
+        """Delete a limited part of the old messages of the plant; otherwise as `delete`."""
+        if "messages_days" not in ages:
+            return False
+        before_ns = now_ns - ages["messages_days"]
+        with self._writing() as writer:
+            old = writer.execute(OLD_MESSAGES, (before_ns, before_ns, MAX_MESSAGES)).fetchall()
+            writer.executemany(DELETE_MESSAGE, old)
+        return len(old) == MAX_MESSAGES
 
 
 def _next_readings(writer: Connection, series: int, within: Span) -> Span:

@@ -109,59 +109,35 @@ class _Covering:
         self._n_cut = 0
         self.cover = Cover()
 
-    def take(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span by the widest roll-ups, its ends by finer roll-ups or single readings."""
+    def take(self, span: Span, widths_ns: Sequence[int], *, is_coarse: bool = False) -> None:
+        """Cover a span by the widest roll-ups, its ends by finer roll-ups or single readings.
+
+        With `is_coarse`, single readings are deleted; the finest roll-ups extend beyond the span.
+        """
         if span[0] >= span[1]:
             return
         if not widths_ns:
             self.cover.spans.append(span)
             return
         width_ns, finer_ns = widths_ns[-1], widths_ns[:-1]
-        gathered_ns = min(span[1], self._mark_ns) // width_ns * width_ns
-        inner = (-(-span[0] // width_ns) * width_ns, gathered_ns)
+        if is_coarse:
+            inner = _inside(span, width_ns) if finer_ns else _around(span, width_ns)
+        else:
+            inner = _inside((span[0], min(span[1], self._mark_ns)), width_ns)
         if inner[0] >= inner[1]:
-            self.take(span, finer_ns)
+            self.take(span, finer_ns, is_coarse=is_coarse)
             return
-        self.take((span[0], inner[0]), finer_ns)
+        for edge in ((span[0], inner[0]), (inner[1], span[1])):
+            self.take(edge, finer_ns, is_coarse=is_coarse)
         for start_ns in range(inner[0], inner[1], MAX_SPANS * width_ns):
             some = _within(inner, (start_ns, start_ns + MAX_SPANS * width_ns))
-            self._take_inner(some, width_ns, finer_ns)
-        self.take((inner[1], span[1]), finer_ns)
+            self._take_inner(some, width_ns, finer_ns, is_coarse=is_coarse)
 
     def take_coarse(self, span: Span, widths_ns: Sequence[int]) -> None:
         """Cover a span by roll-ups whose single readings, except late readings, are deleted."""
-        self._take_cells(span, widths_ns)
+        self.take(span, widths_ns, is_coarse=True)
         late = self._redone(span)
         self.cover.spans += [_within(span, (hour, hour + HOUR_NS)) for hour in late]
-
-    def _take_cells(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span by the widest roll-ups in it; the finest may extend beyond the span."""
-        width_ns, finer_ns = widths_ns[-1], widths_ns[:-1]
-        inner = _inside(span, width_ns) if finer_ns else _around(span, width_ns)
-        if finer_ns and inner[0] >= inner[1]:
-            self._take_cells(span, finer_ns)
-            return
-        for edge in ((span[0], inner[0]), (inner[1], span[1])):
-            if edge[0] < edge[1]:
-                self._take_cells(edge, finer_ns)
-        for start_ns in range(inner[0], inner[1], MAX_SPANS * width_ns):
-            some = _within(inner, (start_ns, start_ns + MAX_SPANS * width_ns))
-            self._take_some_cells(some, width_ns, finer_ns)
-
-    def _take_some_cells(self, inner: Span, width_ns: int, finer_ns: Sequence[int]) -> None:
-        cells = self._cells(inner, width_ns)
-        if cells is None:
-            return
-        self.cover.is_coarse = True
-        time_ns = cells.summaries.time_ns
-        cut_ns = time_ns[self._cut(cells.conditions)]
-        if not finer_ns:
-            self._use(cells, ~self._cut(cells.conditions), width_ns)
-            return
-        self._use(cells, ~np.isin(time_ns, cut_ns), width_ns)
-        for cut in _runs(np.unique(cut_ns), width_ns):
-            self._note_cut((cut[1] - cut[0]) // finer_ns[-1])
-            self._take_cells(cut, finer_ns)
 
     def _note_cut(self, n_finer: int) -> None:
         self._n_cut += n_finer
@@ -172,19 +148,25 @@ class _Covering:
         arguments = (self._reader, self._series, width_ns, span, self._names, self._asked)
         return select_cells(*arguments, has_conditions=self._asked != ANYTHING)
 
-    def _take_inner(self, inner: Span, width_ns: int, finer_ns: Sequence[int]) -> None:
-        redone = self._redone(inner)
+    def _take_inner(
+        self, inner: Span, width_ns: int, finer_ns: Sequence[int], *, is_coarse: bool
+    ) -> None:
+        redone = [] if is_coarse else self._redone(inner)
         self.cover.spans += [_within(inner, (hour, hour + HOUR_NS)) for hour in redone]
         cells = self._cells(inner, width_ns)
         if cells is None:
             return
-        time_ns = cells.summaries.time_ns
+        self.cover.is_coarse |= is_coarse
+        time_ns, is_cut = cells.summaries.time_ns, self._cut(cells.conditions)
+        if is_coarse and not finer_ns:
+            self._use(cells, ~is_cut, width_ns)
+            return
         is_redone = np.isin(time_ns // HOUR_NS * HOUR_NS, redone)
-        is_cut = np.isin(time_ns, time_ns[self._cut(cells.conditions)])
+        is_cut = np.isin(time_ns, time_ns[is_cut])
         self._use(cells, ~is_redone & ~is_cut, width_ns)
         for cut in _runs(np.unique(time_ns[is_cut & ~is_redone]), width_ns):
             self._note_cut((cut[1] - cut[0]) // finer_ns[-1] if finer_ns else 0)
-            self.take(cut, finer_ns)
+            self.take(cut, finer_ns, is_coarse=is_coarse)
 
     def _redone(self, inner: Span) -> list[int]:
         first_ns = inner[0] // HOUR_NS * HOUR_NS

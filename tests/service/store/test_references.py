@@ -20,7 +20,7 @@ from core.change.shaft_response import ShaftResponse
 from core.condition.operating_state import OperatingState
 from core.monitor.catalogue import CATALOGUE
 from core.quality import Reading, Reason, missing, uncertain
-from service.store.documents import baseline_from_json, response_from_json, to_json
+from service.store.documents import from_json, to_json
 from service.store.port import StoreError
 from service.store.references import GapReference, ReferenceSource, SetVectorReference
 from service.store.sqlite import SqliteStore
@@ -199,14 +199,14 @@ def baseline(film_life: Callable[..., StiffnessHistory]) -> BearingBaseline:
 
 
 def test_a_baseline_comes_back_as_it_was(baseline):
-    assert baseline_from_json(to_json(baseline)) == baseline
+    assert from_json(BearingBaseline, to_json(baseline)) == baseline
 
 
 def test_a_response_comes_back_as_it_was_unless_it_was_tampered_with():
     response = ShaftResponse((("UJB", "x"),), (20.0,), ((0.1, 0.2, 0.3),), (0.01,))
-    assert response_from_json(to_json(response)) == response
+    assert from_json(ShaftResponse, to_json(response)) == response
     with pytest.raises(ValueError, match="std"):
-        response_from_json(to_json(response).replace('"std": [', '"std": [-1.0, ', 1))
+        from_json(ShaftResponse, to_json(response).replace('"std": [', '"std": [-1.0, ', 1))
 
 
 def change(content: Any, path: list[str | int], value: object) -> None:
@@ -246,7 +246,7 @@ def test_a_baseline_that_was_tampered_with_is_refused(baseline, path, value, say
     content = json.loads(to_json(baseline))
     change(content, path, value)
     with pytest.raises(ValueError, match=says):
-        baseline_from_json(json.dumps(content))
+        from_json(BearingBaseline, json.dumps(content))
 
 
 @pytest.mark.parametrize(
@@ -255,10 +255,10 @@ def test_a_baseline_that_was_tampered_with_is_refused(baseline, path, value, say
 )
 def test_what_is_no_baseline_is_refused(text):
     with pytest.raises(ValueError, match=r".+"):
-        baseline_from_json(text)
+        from_json(BearingBaseline, text)
 
 
 def test_a_huge_number_is_refused(baseline):
     text = to_json(baseline).replace('"scatter": ', '"scatter": 1e999, "x": ', 1)
     with pytest.raises(ValueError, match=r".+"):
-        baseline_from_json(text)
+        from_json(BearingBaseline, text)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from rigs.probes import post
 
+from core.baseline.baseline import BearingBaseline
 from service.runtime.times import rfc3339
-from service.store.documents import baseline_from_json
+from service.store.documents import from_json
 
 BASELINES = "/api/v1/units/U1/bearings/UJB/baselines"
 FILM = "/api/v1/units/U1/bearings/UJB/film"
@@ -68,7 +69,7 @@ async def test_cells_and_export_are_what_was_learned(learned):
     name = 'attachment; filename="U1-UJB-baseline-1.json"'
     assert export.headers["content-disposition"] == name
     assert export.headers["content-type"] == "application/json"
-    assert baseline_from_json(export.text) == learned.store.films.baseline("U1", "UJB", 1)
+    assert from_json(BearingBaseline, export.text) == learned.store.films.baseline("U1", "UJB", 1)
 
 
 async def test_a_rejected_baseline_is_not_in_force_and_may_be_accepted_again(service, machine):

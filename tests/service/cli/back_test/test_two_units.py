@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from acquisition.simulated.life.truth import UnitLife
-from core.baseline.baseline import Origin
+from core.baseline.baseline import BearingBaseline, Origin
 from core.baseline.history import DIRECTIONS
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
@@ -25,7 +25,7 @@ from service.cli.offline.backtest_cells import ReadingsError
 from service.cli.offline.backtest_files import read_histories
 from service.cli.offline.backtest_histories import BearingRows, Place
 from service.runtime.times import rfc3339
-from service.store.documents import baseline_from_json
+from service.store.documents import from_json
 
 START_NS = 19_723 * DAY_NS
 Histories = Mapping[Place, BearingRows]
@@ -183,7 +183,8 @@ def test_every_reading_is_counted_once(two_units, histories, found):
 
 def test_exported_baselines_read_back_as_they_were(found, tmp_path):
     assert export_baselines(found, tmp_path / "out") == 8
-    stored = baseline_from_json((tmp_path / "out" / "U2-LJB-v1.json").read_text(encoding="utf-8"))
+    text = (tmp_path / "out" / "U2-LJB-v1.json").read_text(encoding="utf-8")
+    stored = from_json(BearingBaseline, text)
     assert stored in found.baselines
     with pytest.raises(FileExistsError):
         export_baselines(found, tmp_path / "out")
