@@ -17,7 +17,7 @@ from acquisition.modbus.polled_source import MapReader
 from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.requests import Span
 from acquisition.modbus.ring_follower import RingReader
-from acquisition.modbus.ring_profile import RingHeader, Slot
+from acquisition.modbus.ring_profile import RingHeader, Slot, decode_slots
 from acquisition.modbus.transport import LinkSettings
 from service.settings.adapter_values import link_settings
 from service.settings.sources.modbus import ModbusLinkSettings
@@ -240,7 +240,7 @@ async def read_ring_once(
     reader = RingReader(client, base_address, function)
     async with client.connected():
         header = await reader.header()
-        [slot] = await reader.slots(header.layout, [header.newest])
+        [slot] = decode_slots(await reader.slots(header.layout, [header.newest]))
         return header, slot
 
 
