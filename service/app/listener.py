@@ -8,29 +8,33 @@ from ssl import SSLContext
 
 from service.runtime.listening import listen, server_tls, socket_file
 from service.settings.plant import PlantFile
-from service.settings.processes import ClosedError, why_closed
+from service.settings.processes import is_loopback
 from service.store.access.tables import AccessStore
 
 
+class ClosedError(Exception):
+    """Error raised if the service would be reachable from other hosts without an account."""
+
+
 def require_protected(plant: PlantFile, store: AccessStore) -> None:
-    """Check that the service is not reachable from other hosts without TLS or accounts.
+    """Check that a service that is reachable from other hosts has an account.
+
+    The plant file requires TLS of such a service. A Unix socket is reachable only by a proxy.
 
     Raises
     ------
     ClosedError
-        If the service would be reachable from other hosts without TLS or without an account.
+        If the service would be reachable from other hosts without an account.
     StoreError
         If accounts cannot be read.
     """
     service = plant.service
-    reason = why_closed(
-        service.host,
-        is_unix_socket=service.socket is not None,
-        has_tls=service.tls is not None,
-        has_account=bool(store.accounts.all()),
-    )
-    if reason is not None:
-        raise ClosedError(reason)
+    if service.socket is None and not is_loopback(service.host) and not store.accounts.all():
+        raise ClosedError(
+            f'service.host "{service.host}" is reachable from other hosts, which requires an'
+            " account (padwatch users add PLANT NAME --role admin); else listen on 127.0.0.1, or"
+            " on a Unix socket behind a reverse proxy"
+        )
 
 
 @contextmanager

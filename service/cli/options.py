@@ -46,7 +46,7 @@ EXIT_CODES = {
     "service.store.access.tables.AccessRefusedError": 2,
     "service.store.access.identities.NameRefusedError": 2,
     "service.api.auth.passwords.PasswordRefusedError": 2,
-    "service.settings.processes.ClosedError": 2,
+    "service.app.listener.ClosedError": 2,
     "service.runtime.listening.CertificateError": 2,
     "acquisition.errors.AcquisitionError": 1,
     "service.store.port.StoreError": 1,

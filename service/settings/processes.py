@@ -125,29 +125,3 @@ def is_loopback(host: str) -> bool:
     except ValueError:
         return False
     return address.is_loopback
-
-
-def why_closed(
-    host: str, *, is_unix_socket: bool = False, has_tls: bool = False, has_account: bool = False
-) -> str | None:
-    """Return the reason why the service must not listen on an address; None if it may listen.
-
-    Any host but loopback requires TLS (``has_tls``) and a stored account (``has_account``). A Unix
-    socket requires neither, because it is reachable only by a proxy on the same host.
-    """
-    if is_unix_socket or is_loopback(host):
-        return None
-    missing = [] if has_tls else ["a certificate and its key in [service.tls]"]
-    if not has_account:
-        missing.append("an account (padwatch users add PLANT NAME --role admin)")
-    if not missing:
-        return None
-    return (
-        f'service.host "{host}" is reachable from other hosts, which requires'
-        f" {' and '.join(missing)}; else listen on 127.0.0.1, or on a Unix socket"
-        " behind a reverse proxy"
-    )
-
-
-class ClosedError(Exception):
-    """Error raised if the service would be reachable from other hosts without TLS or accounts."""

@@ -5,11 +5,14 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 
 import pytest
+from pydantic import ValidationError
 
 from service.api.auth.backoff import ACCOUNT_RULE
 from service.api.auth.passwords import Hashing
 from service.api.auth.service import AccessService, LoggedIn, NotLoggedIn
-from service.settings.processes import why_closed
+from service.app.listener import ClosedError, require_protected
+from service.settings.plant import ServiceSettings
+from service.settings.processes import TlsSettings
 from service.store.access.identities import Identity, Means, Permission, Role, SessionLimits, digest
 from service.store.access.tables import MAX_SESSIONS
 from service.store.port import StoreError
@@ -238,21 +241,25 @@ def test_a_key_for_one_unit_opens_no_other_and_changes_nothing_of_the_plant():
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.1.2.3", "::1", "localhost"])
-def test_loopback_needs_no_login(host):
-    assert why_closed(host) is None
+def test_loopback_needs_no_login(plant, access, host):
     # a Unix socket is left to the proxy that opens it
-    assert why_closed("0.0.0.0", is_unix_socket=True) is None  # noqa: S104
+    for settings in (
+        ServiceSettings(host=host),
+        ServiceSettings(host="0.0.0.0", socket="/run/x"),  # noqa: S104
+    ):
+        require_protected(plant.model_copy(update={"service": settings}), access)
 
 
 @pytest.mark.parametrize(
     "host",
-    ["0.0.0.0", "::", "10.0.0.5", "plant.example", "127.0.0.1.example", "", "::ffff:10.0.0.5"],  # noqa: S104
+    ["0.0.0.0", "::", "10.0.0.5", "plant.example", "127.0.0.1.example", "::ffff:10.0.0.5"],  # noqa: S104
 )
-def test_other_addresses_need_tls_and_an_account(host):
-    assert why_closed(host, has_tls=True, has_account=True) is None
-    for has_tls, has_account in ((False, False), (False, True), (True, False)):
-        why = why_closed(host, has_tls=has_tls, has_account=has_account)
-        assert why is not None
-        assert ("[service.tls]" in why, "users add" in why) == (not has_tls, not has_account)
-        assert host in why
-        assert "\n" not in why
+def test_other_addresses_need_tls_and_an_account(plant, access, host):
+    with pytest.raises(ValidationError, match=r"\[service\.tls\]"):
+        ServiceSettings(host=host)
+    settings = ServiceSettings(host=host, tls=TlsSettings(certificate="x.crt", key="x.key"))
+    reachable = plant.model_copy(update={"service": settings})
+    with pytest.raises(ClosedError, match=f'"{host}".*users add'):
+        require_protected(reachable, access)
+    access.accounts.add("anna", Role.VIEWER, "hash", T0)
+    require_protected(reachable, access)
