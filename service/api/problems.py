@@ -41,6 +41,19 @@ WORDS = {
 }
 """Default descriptions of problems in the OpenAPI document, by status."""
 
+OF_PYDANTIC = {
+    "missing": "required, but missing",
+    "extra_forbidden": "not a member of this request",
+    "string_pattern_mismatch": "wrong format; /docs shows an example",
+}
+"""Descriptions of mistakes, by error type of pydantic, in place of pydantic's own."""
+
+OF_FASTAPI = {
+    400: ("Invalid body", "the body must be JSON in UTF-8"),
+    404: ("Unknown address", "there is no such address; /docs lists all"),
+}
+"""Titles and details of problems that FastAPI finds, by status, in place of FastAPI's own."""
+
 log = structlog.get_logger()
 
 
@@ -175,7 +188,8 @@ def install_problem_handlers(app: FastAPI) -> None:
         if error.status_code == 405 and (methods := _methods(request)):
             return _not_allowed(request, methods)
         text = str(error.detail)
-        return _render(request, error.status_code, text, text, headers=error.headers)
+        title, detail = OF_FASTAPI.get(error.status_code, (text, text))
+        return _render(request, error.status_code, title, detail, headers=error.headers)
 
     @app.exception_handler(RequestValidationError)
     async def _validation(request: Request, error: RequestValidationError) -> Response:
@@ -185,7 +199,7 @@ def install_problem_handlers(app: FastAPI) -> None:
         mistakes = [
             Mistake(
                 parameter=".".join(str(p) for p in e["loc"][1:]),
-                detail=str(e["msg"]).removeprefix("Value error, "),
+                detail=OF_PYDANTIC.get(e["type"], str(e["msg"]).removeprefix("Value error, ")),
             )
             for e in found[:MAX_MISTAKES]
         ]
