@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import asdict
-from typing import Any, Generic, Literal, TypeVar
+from typing import Generic, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -49,8 +49,8 @@ def from_json(kind: type[T], text: str) -> T:
     Raises
     ------
     ValueError
-        If the text is not JSON or has another format, or a key is missing, unknown or repeated, or
-        its value has the wrong type; the message names the key.
+        If the text is not JSON or has another format, or a key is missing or unknown, or its
+        value has the wrong type; the message names the key.
     """
     try:
         found: _Document[T] = _Document[kind].model_validate_json(text)  # type: ignore[valid-type]
@@ -61,11 +61,4 @@ def from_json(kind: type[T], text: str) -> T:
         raise ValueError(f"{where}: {words} (found {first['input']!r:.50})") from error
     if found.format != FORMATS[kind]:
         raise ValueError(f"format: must be {FORMATS[kind]!r} (found {found.format!r:.50})")
-    json.loads(text, object_pairs_hook=_refuse_repeated_keys)  # pydantic accepts repeated keys
     return found.content
-
-
-def _refuse_repeated_keys(pairs: list[tuple[str, Any]]) -> None:
-    keys = [key for key, _ in pairs]
-    if len(set(keys)) < len(keys):
-        raise ValueError(f"a key is repeated among {', '.join(keys)}")
