@@ -9,9 +9,9 @@ import numpy.typing as npt
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.life import live
 from acquisition.simulated.life.moment import scenario_at
-from acquisition.simulated.life.shaft import four_fold
 from acquisition.simulated.life.truth import UnitLife
 from benchmarks.chain_unit import UNIT, Window
+from benchmarks.detection_cases import four_fold
 from benchmarks.detection_unit import (
     BRACKETS_N_PER_M,
     DAY_NS,

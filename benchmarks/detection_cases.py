@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.simulated.life.damage import Damage, DamageKind
-from acquisition.simulated.life.shaft import cooling_failure, four_fold
+from acquisition.simulated.life.shaft import ConditionChange
 from benchmarks.detection_unit import DAY_NS, Later, LearnedUnit
 from core.baseline.history import DIRECTIONS
 from core.change.cause import Cause
@@ -17,6 +17,37 @@ MARGIN_DAYS = 100
 
 ATTRIBUTED_AFTER_H = 24
 """Running hours after the alarm when its cause is looked at again."""
+
+
+CENTRED, OUTWARD = 0.12, 0.60
+WARM_C, COLD_C = 3.0, -3.0
+
+
+def four_fold(
+    start_ns: int, days: float = 30.0, *, stiffer: bool = True
+) -> tuple[ConditionChange, ConditionChange]:
+    """Return two condition changes that make healthy films about four times stiffer, or softer.
+
+    For `days` before `start_ns` the shaft runs near the centre in warm oil, then for `days` at high
+    eccentricity in cold oil; in reverse order if not `stiffer`. The factor is 3.5 to 8 in the most
+    sensitive direction, depending on the machine. A healthy machine has both conditions in spring
+    and autumn; the colder oil may be unusual in midwinter, the warmer oil in midsummer.
+    """
+    first, second = (CENTRED, WARM_C), (OUTWARD, COLD_C)
+    if not stiffer:
+        first, second = second, first
+    span_ns = round(days * DAY_NS)
+    return (
+        ConditionChange(start_ns - span_ns, start_ns, *first),
+        ConditionChange(start_ns, start_ns + span_ns, *second),
+    )
+
+
+def cooling_failure(
+    start_ns: int, days: float = 5.0, oil_offset_c: float = 12.0
+) -> ConditionChange:
+    """Return the change caused by a failed cooler: oil warmer than in any healthy history."""
+    return ConditionChange(start_ns, start_ns + round(days * DAY_NS), oil_offset_c=oil_offset_c)
 
 
 @dataclass(frozen=True)

@@ -23,11 +23,6 @@ class ServiceManager:
         self.watchdog_s = _watchdog_s(environment) if self._address else None
         self._is_reached = True
 
-    @property
-    def listens(self) -> bool:
-        """Whether a service manager receives notifications."""
-        return self._address is not None
-
     def notify(self, **assignments: str) -> None:
         """Send variables of sd_notify(3), such as ``READY``, without blocking; log failure once."""
         if self._address is None:

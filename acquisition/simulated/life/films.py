@@ -51,11 +51,6 @@ class FilmCourse:
     centre_um: FloatArray
 
 
-def even_setting(bearing: LifeBearing) -> PadSetting:
-    """Return pad clearances that all equal the nominal cold clearance of the bearing."""
-    return PadSetting(np.full(bearing.ring.n_pads, bearing.cold_clearance_um))
-
-
 def draw_setting(random: np.random.Generator, bearing: LifeBearing) -> PadSetting:
     """Draw random pad clearances of a bearing, as set in one machine."""
     each = 1.0 + PAD_CLEARANCE_RMS * random.standard_normal(bearing.ring.n_pads)

@@ -7,7 +7,6 @@ import numpy as np
 
 from acquisition.simulated.life.bearing import LifeBearing
 from acquisition.simulated.life.operation import (
-    DAY_NS,
     Operation,
     change_rows,
     held,
@@ -37,37 +36,6 @@ class ConditionChange:
     def holds(self, time_ns: TimeArray) -> FloatArray:
         """Return 1 during the change and 0 outside, (n,)."""
         return ((time_ns >= self.start_ns) & (time_ns < self.stop_ns)).astype(np.float64)
-
-
-CENTRED, OUTWARD = 0.12, 0.60
-WARM_C, COLD_C = 3.0, -3.0
-
-
-def four_fold(
-    start_ns: int, days: float = 30.0, *, stiffer: bool = True
-) -> tuple[ConditionChange, ConditionChange]:
-    """Return two condition changes that make healthy films about four times stiffer, or softer.
-
-    For `days` before `start_ns` the shaft runs near the centre in warm oil, then for `days` at high
-    eccentricity in cold oil; in reverse order if not `stiffer`. The factor is 3.5 to 8 in the most
-    sensitive direction, depending on the machine. A healthy machine has both conditions in spring
-    and autumn; the colder oil may be unusual in midwinter, the warmer oil in midsummer.
-    """
-    first, second = (CENTRED, WARM_C), (OUTWARD, COLD_C)
-    if not stiffer:
-        first, second = second, first
-    span_ns = round(days * DAY_NS)
-    return (
-        ConditionChange(start_ns - span_ns, start_ns, *first),
-        ConditionChange(start_ns, start_ns + span_ns, *second),
-    )
-
-
-def cooling_failure(
-    start_ns: int, days: float = 5.0, oil_offset_c: float = 12.0
-) -> ConditionChange:
-    """Return the change caused by a failed cooler: oil warmer than in any healthy history."""
-    return ConditionChange(start_ns, start_ns + round(days * DAY_NS), oil_offset_c=oil_offset_c)
 
 
 LEVEL_MEAN = 0.33

@@ -10,8 +10,8 @@ from rigs.tiers import fast_and_long
 
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.life import live
-from acquisition.simulated.life.shaft import cooling_failure, four_fold
 from acquisition.simulated.life.truth import UnitLife
+from benchmarks.detection_cases import cooling_failure, four_fold
 from core.arrays import FloatArray
 from core.baseline.history import ReadingOutcome
 

@@ -9,7 +9,7 @@ import pytest
 from acquisition.simulated.life.bearing import LIFE_UJB, ThermalCourse
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.excitation import order1_um_pk
-from acquisition.simulated.life.films import even_setting, film_course
+from acquisition.simulated.life.films import PadSetting, film_course
 from acquisition.simulated.life.moment import row_at, scenario_at
 from acquisition.simulated.life.operation import lagged, wander
 from acquisition.simulated.life.truth import UnitLife
@@ -33,7 +33,7 @@ def test_the_field_of_the_generator_widens_a_bearing_one_way_and_narrows_it_the_
     usual, loaded = (
         film_course(
             LIFE_UJB,
-            even_setting(LIFE_UJB),
+            PadSetting(np.full(LIFE_UJB.ring.n_pads, LIFE_UJB.cold_clearance_um)),
             ThermalCourse(np.array([47.0]), np.array([165.0]), np.array([opening_um])),
             np.array([92.3]),
             np.zeros((2, 1)),

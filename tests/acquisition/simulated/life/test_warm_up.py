@@ -12,7 +12,7 @@ import pytest
 
 from acquisition.simulated.life.bearing import LIFE_BEARINGS, LifeBearing, thermal_course
 from acquisition.simulated.life.excitation import order1_um_pk, warm_unbalance
-from acquisition.simulated.life.films import even_setting, film_course
+from acquisition.simulated.life.films import PadSetting, film_course
 from acquisition.simulated.life.operation import Operation
 from acquisition.simulated.plant.rotor import RotorParameters
 from core.arrays import FloatArray
@@ -37,9 +37,8 @@ def second_day() -> tuple[dict[str, FloatArray], dict[str, FloatArray], dict[str
     films, k_eff, clearance_um = {}, {}, {}
     for bearing in LIFE_BEARINGS:
         thermal = thermal_course(bearing, operation, np.full(N_MINUTES, 24.0), initial_oil_c=33.0)
-        course = film_course(
-            bearing, even_setting(bearing), thermal, operation.speed_rpm, _position_um(bearing)
-        )
+        even = PadSetting(np.full(bearing.ring.n_pads, bearing.cold_clearance_um))
+        course = film_course(bearing, even, thermal, operation.speed_rpm, _position_um(bearing))
         films[bearing.id], clearance_um[bearing.id] = course.film, course.clearance_um
         k = np.stack([course.film.k_xx_n_per_m, course.film.k_yy_n_per_m])
         k_eff[bearing.id] = K_EFF * k / 1e9

@@ -224,7 +224,7 @@ def test_a_manager_hears_what_it_is_told_without_line_breaks(manager_socket):
 
     manager.notify(READY="1", STATUS="all well\nWATCHDOG=trigger")
 
-    assert manager.listens
+    assert manager._address
     assert manager.watchdog_s == 10.0
     assert manager_socket.received == [{"READY": "1", "STATUS": "all well WATCHDOG=trigger"}]
 
@@ -237,7 +237,7 @@ def test_without_a_socket_nobody_is_told(monkeypatch):
     manager = ServiceManager({"WATCHDOG_USEC": "10000000"})
     manager.notify(READY="1")
 
-    assert not manager.listens
+    assert not manager._address
     assert manager.watchdog_s is None
 
 
@@ -260,7 +260,7 @@ def test_an_address_of_another_kind_is_not_used(address):
         manager = ServiceManager({"NOTIFY_SOCKET": address})
         manager.notify(READY="1")
 
-    assert not manager.listens
+    assert not manager._address
     assert [entry["value"] for entry in said] == [address]
 
 
