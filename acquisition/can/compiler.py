@@ -23,10 +23,8 @@ _MAX_SHOWN = 12
 def compile_plan(settings: CanSettings, calibration: UnitCalibration) -> Plan:
     """Return the decoding plan of a device; read the DBC and look up every signal.
 
-    Raises
-    ------
-    ConfigError
-        If a setting does not fit the DBC; the message contains file, key and expected value.
+    Raises ConfigError if a setting does not fit the DBC; the message contains file, key and
+    expected value.
     """
     try:
         return _Compiler(settings, calibration).plan()

@@ -83,10 +83,8 @@ class DbcMessage:
     def raw_value(self, name: str, data: bytes) -> int | float:
         """Return the unscaled value of a signal of any bit layout in one frame.
 
-        Raises
-        ------
-        FrameError
-            If cantools cannot decode the frame, or the frame does not contain the signal.
+        Raises FrameError if cantools cannot decode the frame, or the frame does not contain the
+        signal.
         """
         try:
             values: Any = self._source.decode(data, decode_choices=False, scaling=False)

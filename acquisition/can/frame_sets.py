@@ -151,10 +151,7 @@ class FrameSets:
         than the newest of its message or repeats it: it is counted as refused, not stored. With
         more than `MAX_PENDING` incomplete sets, the oldest is dropped and counted as lost.
 
-        Raises
-        ------
-        FrameError
-            If the number of samples cannot be decoded.
+        Raises FrameError if the number of samples cannot be decoded.
         """
         part, data, index = frame
         wave = part.wave

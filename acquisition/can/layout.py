@@ -163,11 +163,8 @@ def wave_channel(
 ) -> WaveChannel:
     """Return a waveform channel with the gain, offset and readers of its signals.
 
-    Raises
-    ------
-    ConfigError
-        If unit, factor or full scale in the DBC do not match the channel, or its signals differ in
-        their factors.
+    Raises ConfigError if unit, factor or full scale in the DBC do not match the channel, or its
+    signals differ in their factors.
     """
     scalings = {_gain_and_offset(channel, calibration, signal) for signal in signals}
     if len(scalings) > 1:

@@ -113,10 +113,7 @@ class SlcanBus(slcanBus):
     def require_speed(cls, bitrate: int | None, data_bitrate: int | None) -> None:
         """Check that slcan has the bit rates in bit/s, if given; python-can reports a lost link.
 
-        Raises
-        ------
-        ConfigError
-            If a bit rate is not supported; the message lists the supported rates.
+        Raises ConfigError if a bit rate is not supported; the message lists the supported rates.
         """
         for name, speed, known in (
             ("bitrate", bitrate, cls._BITRATES),
@@ -141,10 +138,7 @@ class SlcanBus(slcanBus):
 def _parsed(line: bytes, ids: Container[int]) -> Message | None:
     """Return the frame of a line; None for a reply or for an id that is not received.
 
-    Raises
-    ------
-    FrameError
-        If the line is neither a frame nor a reply.
+    Raises FrameError if the line is neither a frame nor a reply.
     """
     kind = line[:1]
     form = _FORMS.get(kind)

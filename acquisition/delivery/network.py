@@ -25,10 +25,7 @@ class NameLookUp:
 
         The look-up runs in a daemon thread, and continues if the caller is cancelled.
 
-        Raises
-        ------
-        OSError
-            If the name cannot be resolved.
+        Raises OSError if the name cannot be resolved.
         """
         if _is_address(self._host):
             return [self._host]
@@ -55,10 +52,7 @@ class KnownAddresses:
     async def within(self, limit_s: float) -> list[str]:
         """Return the IP addresses within a time limit; if resolution fails, the last known ones.
 
-        Raises
-        ------
-        OSError
-            If resolution fails and no address is known.
+        Raises OSError if resolution fails and no address is known.
         """
         try:
             async with asyncio.timeout(limit_s):

@@ -103,10 +103,7 @@ class Freshness:
     def note(self, alive: bytes, now_s: float) -> None:
         """Update the watchdog with the present value `alive` at a monotonic time.
 
-        Raises
-        ------
-        LinkError
-            If the value has not changed for longer than `stale_after_s`.
+        Raises LinkError if the value has not changed for longer than `stale_after_s`.
         """
         if alive != self._seen:
             self._seen, self._since_s, self._stood_still = alive, now_s, False

@@ -8,11 +8,8 @@ from pathlib import Path
 def read_small_file(path: Path, max_bytes: int) -> bytes:
     """Return the content of a regular file of at most `max_bytes`.
 
-    Raises
-    ------
-    OSError
-        If the file cannot be read, is not a regular file (reading a pipe would block), or is too
-        large; `strerror` states the reason.
+    Raises OSError if the file cannot be read, is not a regular file (reading a pipe would block),
+    or is too large; `strerror` states the reason.
     """
     mode = path.stat().st_mode
     if stat.S_ISDIR(mode):

@@ -92,10 +92,7 @@ def waveform_factor(measurand: Measurand, unit: str, unit_per_v: float) -> float
 def slow_conversion(channel_unit: str, unit: str) -> tuple[float, float]:
     """Return factor and offset that convert a file's unit to a slow channel's: factor · x + offset.
 
-    Raises
-    ------
-    ConfigError
-        If there is no conversion.
+    Raises ConfigError if there is no conversion.
     """
     known = _SLOW[channel_unit]
     if canonical(unit) not in known:
@@ -112,10 +109,7 @@ def unit_in(heading: str) -> str | None:
 def require_unit(place: object, found: str | None, mapped: str) -> None:
     """Check that a column's unit, if its file states one, equals the unit in the import mapping.
 
-    Raises
-    ------
-    ConfigError
-        If the units differ; the message states both.
+    Raises ConfigError if the units differ; the message states both.
     """
     if found and found.strip() and canonical(found) != canonical(mapped):
         raise ConfigError(

@@ -56,6 +56,10 @@ class ModbusClient:
     received bytes are discarded until the line has been silent for `timeout_s`. If connections
     are not kept, each request opens and closes its own connection.
 
+    All methods that read raise LinkError if the device does not answer, reports a temporary
+    failure, or sends a reply that does not match its request, and ConfigError if the device reports
+    an illegal function, address or value.
+
     Attributes
     ----------
     requests_in_flight
@@ -86,13 +90,7 @@ class ModbusClient:
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
-        """Open the connection; close it on exit of the context.
-
-        Raises
-        ------
-        LinkError, ConfigError
-            As `open`.
-        """
+        """Open the connection, with the errors of `open`; close it on exit of the context."""
         try:
             await self.open()
             yield
@@ -118,12 +116,7 @@ class ModbusClient:
     async def require_device(self) -> None:
         """Check that the device has the configured identity; no effect if none is configured.
 
-        Raises
-        ------
-        ConfigError
-            If the identity differs; the message contains the found and the expected identity.
-        LinkError
-            As `read`.
+        If it differs, raises ConfigError with the found and the expected identity.
         """
         identity = self._settings.identity
         if identity is None:
@@ -141,10 +134,7 @@ class ModbusClient:
     async def read(self, address: int, count: int, function: int = READ_HOLDING_REGISTERS) -> bytes:
         """Read `count` registers or bits from an address on; result as `read_spans`.
 
-        Raises
-        ------
-        LinkError, ConfigError
-            As `read_spans`; also ConfigError if function or address range are invalid.
+        Raises ConfigError if function or address range are invalid.
         """
         return await self.read_spans([Span(address, count, function)])
 
@@ -156,14 +146,6 @@ class ModbusClient:
         bytes
             Concatenated contents of the ranges: registers as big-endian words, bits packed eight to
             a byte, the first bit least significant.
-
-        Raises
-        ------
-        LinkError
-            If the device does not answer, reports a temporary failure, or a reply does not match
-            its request.
-        ConfigError
-            If the device reports an illegal function, address or value.
         """
         requests = [request for span in spans for request in span_requests(span)]
         return b"".join([reply[2:] for reply in await self._replies(requests)])
@@ -171,10 +153,7 @@ class ModbusClient:
     async def read_fifos(self, addresses: Sequence[int]) -> list[bytes]:
         """Read one FIFO queue per address; return its 0 to 31 registers as big-endian words.
 
-        Raises
-        ------
-        LinkError, ConfigError
-            As `read_spans`; also LinkError if the device states more than 31 registers.
+        Raises LinkError if the device states more than 31 registers.
         """
         replies = await self._replies([fifo_request(address) for address in addresses])
         return [fifo_registers(reply) for reply in replies]
@@ -182,10 +161,7 @@ class ModbusClient:
     async def identify(self) -> Identification:
         """Read vendor, product code and revision by function 43/14.
 
-        Raises
-        ------
-        LinkError, ConfigError
-            As `read_spans`; also LinkError if the identification takes too many replies.
+        Raises LinkError if the identification takes more than eight replies.
         """
         objects: dict[int, bytes] = {}
         following: int | None = 0

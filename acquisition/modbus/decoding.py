@@ -71,10 +71,7 @@ class CellDecoder:
 class MapDecoder:
     """Decoder of one poll of a device to the values of its register map.
 
-    Raises
-    ------
-    MapError
-        If cells that the map requires in one request cannot be read in one request.
+    Raises MapError if cells that the map requires in one request cannot be read in one request.
     """
 
     def __init__(self, registers: RegisterMap) -> None:

@@ -157,10 +157,8 @@ def place_records(
 
     Samples that were read before are left out.
 
-    Raises
-    ------
-    LinkError
-        If the counter restarts more than once in a reading, so that it cannot count samples.
+    Raises LinkError if the counter restarts more than once in a reading, so that it cannot count
+    samples.
     """
     if isinstance(samples, UncountedSamples):
         place = samples.place(piece.n_samples)
@@ -203,10 +201,8 @@ class ChannelAssembly:
     def place(self, pieces: list[FifoPiece], now_s: float) -> list[PlacedSamples]:
         """Add one reading of each queue, in the order of the channels; return the aligned samples.
 
-        Raises
-        ------
-        LinkError
-            If the counters of two channels differ too much, as after a restart between the reads.
+        Raises LinkError if the counters of two channels differ too much, as after a restart between
+        the reads.
         """
         first, *others = pieces
         for sample in place_records(first, self._samples, now_s):

@@ -78,10 +78,7 @@ class FifoLayout:
     def decode(self, data: bytes) -> FifoPiece:
         """Return the samples in one reading of one queue.
 
-        Raises
-        ------
-        LinkError
-            If the reading contains an incomplete record.
+        Raises LinkError if the reading contains an incomplete record.
         """
         words = np.frombuffer(data, ">u2").astype(np.uint16)
         if self.kind is FifoKind.PER_CHANNEL:

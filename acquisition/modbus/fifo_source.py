@@ -80,10 +80,7 @@ class FifoSource:
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
         """Open the link and yield blocks; see `SampleSource`.
 
-        Raises
-        ------
-        LinkError, ConfigError
-            As `SampleSource`; also LinkError if the link is too slow for the sampling rate.
+        Raises LinkError also if the link is too slow for the sampling rate.
         """
         async with self._client.connected():
             await self._begin()

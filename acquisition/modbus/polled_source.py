@@ -54,22 +54,13 @@ class MapReader:
             yield
 
     async def read(self) -> MapReading:
-        """Read and decode all values; check the identity first if connections are not kept.
-
-        Raises
-        ------
-        LinkError, ConfigError
-            As `connected`.
-        """
+        """Read and decode all values; errors as `connected`."""
         return self._decoder.read(await self.content())
 
     async def content(self) -> bytes:
         """Read all registers of the map; return their bytes in the order of `ReadPlan.spans`.
 
-        Raises
-        ------
-        LinkError, ConfigError
-            As `connected`.
+        Checks identity and signature first if connections are not kept; errors as `connected`.
         """
         if not self._client.is_kept:
             await self._client.require_device()

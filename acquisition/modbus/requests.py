@@ -101,10 +101,7 @@ class Span:
 class ReadRequest:
     """Modbus read request, given by its PDU.
 
-    Raises
-    ------
-    ConfigError
-        If the PDU is not a read request; only read requests can be framed.
+    Raises ConfigError if the PDU is not a read request; only read requests can be framed.
     """
 
     pdu: bytes
@@ -217,10 +214,7 @@ def span_requests(span: Span) -> tuple[ReadRequest, ...]:
 def fifo_request(address: int) -> ReadRequest:
     """Return the request that reads the FIFO queue at an address (function 0x18).
 
-    Raises
-    ------
-    ConfigError
-        If the address is not 0 to 65535.
+    Raises ConfigError if the address is not 0 to 65535.
     """
     pointer = Span(address, 1)
     return ReadRequest(bytes((READ_FIFO_QUEUE,)) + pointer.address.to_bytes(2, "big"))

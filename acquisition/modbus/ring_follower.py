@@ -114,21 +114,8 @@ class RingFollower:
         self._handled = 0
         self._rejected: Counter[Refusal] = Counter()
 
-    @property
-    def newest(self) -> tuple[int, int] | None:
-        """Epoch and newest sequence number of the last header; None before the first header."""
-        return None if self._header is None else (self._header.epoch, self._header.newest)
-
     async def header(self) -> RingHeader:
-        """Read the header; check its channels and rate against the calibration.
-
-        Raises
-        ------
-        ConfigError
-            If a field differs; the message contains the found and the expected value.
-        LinkError
-            As `RingReader.header`.
-        """
+        """Read the header; raise ConfigError if its channels or rate are not those calibrated."""
         header = await self._reader.header()
         ring = header.layout
         found = (ring.n_channels, ring.rate_mhz, ring.n_slow)
@@ -148,11 +135,7 @@ class RingFollower:
         """Read new slots, oldest first, up to 0.5 s of samples; return the accepted samples.
 
         Each block is a run of consecutive slots, with one cell per slot; the list may be empty.
-
-        Raises
-        ------
-        LinkError, ConfigError
-            As `RingReader`; the next call then reads the same slots again.
+        After an error of `RingReader`, the next call reads the same slots again.
         """
         header = await self.header()
         await self._enter(header)

@@ -102,10 +102,8 @@ class RingLayout:
     def require_possible(self) -> None:
         """Check that all fields of the layout are within their limits.
 
-        Raises
-        ------
-        ConfigError
-            If a field is out of its limits; the message contains field, value and limits.
+        Raises ConfigError if a field is out of its limits; the message contains field, value and
+        limits.
         """
         for name, value, lowest, highest in (
             ("n_channels", self.n_channels, 1, MAX_CHANNELS),

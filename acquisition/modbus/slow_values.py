@@ -143,13 +143,7 @@ class JoinedSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open both links; leaving the context closes them.
-
-        Raises
-        ------
-        LinkError, ConfigError
-            As raised by the waveform source.
-        """
+        """Open both links, with the errors of the waveform source; close them on exit."""
         async with self._source.connect() as blocks, self._slow.watch():
             joined = self._joined(blocks)
             try:

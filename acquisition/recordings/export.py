@@ -75,10 +75,8 @@ def write_rows(recording: Recording, kind: ExportFormat, sink: Path | RawIOBase)
 
     Nothing is written without iteration. The file is complete once the last number, 0, is yielded.
 
-    Raises
-    ------
-    ConfigError
-        If a channel has the name of a reserved column, or a file of the recording is unreadable.
+    Raises ConfigError if a channel has the name of a reserved column, or a file of the recording is
+    unreadable.
     """
     schema_of, open_writer = _FORMATS[kind]
     schema = schema_of(recording.manifest)
@@ -120,10 +118,7 @@ def csv_schema(manifest: Manifest) -> Any:
 def parquet_schema(manifest: Manifest) -> Any:
     """Return the pyarrow schema of a Parquet export; the metadata of each column contain its unit.
 
-    Raises
-    ------
-    ConfigError
-        If a channel has the name of a reserved column.
+    Raises ConfigError if a channel has the name of a reserved column.
     """
     columns = _columns(manifest)
     for id_, _ in columns:

@@ -173,10 +173,7 @@ class _Head(BaseModel):
 def read_manifest(folder: Path) -> Manifest:
     """Read and check the manifest of a recording.
 
-    Raises
-    ------
-    ConfigError
-        If the manifest is missing or invalid; the message names the first error.
+    Raises ConfigError if the manifest is missing or invalid; the message names the first error.
     """
     path = folder / MANIFEST
     if not folder.is_dir():

@@ -174,10 +174,7 @@ def heads_in(
 ) -> tuple[Heads, Mapping[int, list[Rejection]], SampleType | None]:
     """Return the headers in a message, the rejections by row, and the sample type or None.
 
-    Raises
-    ------
-    ConfigError
-        If the message does not contain blocks with `n_slow` slow values each.
+    Raises ConfigError if the message does not contain blocks with `n_slow` slow values each.
     """
     try:
         head = _BlocksHead.model_validate(message[0])
@@ -232,10 +229,7 @@ class Progress:
     ) -> "Progress":
         """Return the position after the next blocks.
 
-        Raises
-        ------
-        ConfigError
-            If a block is invalid at this position; the message contains its number.
+        Raises ConfigError if a block is invalid at this position; the message contains its number.
         """
         for name, least, most in (
             ("n_samples", 1, MAX_BLOCK_SAMPLES),
@@ -304,10 +298,7 @@ def frames_message(frames: Frames, done: float) -> Message:
 def frames_of(message: Message) -> Frames:
     """Return the CAN frames in a message.
 
-    Raises
-    ------
-    ConfigError
-        If the message is malformed.
+    Raises ConfigError if the message is malformed.
     """
     if len(message[1]) % FRAME.itemsize:
         raise _malformed()

@@ -51,10 +51,7 @@ class Recording:
 def open_recording(folder: Path) -> Recording:
     """Open a recording and check it fully: manifest, file sizes, checksums, columns, lengths.
 
-    Raises
-    ------
-    ConfigError
-        If a check fails; the message states the file and the fault in one sentence.
+    Raises ConfigError if a check fails; the message states the file and the fault in one sentence.
     """
     manifest = read_manifest(folder)
     for name, expected in manifest.files.items():

@@ -154,10 +154,8 @@ def imported_blocks(path: Path, job: ImportJob) -> Generator[tuple[SampleBlock, 
 
     The calibration of the blocks is :attr:`ImportJob.calibration`.
 
-    Raises
-    ------
-    ConfigError
-        If the file is missing or does not match the job; one sentence with the path of the file.
+    Raises ConfigError if the file is missing or does not match the job; one sentence with the path
+    of the file.
     """
     calibration = job.calibration
     for message in _imported(path, job, "blocks"):

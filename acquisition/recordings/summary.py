@@ -58,10 +58,7 @@ class RecordingSummary:
 def summary_of(recording: Recording) -> RecordingSummary:
     """Return the summary of a recording, from the headers of all its blocks.
 
-    Raises
-    ------
-    ConfigError
-        If a file of the recording has become unreadable.
+    Raises ConfigError if a file of the recording has become unreadable.
     """
     manifest, progress = recording.manifest, Progress()
     channels = np.arange(len(manifest.channels))[:, np.newaxis]

@@ -99,10 +99,8 @@ def parquet_file(path: Path, schema: Any, n_rows: int, rows_per_group: int) -> I
     Only for use in the confined child, because pyarrow allocates the size stated in a page header:
     up to 2 GB for a page of 64 kB.
 
-    Raises
-    ------
-    ConfigError
-        If the file does not match the manifest, or reading it fails inside the context.
+    Raises ConfigError if the file does not match the manifest, or reading it fails inside the
+    context.
     """
     full, last = divmod(n_rows, rows_per_group)
     with foreign_errors_of(path), path.open("rb") as stream, pq.ParquetFile(stream) as file:

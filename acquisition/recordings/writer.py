@@ -113,11 +113,8 @@ class RecordingWriter:
 
         Slow values measured by another device are included; a missing value is recorded as NaN.
 
-        Raises
-        ------
-        ConfigError
-            If the unit, the calibration or the sample type of the block differ, it exceeds the
-            limits of the format, or it cannot be written.
+        Raises ConfigError if the unit, the calibration or the sample type of the block differ, it
+        exceeds the limits of the format, or it cannot be written.
         """
         if not self._progress.n_blocks:
             self.unit = self.unit.model_copy(update={"sample_type": block.counts.dtype.name})
@@ -143,10 +140,7 @@ class RecordingWriter:
     def finish(self) -> Manifest:
         """Sync all files, rename the recording to its final name, and return its manifest.
 
-        Raises
-        ------
-        ConfigError
-            If no block was written, or writing to the disk fails.
+        Raises ConfigError if no block was written, or writing to the disk fails.
         """
         if not self._progress.n_blocks:
             self.abandon()
@@ -167,10 +161,7 @@ class RecordingWriter:
     def abandon(self) -> None:
         """Remove the unfinished recording.
 
-        Raises
-        ------
-        ConfigError
-            If its files cannot be removed.
+        Raises ConfigError if its files cannot be removed.
         """
         with suppress(ConfigError), foreign_errors_of(self._aside):
             self._close()  # writes the footer, which fails on a full disk

@@ -32,11 +32,8 @@ def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[Frames, float]]:
     candump writes UTC seconds since 1970. BLF contains the local time of its writer; the time zone
     is that of the import job.
 
-    Raises
-    ------
-    ConfigError
-        If a frame is invalid, the log is incomplete, or the log has frames of several buses and the
-        job selects none.
+    Raises ConfigError if a frame is invalid, the log is incomplete, or the log has frames of
+    several buses and the job selects none.
     """
     size = max(path.stat().st_size, 1)
     with path.open("rb") as stream:

@@ -33,10 +33,7 @@ _Columns: TypeAlias = Sequence[tuple[str, ...]]
 def csv_rows(path: Path, job: ImportJob) -> Iterator[Rows]:
     """Yield the rows after the header; an empty cell of a slow channel repeats the previous value.
 
-    Raises
-    ------
-    ConfigError
-        If the file does not match the job; the message names the line.
+    Raises ConfigError if the file does not match the job; the message names the line.
     """
     with path.open("rb") as stream:
         yield from _CsvFile(stream, job).rows(max(path.stat().st_size, 1))

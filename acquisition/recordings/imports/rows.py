@@ -87,10 +87,8 @@ class Indexer:
     def stretches(self, times_ns: TimeArray) -> Iterator[Stretch]:
         """Yield the ranges without a gap of the next rows; rows are positions in `times_ns` (n,).
 
-        Raises
-        ------
-        ConfigError
-            If times decrease, are irregular or have a wrong rate; the message names the row.
+        Raises ConfigError if times decrease, are irregular or have a wrong rate; the message names
+        the row.
         """
         start = 0
         while start < len(times_ns):
@@ -177,10 +175,7 @@ def sample_blocks(table: Iterable[Rows], job: ImportJob) -> Iterator[tuple[Sampl
     A block ends at a gap and at the end of each piece read. Its cells begin at multiples of the
     unit's block length; the slow values of a cell are those valid at its first sample.
 
-    Raises
-    ------
-    ConfigError
-        If the times are inconsistent with the sampling rate of the unit.
+    Raises ConfigError if the times are inconsistent with the sampling rate of the unit.
     """
     indexer, calibration = Indexer(job.rate_hz, job.time.tolerance), job.calibration
     for rows in table:

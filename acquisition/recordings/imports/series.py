@@ -76,10 +76,7 @@ class SeriesFile:
 def series_rows(file: SeriesFile, job: ImportJob) -> Iterator[Rows]:
     """Yield the rows of a measurement file with the columns that an import job selects.
 
-    Raises
-    ------
-    ConfigError
-        If the file does not match the job.
+    Raises ConfigError if the file does not match the job.
     """
     found = [_column(file, column) for column in job.channels]
     channels = list(zip(job.channels, found, strict=True))

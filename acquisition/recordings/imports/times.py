@@ -50,10 +50,7 @@ def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None
 def utc_ns(us: TimeArray, start_ns: int) -> TimeArray:
     """Convert whole microseconds since `start_ns` (UTC in ns since 1970) to UTC in nanoseconds.
 
-    Raises
-    ------
-    ConfigError
-        If a time is too far from 1970 for nanoseconds in 64 bits.
+    Raises ConfigError if a time is too far from 1970 for nanoseconds in 64 bits.
     """
     found = us + np.int64(start_ns // 1000)
     wrong = np.abs(found) >= _MAX_US
@@ -75,10 +72,7 @@ def _whole_us(values: npt.NDArray[Any], us_per_unit: float) -> TimeArray:
 def text_to_ns(texts: Sequence[str], axis: TimeAxis) -> TimeArray:
     """Convert ISO 8601 texts to UTC in ns, (n,); the default time zone is that of `axis`.
 
-    Raises
-    ------
-    ConfigError
-        If a text is not a valid time.
+    Raises ConfigError if a text is not a valid time.
     """
     zone = timezone(timedelta(seconds=axis.utc_offset_s))
     return utc_ns(np.array([_text_to_us(text, zone) for text in texts], dtype=np.int64), 0)
@@ -106,10 +100,7 @@ def from_start(start_ns: int, first: int, stop: int, rate_hz: float) -> TimeArra
 def library(name: str, what: str) -> Any:
     """Import an optional library and return it; `what` names the file format in the error.
 
-    Raises
-    ------
-    ConfigError
-        If the library is not installed.
+    Raises ConfigError if the library is not installed.
     """
     try:
         return importlib.import_module(name)

@@ -95,27 +95,6 @@ async def test_another_device_at_the_same_address_is_refused(plant, cell, held, 
             await take(source, 1)
 
 
-@pytest.mark.parametrize(
-    ("fault", "error", "said"),
-    [
-        ("exception_2", ConfigError, "illegal data address"),
-        ("exception_11", LinkError, "gateway target"),
-        ("cut", LinkError, "closed"),
-    ],
-)
-async def test_a_refusal_is_told_and_the_next_poll_is_its_own(plant, fault, error, said):
-    async with plant() as (source, _, server, _):
-        async with source.connect() as stream:
-            first = await anext(stream)
-            server.inject(fault)
-            with pytest.raises(error, match=said):
-                await anext(stream)
-        [after] = await take(source, 1)
-
-    assert after.first_index > first.first_index
-    assert float(after.samples[0, 0]) == 100.0 + after.first_index
-
-
 async def test_the_first_poll_does_not_wait_and_the_others_come_at_multiples(stepped_clock):
     ticks = PollClock(stepped_clock, 60.0)
     stepped_clock.step(7.0)

@@ -13,7 +13,8 @@ from core.alarms.judgements import drift_reading
 
 
 @pytest.mark.parametrize(
-    ("trouble", "complaint"), [("frozen", "no usable slot"), ("writes nothing", "no usable slot")]
+    ("trouble", "complaint"),
+    [(trouble, "newest usable slot has not") for trouble in ("frozen", "writes nothing")],
 )
 async def test_a_device_that_stands_still_or_counts_but_writes_nothing_is_not_connected(
     trouble, complaint, device, server, source_at, stepped_clock
@@ -27,9 +28,9 @@ async def test_a_device_that_stands_still_or_counts_but_writes_nothing_is_not_co
         with pytest.raises(LinkError, match=complaint):
             await anext(stream)
     if device.frozen:
-        with pytest.raises(LinkError, match=complaint):
-            async with source.connect():
-                pass
+        async with source.connect() as stream:
+            with pytest.raises(LinkError, match=complaint):
+                await anext(stream)
         device.frozen = False
         device.produce(1)
         async with source.connect() as stream:

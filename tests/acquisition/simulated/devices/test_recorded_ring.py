@@ -197,7 +197,7 @@ async def test_a_device_whose_recording_has_ended_stands_still(counts_calibratio
         source = source_of(server, counts_calibration(), poll_period_s=0.001, stale_after_s=0.05)
         async with source.connect() as stream:
             await anext(stream)
-            with pytest.raises(LinkError, match="no usable slot"):
+            with pytest.raises(LinkError, match="newest usable slot has not changed"):
                 await anext(stream)
 
 

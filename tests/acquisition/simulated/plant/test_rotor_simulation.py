@@ -56,17 +56,6 @@ def test_many_steps_at_once_equal_the_same_steps_one_by_one(n_steps):
     assert np.abs(after - expected_state).max() <= 1e-11 * np.abs(expected_state).max()
 
 
-def test_a_run_in_two_parts_equals_the_run_in_one():
-    rotor = lift(discrete_rotor(), 32)
-    forces = 1.0e4 * np.random.default_rng(3).standard_normal((6, 640))
-
-    whole, _ = simulate(rotor, np.zeros(20), forces)
-    first, state = simulate(rotor, np.zeros(20), forces[:, :192])
-    second, _ = simulate(rotor, state, forces[:, 192:])
-
-    assert np.hstack([first, second]) == pytest.approx(whole, rel=1e-11, abs=1e-18)
-
-
 def test_a_held_force_settles_where_the_springs_balance_it():
     forces = np.zeros((6, 600 * 60))
     forces[4] = 1.0e5
