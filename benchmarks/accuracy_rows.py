@@ -203,7 +203,8 @@ def _published(number: int) -> Row:
         "published films: " + "; ".join(names),
         Run(scenario, REALISTIC),
         (
-            HELD,
+            # the doubt whether a film lags widens intervals of constant films
+            replace(HELD, coverage=(0.93, 0.99)),
             Required("dynamic k_xx", mean=0.015, coverage=(0.88, 1.0)),
             Required("dynamic k_yy", mean=0.015, coverage=(0.88, 1.0)),
             Required("dynamic *", coverage=(0.88, 1.0)),

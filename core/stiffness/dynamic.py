@@ -54,7 +54,7 @@ LAG_RESOLUTION = 0.001
 """Standard uncertainty of damping beside lagging parts from tapering, as in `dynamic_readings`:
 errors are 0.10 to 0.16 % in simulations without noise."""
 
-AS_DELAY, AS_LAGS = 1.05, 1.3
+AS_DELAY, AS_LAGS = 1.0, 1.1
 """Ratios of the squared significances of lagging parts and of a significant delay of the bearing
 channels, up to which the misfit is a delay, and from which it is the film. Medians are 1.4 to 1.7
 for films of tilting pads and 0.7 to 0.85 for late channels."""
@@ -85,6 +85,8 @@ class DynamicStiffness:
         Random standard uncertainty of `delay_s`; infinite if the delay could not be fitted.
     delay_per_damping
         Change of `delay_s` per N·s/m of the bracket's damping.
+    late_share
+        Share of the misfit of constant coefficients that a delay explains better than the film.
     coherence : (2,)
         Fraction of the power of each bearing channel that the shaft's motion explains through the
         fitted film, over the weighted lines; 0 to 1.
@@ -109,6 +111,7 @@ class DynamicStiffness:
     delay_s: float
     delay_std_s: float
     delay_per_damping: float
+    late_share: float
     coherence: FloatArray
     coherence_segments: FloatArray
     lack_of_fit: FloatArray
@@ -316,6 +319,7 @@ def _results(
             delay_s=0.0 if unseparable[n] else float(delay_s[n]),
             delay_std_s=math.inf if unseparable[n] else float(delay_std[n]),
             delay_per_damping=0.0 if unseparable[n] else float(delay_per_damping[n]),
+            late_share=0.0 if seeks_mass[n] else float(dropped[n, 0]),
             coherence=coherence[n],
             coherence_segments=segments[n],
             lack_of_fit=lack[n],

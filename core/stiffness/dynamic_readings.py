@@ -98,7 +98,8 @@ def fit_quality(found: DynamicStiffness, max_delay_s: float, damping: float) -> 
     """Return the quality of the fit: uncertain if it shows a channel delay or is poor."""
     sure = coverage_factor((), 1.0 - FALSE_ALARM)
     limits_s = max_delay_s + abs(found.delay_per_damping) * damping
-    if abs(found.delay_s) > limits_s + sure * found.delay_std_s:
+    doubt = 0.0 if found.late_share > 0.5 else sure * found.delay_std_s
+    if abs(found.delay_s) > limits_s + doubt:
         return uncertain(Reason.CHANNEL_DELAY)
     massless = found.bracket_mass_kg < -sure * found.bracket_mass_std_kg
     if massless or np.any(found.lack_of_fit > MAX_LACK_OF_FIT):
