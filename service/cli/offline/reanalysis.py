@@ -9,6 +9,7 @@ from core.monitor.monitor import UnitMonitor
 from core.monitor.refresh import Refresh
 from core.quality import Level, Reason
 from core.samples.calibration import UnitCalibration
+from core.stiffness.bracket_ratio import reported_name
 from service.api.routes.bearings import estimator_names, runout_names
 from service.api.values import QualityModel, reading_model, window_model
 from service.runtime.times import rfc3339
@@ -33,22 +34,26 @@ N_PER_GN = 1e9
 
 
 def stiffness_lines(assessment: Assessment) -> Iterator[str]:
-    """Yield the film stiffness of a bearing in x and y as text, in GN/m with its 95 % interval.
+    """Yield the film stiffness of a bearing in x and y as text, with its 95 % interval.
 
-    A stiffness without a value is shown with its reason, an uncertain one with its doubt.
+    It is in GN/m or, where the bracket is unknown, in k_b. A stiffness without a value is shown with
+    its reason, an uncertain one with its doubt.
     """
     for axis in ("xx", "yy"):
-        reading = assessment.readings[f"stiffness_{axis}_n_per_m"]
+        absolute = f"stiffness_{axis}_n_per_m"
+        name = reported_name(assessment.readings, absolute)
+        reading = assessment.readings[name]
+        scale, unit = (N_PER_GN, "GN/m") if name == absolute else (1.0, "k_b")
         words = f"{assessment.unit} {assessment.bearing} film stiffness {axis}: "
         if reading.value is None:
             yield f"{words}not available, {reading.quality.reason.value}"
             continue
-        words += f"{reading.value / N_PER_GN:.3f}"
+        words += f"{reading.value / scale:.3f}"
         if reading.interval_95 is not None:
             low, high = reading.interval_95
-            words += f" ± {(high - low) / 2.0 / N_PER_GN:.3f} GN/m (95 %)"
+            words += f" ± {(high - low) / 2.0 / scale:.3f} {unit} (95 %)"
         else:
-            words += " GN/m, uncertainty unknown"
+            words += f" {unit}, uncertainty unknown"
         reason = reading.quality.reason
         signs = f"check the sign of shaft_{axis[0]} or bearing_{axis[0]}"
         doubt = signs if reason is Reason.POLARITY else reason.value

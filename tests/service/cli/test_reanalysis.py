@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import typer
 from pydantic_core import to_json
+from rigs.assessments import assessment
 from rigs.command_line import padwatch
 from typer.testing import CliRunner
 
@@ -21,6 +22,7 @@ from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.bearing_readings import UnitEvaluation
 from core.monitor.monitor import UnitMonitor
 from core.monitor.refresh import Refresh
+from core.quality import Reading
 from core.samples.blocks import Rejection, SampleBlock
 from service.app.recordings import recording_writer, selection_of
 from service.cli import validate as command
@@ -30,6 +32,7 @@ from service.cli.offline.reanalysis import (
     assessment_document,
     calibration_differences,
     refreshes,
+    stiffness_lines,
 )
 from service.measuring.simulated_sources import simulated_feed
 from service.settings.core_values import calibration_of, machine_of
@@ -298,3 +301,10 @@ def test_states_are_not_needed_where_speed_and_power_tell(readings, plant_path):
     rated = "rated_power_mw = 700.0\nrated_speed_rpm"
     plant_path.write_text(plant_path.read_text().replace("rated_speed_rpm", rated, 1))
     assert padwatch("backtest", readings, "--plant", plant_path).exit_code == 0
+
+
+def test_a_film_on_an_unknown_bracket_is_told_as_a_ratio_to_it():
+    ratio = Reading(0.585, interval_95=(0.57, 0.60))
+    x, y = stiffness_lines(assessment(stiffness_xx_of_kb=ratio))
+    assert x == "U1 UJB film stiffness xx: 0.585 ± 0.015 k_b (95 %)"
+    assert y.endswith("not available, not_measured")
