@@ -36,8 +36,8 @@ N_PER_GN = 1e9
 def stiffness_lines(assessment: Assessment) -> Iterator[str]:
     """Yield the film stiffness of a bearing in x and y as text, with its 95 % interval.
 
-    It is in GN/m or, where the bracket is unknown, in k_b. A stiffness without a value is shown with
-    its reason, an uncertain one with its doubt.
+    It is in GN/m or, where the bracket is unknown, in k_b. A stiffness without a value is shown
+    with its reason, an uncertain one with its doubt.
     """
     for axis in ("xx", "yy"):
         absolute = f"stiffness_{axis}_n_per_m"
