@@ -93,7 +93,7 @@ class DynamicStiffness:
     coherence_segments : (2,)
         Number of independent segments that would make a coherence at a single line equally certain.
     lack_of_fit : (2,)
-        About 1 if stiffness and damping are constant over frequency, as modelled; else larger.
+        About 1 if the film is as modelled over the lines; else larger.
     frequency_hz : (n_used,)
         Frequencies of the used lines.
     probe_noise_um2_per_hz : (2,)
