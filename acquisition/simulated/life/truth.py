@@ -198,9 +198,3 @@ class UnitLife:
     truth: Mapping[str, BearingLifeTruth]
     damage: tuple[Damage, ...]
     changes: tuple[ConditionChange, ...]
-
-    def is_damaged(self) -> npt.NDArray[np.bool_]:
-        """Return whether any damage has begun, (n,)."""
-        time_ns = self.operation.time_ns
-        onsets = [damage.onset_ns for damage in self.damage]
-        return np.asarray(time_ns >= min(onsets, default=int(time_ns[-1]) + 1))

@@ -42,8 +42,6 @@ def test_damage_changes_nothing_before_it_and_nothing_in_other_bearings(two_year
         np.testing.assert_array_equal(
             healthy.readings[name].ln_k[:, same], ill.readings[name].ln_k[:, same]
         )
-    np.testing.assert_array_equal(ill.is_damaged(), ~before)
-    assert not healthy.is_damaged().any()
 
 
 @pytest.mark.parametrize("seed", SEEDS)
