@@ -47,7 +47,7 @@ test: develop axe
 	$(PYTEST)
 
 test-long: develop axe
-	$(PYTEST) -m long
+	$(PYTEST) -m long $(LEAVE_OUT)
 
 mutants: develop
 	$(BIN)/python tests/mutants/run.py

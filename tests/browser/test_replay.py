@@ -36,7 +36,7 @@ async def test_the_result_of_a_replay_stays_and_its_trends_are_those_of_the_reco
 ):
     await page.goto(replayed + "#/units/U1/bearings/UJB")
     stiffness = page.locator("[data-reading=stiffness_xx_n_per_m] .number").first
-    await expect(stiffness).to_have_text("0.689")
+    await expect(stiffness).to_have_text("0.686")
     await expect(page.locator(".fold .source")).to_contain_text("Replay finished at")
     curve = page.locator("[data-chart=stiffness-trend] .chart path.js-line").first
     await expect(curve).to_be_attached()

@@ -22,7 +22,7 @@ FAST_LINE = "baudrate = 4_000_000\nparity = 'none'"
 
 MIN_SAMPLES = 20
 POLLED_EACH_S = 0.05
-QUEUE_HZ = 20.0
+QUEUE_HZ = 50.0
 """A queue that a busy machine does not empty in time is a lost link."""
 
 POLLED_UP_TO_HZ = 8.0

@@ -118,7 +118,9 @@ async def test_a_device_that_repeats_itself_for_ever_is_stale(shape, device, sou
 
 async def test_an_unplugged_serial_adapter_leaves_no_thread(tmp_path, shape, device, source_of):
     async with SlcanPtyServer(device, link=tmp_path / "adapter") as server:
-        source = source_of(shape, server.endpoint, options={"sleep_after_open": 0.0})
+        source = source_of(
+            shape, server.endpoint, options={"sleep_after_open": 0.0}, stale_after_s=30.0
+        )
         for n in range(1, 6):
             async with source.connect() as stream:
                 server.produce(1)
