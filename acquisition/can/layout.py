@@ -168,7 +168,10 @@ def wave_channel(
     """
     scalings = {_gain_and_offset(channel, calibration, signal) for signal in signals}
     if len(scalings) > 1:
-        raise ConfigError(f"signals.{channel.id}: all signals must have the same factor and offset")
+        raise ConfigError(
+            f"signals.{channel.id}: all signals of the channel must have the same factor and"
+            f" offset in the DBC file, found {sorted(scalings)}"
+        )
     for signal in filter(is_counts, signals):
         _require_full_scale(channel, calibration, signal)
     return WaveChannel(wave, tuple(column_reader(s) for s in signals), *scalings.pop())

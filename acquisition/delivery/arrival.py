@@ -206,9 +206,10 @@ class HostStamps:
         self._least_delay_ns: int | None = None
 
     def add(self, epoch: int, stop_index: int, arrived_ns: int) -> None:
-        """Add the arrival of the samples before `stop_index` at a UTC time, ns since 1970.
+        """Add the arrival of the samples before `stop_index`, at `arrived_ns` (ns since 1970 UTC).
 
-        Call it at least once before `start_ns`, which has no meaning before.
+        `epoch` is that of the sample counter. The result of `start_ns` is undefined before the
+        first call.
         """
         delay_ns = arrived_ns - self.start_ns(stop_index)
         if epoch != self._epoch or delay_ns < -_STEP_NS:

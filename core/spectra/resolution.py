@@ -75,7 +75,11 @@ class Resolution:
         return resolved
 
     def qualities(self, qualities: tuple[Quality, ...]) -> tuple[Quality, ...]:
-        """Return the qualities of the resolved signals; each signal needs both transducers."""
+        """Return the quality of each resolved signal, given that of each transducer, in order.
+
+        It is the worse of the two transducers that the signal is computed from, with the reason
+        `REDUCED_PROBES` if only the other one is bad.
+        """
         resolved = list(qualities)
         for rows, _ in self._pairs:
             for own, other in (rows, rows[::-1]):

@@ -140,7 +140,10 @@ class Segment:
 
     @cached_property
     def velocities_mm_s_rms(self) -> tuple[Reading, ...]:
-        """Broad-band rms velocity, in mm/s, of each channel; missing for bad channels and polls."""
+        """Broad-band rms velocity of each channel, in mm/s, in channel order.
+
+        The reading of a bad channel has no value, and none has in a segment of polls.
+        """
         return self._of_channels(None if self.overall is None else self.overall.velocity_mm_s_rms)
 
     def _of_channels(self, values: FloatArray | None) -> tuple[Reading, ...]:

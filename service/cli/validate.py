@@ -29,9 +29,10 @@ def validate(
         bool, typer.Option("--json", help="Print the rows as a JSON array instead of tables.")
     ] = False,
 ) -> None:
-    """Recompute the published tables and print them beside padwatch's figures.
+    """Recompute the tables of Brito et al. and print them beside the published figures.
 
-    Exit code 1 if an error exceeds its limit, or what the rounding of the printed figures explains.
+    Exit code 1 if a deviation exceeds its limit, or is larger than the rounding of the published
+    figures explains.
     """
     simulated, measured = simulated_rows(), measured_rows()
     if json_output:

@@ -96,7 +96,7 @@ class Outbound:
         return self._waiting[unit][0]
 
     async def published(self, unit: str) -> None:
-        """Remove the oldest message of a unit after its acknowledgement by the servers."""
+        """Remove the oldest message of a unit; call it once the servers have acknowledged it."""
         message = self._waiting[unit].popleft()
         self.n_bytes -= len(message.payload)
         self.n_published += 1

@@ -51,7 +51,10 @@ UM_PER_M = 1e6
 
 
 def add_units(families: Families, newest: Newest, bearings: Bearings) -> None:
-    """Add link states, ages and qualities of results, and current values that are not bad."""
+    """Add the metrics of all units to `families`.
+
+    They are the state of the link, age and quality of each result, and values that are not bad.
+    """
     families.declare(UNITS)
     for unit, its in bearings.items():
         is_connected = newest.status(unit).state is LinkState.CONNECTED

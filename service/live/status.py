@@ -37,14 +37,15 @@ class UnitStatus:
     since_ns
         Start of the present link state, UTC nanoseconds since 1970.
     last_sample_ns
-        End of the newest block by the time stamps of its samples, UTC nanoseconds since 1970.
+        End of the newest block by the time stamps of its samples, UTC nanoseconds since 1970; None
+        before the first block.
     received_s
         Arrival time of the newest block by a monotonic clock, s; None before the first block.
     received_ns
         Arrival time of the newest block by the host clock of the serving process, UTC nanoseconds
         since 1970; None in the measuring process, and while the age of the block is unknown.
     account
-        Balance of the samples that the device offered.
+        Counts of the samples that the device offered: stored, flagged, lost and rejected.
     clock
         Offset and drift of the device clock; None if unknown.
     stamp_fault

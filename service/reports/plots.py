@@ -179,7 +179,10 @@ class Plot:
         )
 
     def upright(self, x: float, look: str, words: str = "", row: int = 0) -> None:
-        """Add a vertical line with a label; `row` is the row of the label, counted from the top."""
+        """Add a vertical line at `x`, in units of the x axis, with the label `words`.
+
+        `look` is the CSS class of the line, and `row` the row of the label, from 0 at the top.
+        """
         place, y = self._x(x), TOP + 8 + 9 * row
         self._marks.append(f'<path class="{look}" d="M{place} {TOP:g}V{self.height - BOTTOM:g}"/>')
         self._marks.append(

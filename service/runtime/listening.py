@@ -111,7 +111,8 @@ def server_tls(certificate: Path, key: Path) -> ssl.SSLContext:
     except (ssl.SSLError, ValueError) as error:
         why = getattr(error, "reason", None) or str(error)
         raise CertificateError(
-            f"service.tls: {certificate} and {key} must be a certificate and its key: {why}"
+            f"service.tls: cannot load certificate {certificate} with key {key}: {why}; the key"
+            " must belong to the certificate and have no passphrase"
         ) from error
     return context
 

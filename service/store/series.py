@@ -47,11 +47,12 @@ def unique_time_ns(
     Parameters
     ----------
     select
-        Query of the columns `measured`, with parameters `key` and time.
+        Query of the columns that `measured` is compared with; its parameters are the elements of
+        `key` and the time.
     key
         Key of the series.
     measured
-        Values that identify the measurement.
+        Values of these columns for the new measurement, in the same order.
     """
     while writer.execute(select, (*key, time_ns)).fetchone() not in (None, measured):
         time_ns += 1

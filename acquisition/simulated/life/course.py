@@ -34,8 +34,8 @@ but the excitation is negligible too."""
 class LifeCourse:
     """Operating conditions of a simulated unit over time, interpolated between 10-minute steps.
 
-    Standstill is included: forces decrease with the square of the speed, so that only transducer
-    noise, gaps and oil temperatures remain.
+    Standstill can be sampled too: forces scale with the square of the speed, so that only
+    transducer noise, gaps and oil temperatures remain.
 
     Parameters
     ----------
@@ -44,12 +44,12 @@ class LifeCourse:
     machine
         Unit to be sampled, as in `scenario_at`.
     start_ns
-        Time of the first sample.
+        Time of the first sample, ns since 1970 UTC.
 
     Raises
     ------
     ValueError
-        If damage has an unknown bearing, or `start_ns` is outside the life.
+        If damage names an unknown bearing, or `start_ns` is outside the life.
     KeyError
         If a bearing of the machine is missing from the life.
     """
