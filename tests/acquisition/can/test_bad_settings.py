@@ -123,7 +123,9 @@ def test_a_misfit_is_refused_with_file_key_and_fix(channels, others, words, dbc)
 
 def test_samples_of_one_channel_with_different_factors_are_refused(dbc):
     dbc.write_text(DBC.replace("(0.30517578125,0)", "(0.31,0)"), encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"signals\.x: all signals of the channel must have the same factor"):
+    with pytest.raises(
+        ConfigError, match=r"signals\.x: all signals of the channel must have the same factor"
+    ):
         compiled(dbc, channel("x", "WAVE.x WAVE.y"))
 
 
