@@ -44,7 +44,7 @@ def time_text(time_ns: int) -> str:
     return datetime.fromtimestamp(time_ns // NS_PER_S, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
-keys_app = command_group("Keys of machines: create, list, revoke.")
+keys_app = command_group("API keys: create, list, revoke.")
 
 
 @keys_app.command()

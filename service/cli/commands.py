@@ -31,7 +31,7 @@ GROUPS = {
         ),
         "delivery": ("notifications.app", "Test receivers of alarms, and resend messages."),
         "users": ("accounts.users_app", "Accounts of people: add, list, change, remove."),
-        "keys": ("accounts.keys_app", "Keys of machines: create, list, revoke."),
+        "keys": ("accounts.keys_app", "API keys: create, list, revoke."),
     },
     "Recordings and readings": {
         "record": ("record.record", "Record a unit's samples exactly as its DAQ delivers them."),

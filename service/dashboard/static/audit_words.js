@@ -70,5 +70,5 @@ export function chainWords(entries) {
     if (entry.previous_hash !== older.hash) return { look: "bad", words: `Entry ${entry.number} of the chain ${entry.chain} does not carry the hash of entry ${older.number}: run padwatch audit verify.` };
   }
   if (linked.size === 0) return { look: "absent", words: "No two entries shown follow each other. All of them are checked by padwatch audit verify." };
-  return { look: "good", words: `${linked.size} entries shown hold together by their hashes. All of them are checked by padwatch audit verify.` };
+  return { look: "good", words: `${linked.size} entries shown have an intact hash chain. To check all entries: padwatch audit verify.` };
 }

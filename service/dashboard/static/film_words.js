@@ -148,7 +148,7 @@ function progressWords({ learning, in_force: inForce, is_frozen: isFrozen, versi
     return `Learning: ${learning.n_days} of ${learning.n_days_wanted} days with settled readings.`;
   }
   if (inForce === null) return waitingWords(versions, acceptance);
-  return learning.is_over ? "The learning period is over; the baseline stands still until it is renewed." : "Learned again from time to time until the learning period ends.";
+  return learning.is_over ? "The learning period is over; the baseline is final until you start a new one." : "Learned again from time to time until the learning period ends.";
 }
 
 function waitingWords(versions, acceptance) {

@@ -11,7 +11,7 @@ const ACTIONS = {
   reject: ["Reject", (version) => `Compare the bearing with version ${version} no longer.`],
   freeze: ["Freeze", () => "Keep the version in force, and learn no further."],
   thaw: ["Thaw", () => "Learn again."],
-  renew: ["Renew", () => "Begin a new baseline after a machine event: older readings count no longer, and nothing is in force until it has been learned."],
+  renew: ["Renew", () => "Start a new baseline after an overhaul: earlier readings are ignored, and film alarms stay off until it is learned."],
 };
 
 /** Returns `{ node, open(action, version, opener) }`; `again` asks for the baselines afresh. */

@@ -1,4 +1,4 @@
-/** Keys of machines: a new one is shown once; each says when it was used last and when it ends. */
+/** API keys: a new one is shown once; each says when it was used last and when it ends. */
 
 import { keyMark, unitsOf, unitsWords, usedWords } from "../access_words.js";
 import { ask, tell } from "../api.js";
@@ -26,7 +26,7 @@ export function keyList(again) {
   const form = question("A new key for a machine", "Create", fields, async () => {
     shown.show(await tell(["keys"], { name: name.value.trim(), role: role.value, units: unitsOf(units.value), days: Number(days.value) }));
   }, again);
-  const head = element("div", { class: "panel-head" }, element("h2", {}, "Keys of machines"), create);
+  const head = element("div", { class: "panel-head" }, element("h2", {}, "API keys"), create);
   return {
     node: element("section", { class: "panel listing keys" }, head, form.node, shown.node, table.node),
     ask: async (signal) => table.draw(await ask(["keys"], [], signal)),

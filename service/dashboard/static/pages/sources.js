@@ -17,7 +17,7 @@ const PERIOD_S = 2;
 const READING_HELP =
   "Samples are counted per channel since the service started; what is missing never arrived, what is rejected arrived and could not be used. " +
   "Lag: how far the newest sample is behind this service’s clock. Device clock: how far it is ahead of it. " +
-  "Poll: what asking the device took last.";
+  "Poll: last response time of the device.";
 
 /** Returns `{ draw(view), close() }`. */
 export function sourcesPage(main) {
