@@ -174,7 +174,7 @@ class _Covering:
 
     def _use(self, cells: Cells, rows: npt.NDArray[np.bool_], width_ns: int) -> None:
         if rows.any():
-            chosen = cells.summaries.at(rows)
+            chosen = cells.summaries if rows.all() else cells.summaries.at(rows)
             self.cover.summaries.append(chosen.in_spans(self._bucket_ns))
             self.cover.n_rolled += int(cells.conditions.n_readings[rows].sum())
             self.cover.rolled_spans += _runs(np.unique(chosen.time_ns), width_ns)

@@ -171,6 +171,8 @@ def _record(n_columns: int, n_usable: int) -> np.dtype[np.void]:
 
 
 def _alike(patterns: list[bytes]) -> list[tuple[bytes, npt.NDArray[np.int64]]]:
+    if patterns and patterns.count(patterns[0]) == len(patterns):
+        return [(patterns[0], np.arange(len(patterns)))]
     rows: dict[bytes, list[int]] = {}
     for row, pattern in enumerate(patterns):
         rows.setdefault(pattern, []).append(row)
@@ -256,7 +258,7 @@ IN_SPAN = """
 SELECT_CELLS = f"""
     SELECT cell.* FROM whole_rollup_cell AS cell WHERE {OVERLAPPING} ORDER BY start_ns, slot
 """  # noqa: S608
-SELECT_PLACES = "SELECT series, width_s, start_ns, slot, NULL, n_readings FROM"
+SELECT_PLACES = "SELECT start_ns, slot, n_readings FROM"
 SELECT_NUMBERS = f"""
     SELECT n.*
     FROM whole_rollup_cell AS cell CROSS JOIN whole_rollup_numbers AS n ON n.series = cell.series
@@ -311,7 +313,8 @@ def select_cells(
     rows = read("rollup_cell", select, span) if span[0] < span[1] else []
     if not rows:
         return None
-    _, _, start, slot, state, n_readings, *bounds = zip(*rows, strict=True)
+    columns = list(zip(*rows, strict=True))
+    start, slot = columns[2:4] if has_conditions else columns[:2]
     start_ns = np.array(start)
     places = start_ns // width_ns * MOST_SLOTS + np.array(slot)
     summaries, n_found = _nothing(names, start_ns), np.zeros(len(rows), dtype=np.int64)
@@ -329,7 +332,8 @@ def select_cells(
             return select_cells(reader, series, width_ns, span, names, asked)
         unknown = np.full(len(rows), np.nan)
         states = np.full(len(rows), NO_STATE)
-        return Cells(Conditions(states, np.array(n_readings), *[unknown] * 4), summaries)
+        return Cells(Conditions(states, np.array(columns[2]), *[unknown] * 4), summaries)
+    state, n_readings, *bounds = columns[4:]
     states = np.array([NO_STATE if each is None else each for each in state], dtype=np.int64)
     extremes = (np.array(column, dtype=np.float64) for column in bounds)
     return Cells(Conditions(states, np.array(n_readings, dtype=np.int64), *extremes), summaries)
