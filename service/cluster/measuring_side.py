@@ -7,16 +7,8 @@ from collections.abc import Callable, Collection, Iterable
 from uuid import uuid4
 
 from acquisition.clock import Clock
-from service.live.commands import (
-    BaselineCommand,
-    UnreadableCommandError,
-    decoded,
-)
-from service.live.snapshot import (
-    UnitReport,
-    link_document,
-    snapshot_document,
-)
+from service.live.commands import BaselineCommand, UnreadableCommandError, decoded
+from service.live.snapshot import UnitReport, link_document, snapshot_document
 from service.measuring.commands import CommandExecutor
 from service.measuring.snapshots import LINK_EVERY_S, SnapshotBuilder
 from service.runtime.heartbeats import UNHEARD, Pulse

@@ -9,10 +9,7 @@ import structlog
 from acquisition.clock import Clock
 from core.units import ns_from_s
 from service.live.client import LiveClient
-from service.live.commands import (
-    OperatorCommand,
-    encoded,
-)
+from service.live.commands import OperatorCommand, encoded
 from service.live.current_state import LiveAlarms
 from service.live.operators import Operators
 from service.live.receivers import (
@@ -96,8 +93,9 @@ class Feed:
     ) -> tuple[Report, Revision | None] | None:
         """Decode a report; log an unreadable report once and return None."""
         try:
-            link = link_of_document(beat.signs)
+            # the snapshot first, whose error names both versions
             snapshot = None if document is None else snapshot_of_document(document[2])
+            link = link_of_document(beat.signs)
         except UnreadableSnapshotError as error:
             if str(error) != self._unreadable:
                 reason = self._unreadable = str(error)

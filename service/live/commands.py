@@ -1,6 +1,7 @@
 """Commands of operators and engineers to the measuring process, and the errors they can cause."""
 
 from dataclasses import dataclass
+from importlib.metadata import version as version_of
 from typing import Any, TypeAlias
 
 from pydantic import TypeAdapter, ValidationError
@@ -194,25 +195,38 @@ _KINDS: dict[str, tuple[type[OperatorCommand], TypeAdapter[Any]]] = {
 """Class of the command, and adapter of its fields in their order, by kind."""
 
 
+OWN_VERSION = version_of("padwatch")
+
+
 def encoded(command: OperatorCommand) -> tuple[str, str]:
-    """Return the kind of a command (the name of its class or action) and its JSON document."""
+    """Return the kind of a command (the name of its class or action) and its document.
+
+    The document is the version of the program, a line feed, and the fields of the command as JSON.
+    """
     kind = type(getattr(command, "action", command)).__name__
-    return kind, _KINDS[kind][1].dump_json(tuple(vars(command).values())).decode()
+    fields = _KINDS[kind][1].dump_json(tuple(vars(command).values())).decode()
+    return kind, f"{OWN_VERSION}\n{fields}"
 
 
 def decoded(kind: str, document: str) -> OperatorCommand:
-    """Return the command from kind and JSON document, as returned by `encoded`.
+    """Return the command from kind and document, as returned by `encoded`.
 
     Raises
     ------
     UnreadableCommandError
         If the document is from another version of the program, or damaged.
     """
+    theirs, _, content = document.partition("\n")
+    if theirs != OWN_VERSION:
+        raise UnreadableCommandError(
+            f"the command was sent by padwatch {theirs[:40]}, but this is padwatch {OWN_VERSION};"
+            " update all processes to one version"
+        )
     if kind not in _KINDS:
-        raise UnreadableCommandError(f"unknown command {kind}; update all processes to one version")
+        raise UnreadableCommandError(f"unknown command {kind}")
     made, adapter = _KINDS[kind]
     try:
-        return made(*adapter.validate_json(document))
+        return made(*adapter.validate_json(content))
     except ValidationError as error:
         raise UnreadableCommandError(f"command {kind} cannot be read: {error}") from error
 

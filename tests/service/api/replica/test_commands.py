@@ -10,7 +10,7 @@ from harness.waiting import at_work
 
 from core.alarms.operation import Comment
 from service.cluster.serving_side import WAIT_S, DatabaseOperators
-from service.live.commands import AlarmCommand, decoded, encoded
+from service.live.commands import AlarmCommand, UnreadableCommandError, decoded, encoded
 from service.store.port import AlarmQuery
 from service.store.sharing import Answer, Command, CommandState
 
@@ -182,3 +182,11 @@ def test_every_command_is_read_as_it_was_written():
     task = AlarmCommand(LINK, Comment("anna", "é\n\"'"))
 
     assert decoded(*encoded(task)) == task
+
+
+def test_a_command_of_another_version_is_refused_by_both_versions():
+    kind, document = encoded(AlarmCommand(LINK, Comment("anna", "seen")))
+    own, fields = document.split("\n")
+
+    with pytest.raises(UnreadableCommandError, match=f"padwatch 0.0.9, but this is padwatch {own}"):
+        decoded(kind, f"0.0.9\n{fields}")
