@@ -2,6 +2,7 @@
 
 import asyncio
 import gzip
+import re
 import secrets
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Hashable, Mapping
@@ -20,8 +21,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from acquisition.clock import Clock
 from service.api.auth.authenticator import CALLER
+from service.api.problems import ProblemError
 from service.runtime.asker import ASKER, Asker
 from service.runtime.times import rfc3339
+from service.store.port import StoreError
 
 T = TypeVar("T")
 
@@ -44,9 +47,10 @@ ENCODINGS: dict[str, Callable[[bytes], bytes]] = {
 MAX_CACHE_BYTES = 16_000_000
 
 MAX_KNOWN = 4096
-"""Number of answered requests that can be revalidated without routing; ten for each open page."""
+"""Number of answered requests that can be repeated without routing; ten for each open page."""
 
 Revision = Callable[[], Hashable]
+Remake = Callable[[str | None], Make]
 
 
 async def in_thread(do: Callable[[], T]) -> T:
@@ -114,7 +118,7 @@ class Answers:
 
     If the bodies exceed `max_bytes` together, the least recently used answers are dropped.
     Concurrent requests for the same answer wait for one computation of it. Answered requests that
-    may be repeated are kept by caller, for `Revalidation`.
+    may be repeated are kept by caller, for `Repetition`.
     """
 
     def __init__(self, max_bytes: int = MAX_CACHE_BYTES) -> None:
@@ -123,10 +127,10 @@ class Answers:
         self._max_bytes, self._n_bytes = max_bytes, 0
         self._kept: OrderedDict[tuple[str, str], Response] = OrderedDict()
         self._making: dict[tuple[str, str], _Making] = {}
-        self._known: OrderedDict[Hashable, tuple[Revision, object]] = OrderedDict()
+        self._known: OrderedDict[Hashable, tuple[Revision, Remake, object]] = OrderedDict()
 
     async def of(
-        self, request: Request, revision: Revision, make: Make, *, is_lasting: bool = False
+        self, request: Request, revision: Revision, make: Make, lasting: Remake | None = None
     ) -> Response:
         """Return the answer to a request; status 304 at once if the client has cached it.
 
@@ -138,33 +142,38 @@ class Answers:
         make
             Function that returns the answer; bytes are JSON. It is called in a thread and may
             block, or is a coroutine function.
-        is_lasting
-            Whether `revision` is also valid for later requests of the same URL.
+        lasting
+            Function that returns `make` for a later request of the same URL, given the value of
+            its parameter ``since``, which may differ; None if `revision` does not apply to it.
         """
-        tag = self._tag(request.scope, revision())
-        if is_lasting:
-            self._known[_asked(request.scope)] = revision, request.scope.get("route")
+        if lasting is not None:
+            self._known[_asked(request.scope)[0]] = revision, lasting, request.scope.get("route")
             if len(self._known) > MAX_KNOWN:
                 self._known.popitem(last=False)
-        if is_known(tag, request.headers.get("if-none-match")):
+        return await self._of(request.scope, revision, make)
+
+    async def repeated(self, scope: Scope) -> Response | None:
+        """Return the answer to a request that was answered before; None if it must be routed."""
+        asked, since = _asked(scope)
+        if scope["method"] != "GET" or asked not in self._known:
+            return None
+        self._known.move_to_end(asked)
+        revision, lasting, scope["route"] = self._known[asked]
+        try:
+            return await self._of(scope, revision, lasting(since))
+        except (ProblemError, StoreError):
+            return None  # the route raises it again
+
+    async def _of(self, scope: Scope, revision: Revision, make: Make) -> Response:
+        headers = Headers(scope=scope)
+        tag = self._tag(scope, revision())
+        if is_known(tag, headers.get("if-none-match")):
             return Response(status_code=304, headers={"ETag": tag})
-        key = (tag, encoding_of(request.headers))
+        key = (tag, encoding_of(headers))
         if (kept := self._kept.get(key)) is not None:
             self._kept.move_to_end(key)
             return kept
         return await self._made(key, make)
-
-    def revalidated(self, scope: Scope) -> tuple[str, object] | None:
-        """Return entity tag and route of a current answer that the client has cached, else None."""
-        if scope["method"] != "GET" or (named := _header(scope, b"if-none-match")) is None:
-            return None
-        asked = _asked(scope)
-        if asked not in self._known:
-            return None
-        self._known.move_to_end(asked)
-        revision, route = self._known[asked]
-        tag = self._tag(scope, revision())
-        return (tag, route) if is_known(tag, named) else None
 
     def _tag(self, scope: Scope, revision: Hashable) -> str:
         url = scope["path"].encode() + b"?" + scope["query_string"]
@@ -219,26 +228,28 @@ async def rendered(make: Callable[[], BaseModel]) -> Response:
     return Response(await asyncio.to_thread(lambda: json_of(make())), media_type=JSON)
 
 
-def _header(scope: Scope, wanted: bytes) -> str | None:
-    """Return the value of a header of a request; None without the header."""
-    return next((v.decode("latin-1") for name, v in scope["headers"] if name == wanted), None)
+SINCE = re.compile(rb"since=([0-9a-f]+-[0-9]{1,18})")
+"""Query of a request for changes after a revision, which differs from poll to poll."""
 
 
-def _asked(scope: Scope) -> Hashable:
-    """Return what an answer depends on: caller, URL, and headers that select or describe content.
+def _asked(scope: Scope) -> tuple[Hashable, str | None]:
+    """Return what an answer depends on, and the value of ``since`` if it is the only parameter.
 
-    The state of a request contains its caller below `CALLER`.
+    The former are caller, URL without that value, and headers that select or describe content. The
+    state of a request contains its caller below `CALLER`.
     """
-    caller = scope.get("state", {}).get(CALLER)
+    caller, query = scope.get("state", {}).get(CALLER), scope["query_string"]
     headers = tuple(h for h in scope["headers"] if h[0] in (b"accept", b"content-length"))
-    return caller and caller.identity, scope["path"], scope["query_string"], headers
+    found = SINCE.fullmatch(query)
+    asked = caller and caller.identity, scope["path"], b"since" if found else query, headers
+    return asked, found[1].decode() if found else None
 
 
-class Revalidation:
-    """ASGI middleware that answers 304 without routing if the client has a current answer.
+class Repetition:
+    """ASGI middleware that answers requests without routing if they were answered before.
 
     It applies to requests that the same caller with the same rights has made before: permission
-    and parameters were checked then. Fifty polling pages cost a third of what routing them costs.
+    and parameters were checked then. Fifty polling pages cost half of what routing them costs.
     """
 
     def __init__(self, app: ASGIApp, answers: Answers) -> None:
@@ -246,12 +257,8 @@ class Revalidation:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request, or forward it."""
-        found = self._answers.revalidated(scope)
-        if found is None:
-            await self._app(scope, receive, send)
-            return
-        tag, scope["route"] = found
-        await Response(status_code=304, headers={"ETag": tag})(scope, receive, send)
+        answer = await self._answers.repeated(scope)
+        await (answer or self._app)(scope, receive, send)
 
 
 TIME_HEADER = "Padwatch-Time"

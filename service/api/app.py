@@ -7,7 +7,7 @@ from typing import Any
 
 from fastapi import APIRouter, Depends, FastAPI, Request, Response
 
-from service.api.answers import AnswerHeaders, Answers, Revalidation
+from service.api.answers import AnswerHeaders, Answers, Repetition
 from service.api.auth.accounts import account_router, key_router
 from service.api.auth.declared import Declared, declared
 from service.api.auth.gate import Gate, require_declared
@@ -112,7 +112,7 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
     app.state.clock = context.clock
     authenticator, requests = context.access, RequestMetrics()
     # the last one runs first
-    app.add_middleware(Revalidation, answers=context.answers)
+    app.add_middleware(Repetition, answers=context.answers)
     app.add_middleware(AnswerHeaders, clock=context.clock)
     app.add_middleware(Gate, declared=lambda: app.declared, authenticator=authenticator)
     app.add_middleware(TimedRequests, metrics=requests)

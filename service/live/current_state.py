@@ -107,6 +107,8 @@ class LiveUnits:
         self._seen: dict[str, object] = {}
         self._checked: dict[str, tuple[LatestReport, float]] = {}
         self._asked: dict[tuple[str, ...], tuple[object, asyncio.Future[Any]]] = {}
+        self.n_reports = 0
+        """Number of applied reports."""
         self.read_error: str | None = None
         """Error of the newest attempt to read the reports; None if the attempt succeeded."""
 
@@ -165,6 +167,7 @@ class LiveUnits:
                 arrived_ns = sent_ns - ns_from_s(link.data_age_s)
                 received_s = sent_s - link.data_age_s
                 status = replace(status, received_s=received_s, received_ns=arrived_ns)
+        self.n_reports += 1
         self._latest[unit] = replace(
             latest, beat=beat, sent_s=sent_s, link=link, status=status, received_ns=received_ns
         )

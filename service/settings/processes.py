@@ -1,5 +1,6 @@
 """Settings of logins, TLS and limits of the HTTP server, and of the stream between processes."""
 
+from functools import lru_cache
 from ipaddress import ip_address
 from typing import Annotated, Literal
 
@@ -113,6 +114,7 @@ class StreamSettings(Settings):
     """TCP port of the health page of `padwatch analyse`, on loopback only; 0 uses a free port."""
 
 
+@lru_cache(maxsize=1024)
 def is_loopback(host: str) -> bool:
     """Return whether an address is a loopback address.
 

@@ -218,7 +218,7 @@ def alarm_router(context: Context) -> APIRouter:
             )
 
         return await context.answers.of(
-            request, partial(alarm_list_revision, engine, films), make, is_lasting=True
+            request, partial(alarm_list_revision, engine, films), make, lambda _: make
         )
 
     @router.get(

@@ -264,7 +264,7 @@ def bearing_router(context: Context) -> APIRouter:
         live = context.live
         make = partial(latest_model, live, unit, bearing)
         revision = partial(live.revision, unit)
-        return await context.answers.of(request, revision, make, is_lasting=True)
+        return await context.answers.of(request, revision, make, lambda _: make)
 
     @router.get(
         "/{bearing}/budgets/{quantity}",

@@ -471,7 +471,7 @@ def film_router(context: Context) -> APIRouter:
         context.bearing(unit, bearing)
         make = partial(film_model, context, unit, bearing)
         return await context.answers.of(
-            request, partial(context.now_revision, unit), make, is_lasting=True
+            request, partial(context.now_revision, unit), make, lambda _: make
         )
 
     return router

@@ -1,7 +1,6 @@
 """Route for the overview of the plant: what a tile shows of each unit, and what changed."""
 
 from collections.abc import Hashable
-from functools import partial
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
@@ -10,6 +9,7 @@ from pydantic import Field
 from core.quality import Level, Reading
 from core.stiffness.bracket_ratio import reported_name
 from core.stiffness.estimators import is_reversed
+from service.api.answers import Make
 from service.api.auth.declared import subject_router
 from service.api.context import Context
 from service.api.routes.alarm_models import AlarmCountModel
@@ -23,6 +23,7 @@ from service.api.values import (
     ReadingModel,
     reading_model,
 )
+from service.live.current_state import CHECK_S
 from service.settings.bearings import BearingSettings
 
 SHOWN = (
@@ -164,17 +165,21 @@ class Overview:
         self._context = context
         self._n = 0
         self._head: Hashable = None
+        self._seen: Hashable = None
         self._units: dict[str, tuple[Hashable, int]] = {}
         self._tiles: dict[str, tuple[int, UnitTileModel]] = {}
 
     def revision(self) -> int:
         """Return the revision of the overview, a number that each observed change increases."""
-        for unit in self._context.units:
-            now = self._context.now_revision(unit)
-            if unit not in self._units or self._units[unit][0] != now:
-                self._n += 1
-                self._units[unit] = now, self._n
         live, alarms, plant = self._context.live, self._context.alarms, self._context.plant()
+        seen = live.n_reports, int(self._context.clock.monotonic_s() / CHECK_S)
+        if seen != self._seen:
+            self._seen = seen
+            for unit in self._context.units:
+                now = self._context.now_revision(unit)
+                if unit not in self._units or self._units[unit][0] != now:
+                    self._n += 1
+                    self._units[unit] = now, self._n
         head = (live.store_error, live.n_unstored, alarms.revision, plant.captures, plant.evidence)
         self._n += head != self._head
         self._head = head
@@ -275,7 +280,10 @@ def overview_router(context: Context) -> APIRouter:
         ] = None,
     ) -> Response:
         """Return all units with bearings and films; values that are not current are null."""
-        make = partial(shown.model, since)
-        return await context.answers.of(request, shown.revision, make, is_lasting=True)
+
+        def make(since: str | None) -> Make:
+            return lambda: shown.model(since)
+
+        return await context.answers.of(request, shown.revision, make(since), make)
 
     return router

@@ -307,12 +307,11 @@ def trend_router(context: Context) -> APIRouter:
             def revision() -> Hashable:
                 return times, context.live.past_revision(unit, query.end_ns)
 
-            return await context.answers.of(
-                request,
-                revision,
-                lambda: trend_answer(query, *read()),
-                is_lasting="last" not in request.query_params,
-            )
+            def make() -> dict[str, object]:
+                return trend_answer(query, *read())
+
+            lasting = None if "last" in request.query_params else lambda _: make
+            return await context.answers.of(request, revision, make, lasting)
         whole, groups, past = await in_thread(read)
         columns = await in_thread(lambda: trend_table(whole, groups, past))
         cursor = None if whole.next_ns is None else str(whole.next_ns)
