@@ -85,7 +85,7 @@ def judged(watch: Watch, moments: Sequence[Sequence[FilmReading]]) -> Verdicts:
 
 def _findings(news: Sequence[FilmNews]) -> Iterator[tuple[FilmDirection, tuple[Verdict, str]]]:
     for one in news:
-        for direction, finding in zip(DIRECTIONS, one.findings, strict=True):
+        for direction, finding in zip(DIRECTIONS, one.findings[: len(DIRECTIONS)], strict=True):
             cause = finding.attribution.cause.value if finding.attribution else ""
             yield (one.reading.bearing, direction), (finding.verdict, cause)
 

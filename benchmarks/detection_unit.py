@@ -75,10 +75,12 @@ class LearnedUnit:
 
     def decide(self, later: Later, bearing: str, direction: str) -> DecisionHistory:
         found = self.stiffness(bearing, direction)
-        return decide_all(later.histories[bearing], later.is_settled, direction, found, LIMITS)
+        return decide_all(
+            later.histories[bearing], later.is_settled, f"k_{direction}", found, LIMITS
+        )
 
     def stiffness(self, bearing: str, direction: str) -> QuantityBaseline:
-        found = self.baselines[bearing].of(direction)
+        found = self.baselines[bearing].of(f"k_{direction}")
         if found is None:
             raise RuntimeError(f"unit {self.seed} has learned nothing of {bearing} {direction}")
         return found

@@ -10,18 +10,18 @@ from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import Support
 from core.baseline.grouping import group_readings, robust_std
-from core.baseline.history import DIRECTIONS, StiffnessHistory
+from core.baseline.history import QUANTITIES, StiffnessHistory
 
 
 def mean_difference(first: BearingBaseline, second: BearingBaseline) -> dict[str, float]:
-    """Return the mean difference of ln stiffness by direction, second minus first baseline.
+    """Return the mean difference of ln of each quantity, second minus first baseline.
 
     The mean is over cells with `Support.OWN` in both, weighted by the number of readings in the
-    first. A direction without such cells, or with different grids, is omitted.
+    first. A quantity without such cells, or with different grids, is omitted.
     """
     found: dict[str, float] = {}
     for one in first.quantities:
-        other = second.of(one.direction)
+        other = second.of(one.quantity)
         if other is None or other.grid != one.grid:
             continue
         known = {cell.cell for cell in other.table.cells if cell.support is Support.OWN}
@@ -34,7 +34,7 @@ def mean_difference(first: BearingBaseline, second: BearingBaseline) -> dict[str
             conditions = one.table.middle.rows(np.array(rows))
             weight = np.array([one.table.cells[row].n_readings for row in rows], np.float64)
             difference = other.surface.at(conditions) - one.surface.at(conditions)
-            found[one.direction] = float(np.average(difference, weights=weight))
+            found[one.quantity] = float(np.average(difference, weights=weight))
     return found
 
 
@@ -50,7 +50,7 @@ OUTLIER_STDS = 4.0
 
 @dataclass(frozen=True)
 class Drift:
-    """Change of ln stiffness over the whole learning period, with its standard uncertainty."""
+    """Change of ln of a quantity over the whole learning period, with its standard uncertainty."""
 
     change: float
     std: float
@@ -59,11 +59,11 @@ class Drift:
 def learning_drift(
     history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], baseline: QuantityBaseline
 ) -> Drift | None:
-    """Return the drift of ln stiffness about the baseline during the learning period.
+    """Return the drift of ln of a quantity about its baseline during the learning period.
 
     `is_settled` (n,) selects the readings. None if too few can be compared within a cell.
     """
-    conditions, value = history.conditions, history.ln_k[DIRECTIONS.index(baseline.direction)]
+    conditions, value = history.conditions, history.of(baseline.quantity)[0]
     usable = is_settled & baseline.is_known(conditions) & np.isfinite(value)
     if not usable.any():
         return None
@@ -125,7 +125,9 @@ def far_readings(
         found = learned.compare_history(history)
         deviation = found.deviation[is_settled & (found.place >= 0)]
         if n := int(np.sum(np.abs(deviation) >= FAR_DEVIATION)):
-            counts.append(f"{n} of {deviation.size} readings in {learned.direction}")
+            counts.append(
+                f"{n} of {deviation.size} readings in {QUANTITIES[learned.quantity].label}"
+            )
     if not counts:
         return None
     return f"{' and '.join(counts)} are at least twice or at most half the baseline; check units"

@@ -1,14 +1,13 @@
 """`BearingBaseline`: learned film stiffness of a bearing, with its origin."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.cell_table import NODES, CellTable
-from core.baseline.history import DIRECTIONS, StiffnessHistory
+from core.baseline.history import QUANTITIES, StiffnessHistory
 from core.baseline.surface import ATTITUDE_TERMS, Surface, attitude_terms
 from core.condition.cells import CellGrid, FilmConditions
 
@@ -97,14 +96,14 @@ class Deviations:
 
 @dataclass(frozen=True)
 class QuantityBaseline:
-    """Learned film stiffness in one direction.
+    """Learned values of one of the `QUANTITIES` of a film.
 
     Raises `ValueError` if a value is out of its range, or sizes or order of values are wrong.
 
     Parameters
     ----------
-    quantity, direction
-        Name of the quantity in stored documents, and direction "x" or "y".
+    quantity
+        Name of the quantity, a key of `QUANTITIES`.
     attitude_covariance
         Covariance of the attitude terms of the surface; empty without attitude terms.
     max_surface_std
@@ -121,8 +120,7 @@ class QuantityBaseline:
         Fraction of the learning groups that the robust fit rejected.
     """
 
-    quantity: Literal["stiffness"]
-    direction: str
+    quantity: str
     grid: CellGrid
     surface: Surface
     attitude_covariance: tuple[tuple[float, ...], ...]
@@ -135,8 +133,8 @@ class QuantityBaseline:
     rejected_share: float
 
     def __post_init__(self) -> None:
-        if self.direction not in DIRECTIONS:
-            raise ValueError(f"direction must be {' or '.join(DIRECTIONS)}, got {self.direction}")
+        if self.quantity not in QUANTITIES:
+            raise ValueError(f"quantity must be of {', '.join(QUANTITIES)}, got {self.quantity}")
         if not (self.scatter > 0.0 and self.u_random >= 0.0 and self.reading_h > 0.0):
             raise ValueError(
                 "scatter and reading_h must be above 0 and u_random not below 0, got"
@@ -151,6 +149,11 @@ class QuantityBaseline:
         if times_h != sorted(set(times_h)):
             found = ", ".join(f"{time_h:g} h" for time_h in times_h)
             raise ValueError(f"time scales of time_scatter must increase, got {found}")
+
+    @property
+    def direction(self) -> str:
+        """Direction "x" or "y" of the quantity."""
+        return QUANTITIES[self.quantity].direction
 
     def compare(
         self, conditions: FilmConditions, value: FloatArray, u_random: FloatArray
@@ -178,9 +181,9 @@ class QuantityBaseline:
         return found
 
     def compare_history(self, history: StiffnessHistory) -> Deviations:
-        """Return the deviations of a history's readings in the direction of this baseline."""
-        row = DIRECTIONS.index(self.direction)
-        return self.compare(history.conditions, history.ln_k[row], history.u_random[row])
+        """Return the deviations of a history's readings of the quantity of this baseline."""
+        value, u_random, _ = history.of(self.quantity)
+        return self.compare(history.conditions, value, u_random)
 
     def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
         """Return whether all conditions that the baseline depends on are known (n,)."""
@@ -228,7 +231,7 @@ class BearingBaseline:
     """Learned baseline of one bearing, from the readings of a learning period.
 
     Readings from `learned_from_ns` on, before `learned_until_ns` (ns since 1970 UTC), were used.
-    There is at most one `QuantityBaseline` per direction; directions with too few readings have
+    There is at most one `QuantityBaseline` per quantity; quantities with too few readings have
     none.
     """
 
@@ -237,6 +240,6 @@ class BearingBaseline:
     learned_until_ns: int
     quantities: tuple[QuantityBaseline, ...]
 
-    def of(self, direction: str) -> QuantityBaseline | None:
-        """Return the baseline of direction "x" or "y"; None if it was not learned."""
-        return next((each for each in self.quantities if each.direction == direction), None)
+    def of(self, quantity: str) -> QuantityBaseline | None:
+        """Return the baseline of one of the `QUANTITIES`; None if it was not learned."""
+        return next((each for each in self.quantities if each.quantity == quantity), None)

@@ -18,6 +18,40 @@ DIRECTIONS = ("x", "y")
 """Directions of the film stiffness; row 0 of a (2, n) column is x, row 1 is y."""
 
 
+@dataclass(frozen=True)
+class FilmQuantity:
+    """Quantity of a film in one direction that is learned and judged.
+
+    `value` and `uncertainty` are the columns of `StiffnessHistory` with its natural logarithm and
+    the relative random standard uncertainty.
+    """
+
+    name: str
+    direction: str
+    value: str
+    uncertainty: str
+
+    @property
+    def label(self) -> str:
+        """Words for the quantity: its direction, with "c/k" if it is not the stiffness."""
+        return self.direction if self.value == "ln_k" else f"c/k {self.direction}"
+
+    @property
+    def row(self) -> int:
+        """Row of the direction in (2, n) columns."""
+        return DIRECTIONS.index(self.direction)
+
+
+QUANTITIES = {
+    f"{name}_{d}": FilmQuantity(f"{name}_{d}", d, value, uncertainty)
+    for name, value, uncertainty in (("k", "ln_k", "u_random"), ("ck", "ln_ck", "u_ck"))
+    for d in DIRECTIONS
+}
+"""Watched quantities by name: stiffness k, and damping over stiffness c/k; in x and in y.
+
+Rows of (4, n) columns are in this order."""
+
+
 MIN_LN_K = math.log(1e5)
 """Smallest ln of a stiffness in N/m; larger than that of any ratio to a bracket stiffness. Brackets
 have 1e7 N/m and more, and films are less than a hundred times softer or stiffer."""
@@ -46,7 +80,7 @@ class ReadingOutcome(IntEnum):
 class StiffnessHistory:
     """Stiffness readings of one bearing in order of time, as columns; NaN for missing values.
 
-    Columns are (n,); the columns `PER_DIRECTION` are (2, n). Time may have gaps.
+    Columns are (n,); those of the directions are (2, n). Time may have gaps.
 
     Parameters
     ----------
@@ -61,6 +95,9 @@ class StiffnessHistory:
         1× amplitudes of the shaft relative to the bearing, and of the bearing itself.
     outcome
         Values of `ReadingOutcome`; by default, a missing `ln_k` is `BAD_QUALITY`.
+    ln_ck, u_ck
+        Natural logarithm of damping over stiffness in s, and its random standard uncertainty; by
+        default missing.
 
     Raises
     ------
@@ -81,6 +118,8 @@ class StiffnessHistory:
     shaft_um_pk: FloatArray
     bearing_um_pk: FloatArray
     outcome: CodeArray = field(default_factory=lambda: np.empty((2, 0), np.int8))
+    ln_ck: FloatArray = field(default_factory=lambda: np.empty((2, 0)))
+    u_ck: FloatArray = field(default_factory=lambda: np.empty((2, 0)))
 
     def __post_init__(self) -> None:
         if self.outcome.size == 0:
@@ -88,6 +127,9 @@ class StiffnessHistory:
                 np.isnan(self.ln_k), ReadingOutcome.BAD_QUALITY, ReadingOutcome.MEASURED
             )
             object.__setattr__(self, "outcome", missing.astype(np.int8))
+        if self.ln_ck.size == 0:
+            for name in ("ln_ck", "u_ck"):
+                object.__setattr__(self, name, np.full(self.ln_k.shape, np.nan))
         self._check_shapes()
         steps = np.flatnonzero(np.diff(self.time_ns) <= 0)
         if steps.size:
@@ -101,6 +143,18 @@ class StiffnessHistory:
     def conditions(self) -> FilmConditions:
         """Film conditions of all readings."""
         return FilmConditions(self.eccentricity_ratio, self.oil_temperature_c, self.attitude_deg)
+
+    def of(self, name: str) -> tuple[FloatArray, FloatArray, CodeArray]:
+        """Return ln, random uncertainty and outcome (n,) of one of the `QUANTITIES`.
+
+        A missing c/k has the outcome of the stiffness, or `BAD_QUALITY` if that was measured.
+        """
+        quantity = QUANTITIES[name]
+        value = getattr(self, quantity.value)[quantity.row]
+        known, outcome = np.isfinite(value), self.outcome[quantity.row]
+        silent = np.where(outcome == ReadingOutcome.MEASURED, ReadingOutcome.BAD_QUALITY, outcome)
+        outcome = np.where(known, ReadingOutcome.MEASURED, silent).astype(np.int8)
+        return value, getattr(self, quantity.uncertainty)[quantity.row], outcome
 
     def rows(self, start: int, stop: int) -> "StiffnessHistory":
         """Return the readings from row `start` up to, but not including, row `stop`."""
@@ -122,14 +176,17 @@ class StiffnessHistory:
     def _check_numbers(self) -> None:
         for column in fields(self):
             _refuse(column.name, "is infinite", np.isinf(getattr(self, column.name)))
-        measured = np.isfinite(self.ln_k)
+        measured, has_ck = np.isfinite(self.ln_k), np.isfinite(self.ln_ck)
         _refuse(
             "outcome", "contradicts ln_k", (self.outcome == ReadingOutcome.MEASURED) != measured
         )
         _refuse("u_random", "must be above 0", measured & ~(self.u_random > 0.0))
+        _refuse("u_ck", "must be above 0", has_ck & ~(self.u_ck > 0.0))
 
 
-PER_DIRECTION = frozenset({"ln_k", "u_random", "shaft_um_pk", "bearing_um_pk", "outcome"})
+PER_DIRECTION = frozenset(
+    {"ln_k", "u_random", "shaft_um_pk", "bearing_um_pk", "outcome", "ln_ck", "u_ck"}
+)
 """Names of the columns of shape (2, n), with rows for x and y."""
 
 

@@ -7,7 +7,7 @@ from core.arrays import FloatArray, TimeArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
 from core.baseline.cell_table import CellTable
 from core.baseline.grouping import Groups, group_readings
-from core.baseline.history import DIRECTIONS, StiffnessHistory
+from core.baseline.history import QUANTITIES, StiffnessHistory
 from core.baseline.scatter import time_scatter, with_scatter
 from core.baseline.settings import BaselineSettings
 from core.baseline.surface_fit import MIN_SCATTER, Fit, fit_surface, refit, surface_shape
@@ -78,7 +78,7 @@ def learn(
 ) -> BearingBaseline:
     """Learn the baseline of a bearing from readings that are mostly from a healthy machine.
 
-    Only the readings selected by `is_settled` (n,) are used. A direction in which they cover fewer
+    Only the readings selected by `is_settled` (n,) are used. A quantity whose readings cover fewer
     than `min_learning_days` gets no baseline.
 
     Raises
@@ -88,7 +88,7 @@ def learn(
     """
     if not len(history):
         raise ValueError("the history is empty; a baseline needs readings to learn from")
-    found = [_learn_direction(history, is_settled, each, settings) for each in DIRECTIONS]
+    found = [_learn_quantity(history, is_settled, each, settings) for each in QUANTITIES]
     return BearingBaseline(
         origin,
         int(history.time_ns[0]),
@@ -97,14 +97,13 @@ def learn(
     )
 
 
-def _learn_direction(
+def _learn_quantity(
     history: StiffnessHistory,
     is_settled: npt.NDArray[np.bool_],
-    direction: str,
+    name: str,
     settings: BaselineSettings,
 ) -> QuantityBaseline | None:
-    conditions, row = history.conditions, DIRECTIONS.index(direction)
-    value, u_random = history.ln_k[row], history.u_random[row]
+    conditions, (value, u_random, _) = history.conditions, history.of(name)
     usable = is_settled & settings.is_known(conditions) & np.isfinite(value)
     time_ns, conditions, value = history.time_ns[usable], conditions.rows(usable), value[usable]
     if value.size == 0:
@@ -128,8 +127,7 @@ def _learn_direction(
     table = with_scatter(table, slope, place, day, deviation)
     scatter = table.scatter[place]
     return QuantityBaseline(
-        quantity="stiffness",
-        direction=direction,
+        quantity=name,
         grid=grid,
         surface=fit.surface,
         attitude_covariance=fit.attitude_covariance,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
 from core.baseline.baseline import QuantityBaseline
-from core.baseline.history import DIRECTIONS, CodeArray, StiffnessHistory
+from core.baseline.history import CodeArray, StiffnessHistory
 from core.change.decision import INITIAL_DECISION, Decision, outcomes, step
 from core.change.settings import ChangeLimits, FilmRules
 from core.condition.operating_state import (
@@ -91,10 +91,10 @@ def _operations(
 
 @dataclass(frozen=True, eq=False)
 class DecisionHistory:
-    """Decision on a film in one direction after each reading, as columns (n,).
+    """Decision on a quantity of a film after each reading, as columns (n,).
 
     `verdict` contains values of `Verdict`, and `level` values of `AlarmLevel` or 0. The other
-    columns describe the most significant mean deviation of ln k; NaN as long as there is none.
+    columns describe the most significant mean deviation, in ln; NaN as long as there is none.
     """
 
     verdict: CodeArray
@@ -111,14 +111,13 @@ class DecisionHistory:
 def decide_all(
     history: StiffnessHistory,
     is_settled: npt.NDArray[np.bool_],
-    direction: str,
+    quantity: str,
     baseline: QuantityBaseline | None,
     limits: ChangeLimits,
 ) -> DecisionHistory:
     """Return the decision after each stored reading, from the initial decision on.
 
-    Readings that `is_settled` (n,) excludes are not judged; without a baseline, none is. The
-    direction is "x" or "y".
+    Readings that `is_settled` (n,) excludes are not judged; without a baseline, none is.
     """
     nothing = (np.nan, np.nan, np.nan)
     rows = [
@@ -126,7 +125,7 @@ def decide_all(
             *(decision.verdict, decision.level or 0),
             *((f.change, f.significance, f.time_scale_h) if (f := decision.finding) else nothing),
         )
-        for decision in _decisions(history, is_settled, direction, baseline, limits)
+        for decision in _decisions(history, is_settled, quantity, baseline, limits)
     ]
     verdict, level, *finding = np.array(rows, np.float64).reshape(-1, 5).T.copy()
     return DecisionHistory(verdict.astype(np.int8), level.astype(np.int8), *finding)
@@ -142,22 +141,22 @@ def last_decision(
 
     Readings that `is_settled` (n,) excludes are not judged. Without readings, the initial decision.
     """
-    watched = (history, is_settled, baseline.direction, baseline)
-    found = deque(_decisions(*watched, rules.change, rules.lapsed_ns), maxlen=1)
+    watched = (history, is_settled, baseline.quantity, baseline)
+    limits = rules.limits(baseline.quantity)
+    found = deque(_decisions(*watched, limits, rules.lapsed_ns), maxlen=1)
     return found[0] if found else INITIAL_DECISION
 
 
 def _decisions(
     history: StiffnessHistory,
     is_settled: npt.NDArray[np.bool_],
-    direction: str,
+    quantity: str,
     baseline: QuantityBaseline | None,
     limits: ChangeLimits,
     lapsed_ns: Callable[[int], int] = int,
 ) -> Iterator[Decision]:
-    decision, row = INITIAL_DECISION, DIRECTIONS.index(direction)
-    columns = (history.conditions, history.ln_k[row], history.u_random[row], history.outcome[row])
-    found = outcomes(*columns, is_settled, baseline)
+    decision = INITIAL_DECISION
+    found = outcomes(history.conditions, *history.of(quantity), is_settled, baseline)
     for time_ns, outcome in zip(history.time_ns.tolist(), found, strict=True):
         decision = step(decision, lapsed_ns(time_ns), outcome, baseline, limits)
         yield decision

@@ -9,7 +9,7 @@ import numpy as np
 
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
-from core.baseline.history import DIRECTIONS, are_ratios
+from core.baseline.history import DIRECTIONS, QUANTITIES, are_ratios
 from core.change.cause import Attribution, Cause, UnitReadings, attribute
 from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, outcomes, step
 from core.change.film_reading import FilmReading
@@ -24,14 +24,14 @@ NORMAL_95 = 1.96
 
 @dataclass(frozen=True)
 class FilmFinding:
-    """Verdict on a film in one direction after a reading, with its numbers; None if missing.
+    """Verdict on a quantity of a film after a reading, with its numbers; None if missing.
 
     Parameters
     ----------
     level
         Active level, whether or not this reading was judged.
     change, change_std
-        Most significant mean deviation of the stiffness from the baseline, in ln, and its standard
+        Most significant mean deviation of the quantity from the baseline, in ln, and its standard
         uncertainty.
     time_scale_h
         Averaging time of `change` in running hours.
@@ -40,6 +40,10 @@ class FilmFinding:
         was not compared.
     attribution
         Cause of the change while a level is active, otherwise None.
+    quantity
+        Name of the quantity, a key of `QUANTITIES`.
+    limit
+        Limit of the change for danger if that level is active, otherwise for an alert.
     """
 
     verdict: Verdict
@@ -51,14 +55,26 @@ class FilmFinding:
     deviation_std: float | None = None
     baseline_version: int | None = None
     attribution: Attribution | None = None
+    quantity: str = "k_x"
+    limit: float = ChangeLimits.alert_change
+
+    @property
+    def rank(self) -> tuple[int, float]:
+        """Level, and change relative to the limit, by which findings are ordered."""
+        return self.level or 0, abs(math.expm1(self.change or 0.0)) / self.limit
 
     @property
     def deviation_95_percent(self) -> tuple[float, float] | None:
-        """95 % interval of the deviation, % of the expected stiffness; None without deviation."""
+        """95 % interval of the deviation, % of the expected value; None without deviation."""
         if self.deviation is None or self.deviation_std is None:
             return None
         half = NORMAL_95 * self.deviation_std
         return percent_of(self.deviation - half), percent_of(self.deviation + half)
+
+
+def unjudged(verdict: Verdict) -> tuple[FilmFinding, ...]:
+    """Return findings on all `QUANTITIES` with the same verdict and without numbers."""
+    return tuple(FilmFinding(verdict, quantity=name) for name in QUANTITIES)
 
 
 ALARM_REASONS = {
@@ -70,28 +86,38 @@ ALARM_REASONS = {
 """Reason code of a film-stiffness alarm, by cause of the change."""
 
 
-def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Judgement:
-    """Return the judgement of a film in one direction; unknown if the reading was not judged.
+def alarm_condition(findings: Sequence[FilmFinding], direction: str) -> Judgement:
+    """Return the judgement of a film in one direction from the findings of all `QUANTITIES`.
 
-    Value and limit are changes in percent of the expected stiffness, with the sign of the change.
+    The quantity with the highest level, then with the largest change relative to its limit, gives
+    value, limit and reason. Without a stiffness that is judged, the judgement is unknown. Damping
+    over stiffness is left out where it is not judged, unless its level is active.
+
+    Value and limit are changes in percent of the expected value, with the sign of the change.
     """
-    if finding.verdict not in JUDGED:
-        return unknown(finding.verdict.name.lower())
-    limit = limits.danger_change if finding.level is AlarmLevel.DANGER else limits.alert_change
+    stiffness, ck = (f for f in findings if QUANTITIES[f.quantity].direction == direction)
+    judged = [each for each in (stiffness, ck) if each.verdict in JUDGED]
+    over = [each for each in judged if each.level is not None]
+    silent = [each for each in (stiffness, ck) if each.verdict not in JUDGED]
+    held = [each for each in silent if each is stiffness or each.level is not None]
+    if held and not over:
+        return unknown(held[0].verdict.name.lower())
+    finding = max(judged, key=lambda each: each.rank)
+    level = max(filter(None, (each.level for each in (stiffness, ck))), default=None)
     reason = "ok"
     if finding.level is not None:
         reason = ALARM_REASONS[finding.attribution.cause if finding.attribution else Cause.UNKNOWN]
     change = None if finding.change is None else percent_of(finding.change)
-    signed = math.copysign(round(100.0 * limit, 6), change or 0.0)
-    return Judgement(finding.level, value=change, limit=signed, reason=reason)
+    signed = math.copysign(round(100.0 * finding.limit, 6), change or 0.0)
+    return Judgement(level, value=change, limit=signed, reason=reason)
 
 
 @dataclass(frozen=True)
 class FilmDecision:
-    """Decision on a film in one direction, and version of its baseline (None without baseline)."""
+    """Decision on a quantity of a film, and version of its baseline (None without baseline)."""
 
     bearing: str
-    direction: str
+    quantity: str
     version: int | None
     decision: Decision
 
@@ -112,17 +138,17 @@ class FilmMemory:
 
 @dataclass(frozen=True)
 class FilmNews:
-    """New reading of a film, with the resulting findings and decisions in x and y."""
+    """New reading of a film, with the resulting findings and decisions on all `QUANTITIES`."""
 
     reading: FilmReading
-    findings: tuple[FilmFinding, FilmFinding]
-    decisions: tuple[Decision, Decision]
+    findings: tuple[FilmFinding, ...]
+    decisions: tuple[Decision, ...]
 
     @property
     def worst(self) -> int:
-        """Index of the finding with the highest level, then with the largest change."""
-        sizes = [(each.level or 0, abs(each.change or 0.0)) for each in self.findings]
-        return sizes.index(max(sizes))
+        """Index of the finding with the highest level, then the largest change to its limit."""
+        ranks = [each.rank for each in self.findings]
+        return ranks.index(max(ranks))
 
 
 MAX_RECENT = 4 * MEAN_READINGS
@@ -144,7 +170,7 @@ class FilmJudge:
         self.response: ShaftResponse | None = None
         self._rules = rules
         self._baselines: dict[str, BearingBaseline] = {}
-        self._decisions: dict[FilmDirection, Decision] = {}
+        self._decisions: dict[tuple[str, str], Decision] = {}
         self._films = [(bearing, d) for bearing in rules.estimators for d in DIRECTIONS]
         stiffness = [brackets_n_per_m[bearing] for bearing, _ in self._films]
         self._has_bracket = {
@@ -163,7 +189,7 @@ class FilmJudge:
     ) -> None:
         """Set the active baseline of a bearing from the next reading on; None removes it.
 
-        `decisions` are the decisions in x and y to continue from; by default, initial decisions.
+        `decisions` on all `QUANTITIES` are those to continue from; by default, initial decisions.
         Their times are cleared, so that the next reading may have any time. A baseline learned
         before the bracket stiffness became known or unknown is not comparable and counts as None.
         """
@@ -171,23 +197,23 @@ class FilmJudge:
             self._baselines.pop(bearing, None)
         else:
             self._baselines[bearing] = baseline
-        begun = decisions or (INITIAL_DECISION,) * len(DIRECTIONS)
-        for direction, decision in zip(DIRECTIONS, begun, strict=True):
-            self._decisions[bearing, direction] = _timeless(decision)  # clocks may differ
+        begun = decisions or (INITIAL_DECISION,) * len(QUANTITIES)
+        for name, decision in zip(QUANTITIES, begun, strict=True):
+            self._decisions[bearing, name] = _timeless(decision)  # clocks may differ
 
     @property
     def decided(self) -> tuple[FilmDecision, ...]:
-        """Decisions on all films and directions, with the versions of their baselines."""
+        """Decisions on all quantities of all films, with the versions of their baselines."""
         return tuple(
-            FilmDecision(bearing, direction, self._version(bearing), decision)
-            for (bearing, direction), decision in self._decisions.items()
+            FilmDecision(bearing, name, self._version(bearing), decision)
+            for (bearing, name), decision in self._decisions.items()
         )
 
     def restore(self, decided: Sequence[FilmDecision]) -> None:
         """Restore the decisions made with the active baseline versions; ignore the others."""
         for found in decided:
             if found.version == self._version(found.bearing):
-                self._decisions[found.bearing, found.direction] = found.decision
+                self._decisions[found.bearing, found.quantity] = found.decision
 
     def forget_times(self) -> None:
         """Clear the times of the last readings, so that the next reading may have any time."""
@@ -206,7 +232,7 @@ class FilmJudge:
 
         Returns
         -------
-        One item per reading: its findings, and the updated decisions in x and y.
+        One item per reading: its findings, and the updated decisions on all `QUANTITIES`.
 
         Raises
         ------
@@ -214,32 +240,36 @@ class FilmJudge:
             If a reading is not later than the previous reading of its film.
         """
         found = {
-            (reading.bearing, direction): self._decide(reading, direction)
+            (reading.bearing, name): self._decide(reading, name)
             for reading in readings
-            for direction in DIRECTIONS
+            for name in QUANTITIES
         }
         self._remember(readings, found)
-        for film, finding in found.items():
+        for (bearing, name), finding in found.items():
             if finding.level is not None:
-                found[film] = replace(finding, attribution=self._attribution(film))
+                film = bearing, QUANTITIES[name].direction
+                found[bearing, name] = replace(finding, attribution=self._attribution(film))
         news = []
         for reading in readings:
-            x, y = ((reading.bearing, direction) for direction in DIRECTIONS)
-            decisions = (self._decisions[x], self._decisions[y])
-            news.append(FilmNews(reading, (found[x], found[y]), decisions))
+            keys = [(reading.bearing, name) for name in QUANTITIES]
+            findings = tuple(found[key] for key in keys)
+            news.append(FilmNews(reading, findings, tuple(self._decisions[key] for key in keys)))
         return news
 
-    def _decide(self, reading: FilmReading, direction: str) -> FilmFinding:
-        film, value = (reading.bearing, direction), reading.values[DIRECTIONS.index(direction)]
-        learned, before = self._learned(*film), self._decisions.get(film, INITIAL_DECISION)
-        ln_k, u_random = np.array([value.ln_k]), np.array([value.u_random])
-        code, is_settled = np.array([value.outcome]), np.array([reading.condition.is_settled])
-        [outcome] = outcomes(reading.conditions, ln_k, u_random, code, is_settled, learned)
+    def _decide(self, reading: FilmReading, name: str) -> FilmFinding:
+        key, quantity, limits = (reading.bearing, name), QUANTITIES[name], self._rules.limits(name)
+        learned, before = self._learned(*key), self._decisions.get(key, INITIAL_DECISION)
+        value, u_random, code = (np.array([x]) for x in reading.values[quantity.row].of(quantity))
+        is_settled = np.array([reading.condition.is_settled])
+        [outcome] = outcomes(reading.conditions, value, u_random, code, is_settled, learned)
         now_ns = self._rules.lapsed_ns(reading.time_ns)
-        decision = step(before, now_ns, outcome, learned, self._rules.change)
-        self._decisions[film] = decision
+        decision = step(before, now_ns, outcome, learned, limits)
+        self._decisions[key] = decision
         finding, is_compared = decision.finding, decision.last_counted_ns == decision.last_ns
+        is_danger = decision.level is AlarmLevel.DANGER
         return FilmFinding(
+            quantity=name,
+            limit=limits.danger_change if is_danger else limits.alert_change,
             verdict=decision.verdict,
             level=decision.level,
             change=finding.change if finding else None,
@@ -251,7 +281,7 @@ class FilmJudge:
         )
 
     def _remember(
-        self, readings: Sequence[FilmReading], found: Mapping[FilmDirection, FilmFinding]
+        self, readings: Sequence[FilmReading], found: Mapping[tuple[str, str], FilmFinding]
     ) -> None:
         """Keep the readings of one time to find causes, if all bearings have a settled reading."""
         settled = {each.bearing: each for each in readings if each.condition.is_settled}
@@ -259,9 +289,10 @@ class FilmJudge:
             return
         rows = []
         for bearing, direction in self._films:
-            reading, learned = settled[bearing], self._learned(bearing, direction)
+            stiffness = f"k_{direction}"
+            reading, learned = settled[bearing], self._learned(bearing, stiffness)
             value = reading.values[DIRECTIONS.index(direction)]
-            deviation = found[bearing, direction].deviation
+            deviation = found[bearing, stiffness].deviation
             rows.append(
                 (
                     value.ln_k,
@@ -282,14 +313,15 @@ class FilmJudge:
         return attribute(film, self.response, readings, self._brackets)
 
     def _is_comparable(self, baseline: BearingBaseline) -> bool:
-        cells = [cell.location for each in baseline.quantities for cell in each.table.cells]
+        stiffness = [each for name in ("k_x", "k_y") if (each := baseline.of(name))]
+        cells = [cell.location for each in stiffness for cell in each.table.cells]
         return bool(
             np.all(are_ratios(np.array(cells)) != self._has_bracket[baseline.origin.bearing])
         )
 
-    def _learned(self, bearing: str, direction: str) -> QuantityBaseline | None:
+    def _learned(self, bearing: str, quantity: str) -> QuantityBaseline | None:
         baseline = self._baselines.get(bearing)
-        return baseline.of(direction) if baseline else None
+        return baseline.of(quantity) if baseline else None
 
     def _version(self, bearing: str) -> int | None:
         baseline = self._baselines.get(bearing)

@@ -4,11 +4,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from core.baseline.history import DIRECTIONS, ReadingOutcome
+from core.baseline.history import DIRECTIONS, FilmQuantity, ReadingOutcome
 from core.condition.cells import BearingCondition, FilmConditions
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
-from core.quality import GOOD, Level, Quality, Reading, Reason, worst
+from core.quality import GOOD, NOT_MEASURED, Level, Quality, Reading, Reason, worst
 from core.stiffness.bracket_ratio import reported_name
 from core.stiffness.estimators import ESTIMATORS
 
@@ -28,6 +28,8 @@ class FilmValue:
         Whether stiffness and film condition were measured.
     reason
         Reason for the outcome; "ok" if measured.
+    ln_ck, u_ck
+        Natural logarithm of damping over stiffness in s, and its random standard uncertainty.
     """
 
     ln_k: float
@@ -36,6 +38,17 @@ class FilmValue:
     bearing_um_pk: float
     outcome: ReadingOutcome
     reason: Reason
+    ln_ck: float = math.nan
+    u_ck: float = math.nan
+
+    def of(self, quantity: FilmQuantity) -> tuple[float, float, ReadingOutcome]:
+        """Return ln, random uncertainty and outcome of a quantity, as `StiffnessHistory.of`."""
+        value, outcome = getattr(self, quantity.value), self.outcome
+        if not math.isnan(value):
+            outcome = ReadingOutcome.MEASURED
+        elif outcome is ReadingOutcome.MEASURED:
+            outcome = ReadingOutcome.BAD_QUALITY
+        return value, getattr(self, quantity.uncertainty), outcome
 
 
 @dataclass(frozen=True)
@@ -102,32 +115,42 @@ def good_or_nan(reading: Reading) -> float:
 
 
 def _value(readings: Mapping[str, Reading], estimator: Estimator, direction: str) -> FilmValue:
-    name = ESTIMATORS[estimator].stiffness.format(axes=direction * 2)
+    entry = ESTIMATORS[estimator]
+    name = entry.stiffness.format(axes=direction * 2)
     stiffness = readings[reported_name(readings, name)]
-    outcome, reason = _outcome(
-        stiffness,
-        worst(readings[key].quality for key in ("eccentricity_ratio", "oil_temperature_c")),
-    )
-    is_measured = outcome is ReadingOutcome.MEASURED
-    k_n_per_m = good_or_nan(stiffness)
+    condition = worst(readings[key].quality for key in ("eccentricity_ratio", "oil_temperature_c"))
+    outcome, reason = _outcome(stiffness, condition)
+    ln_k, u_random = _ln(stiffness, outcome)
+    ck = readings[entry.ck.format(axes=direction * 2)] if entry.ck else NOT_MEASURED
+    ln_ck, u_ck = _ln(ck, _outcome(ck, condition)[0])
     return FilmValue(
-        ln_k=math.log(k_n_per_m) if is_measured else math.nan,
-        u_random=(stiffness.u_random or 0.0) / k_n_per_m if is_measured else math.nan,
+        ln_k=ln_k,
+        u_random=u_random,
         shaft_um_pk=value_or_nan(readings[f"order1_shaft_{direction}_um_pk"]),
         bearing_um_pk=value_or_nan(readings[f"order1_bearing_{direction}_um_pk"]),
         outcome=outcome,
         reason=reason,
+        ln_ck=ln_ck,
+        u_ck=u_ck,
     )
 
 
-def _outcome(stiffness: Reading, condition: Quality) -> tuple[ReadingOutcome, Reason]:
-    """Return the outcome of a stiffness reading; a doubtful reading counts as bad quality."""
-    quality = stiffness.quality
+def _ln(reading: Reading, outcome: ReadingOutcome) -> tuple[float, float]:
+    """Return ln of a measured reading and its random uncertainty, otherwise NaN."""
+    if outcome is not ReadingOutcome.MEASURED:
+        return math.nan, math.nan
+    value = good_or_nan(reading)
+    return math.log(value), (reading.u_random or 0.0) / value
+
+
+def _outcome(reading: Reading, condition: Quality) -> tuple[ReadingOutcome, Reason]:
+    """Return the outcome of a reading; a doubtful reading counts as bad quality."""
+    quality = reading.quality
     if quality.reason is Reason.INSUFFICIENT_EXCITATION:
         return ReadingOutcome.INSUFFICIENT_EXCITATION, quality.reason
     found = quality if quality.level is not Level.GOOD else condition
     if found.level is not Level.GOOD:
         return ReadingOutcome.BAD_QUALITY, found.reason
-    if not good_or_nan(stiffness) > 0.0 or not (stiffness.u_random or 0.0) > 0.0:
+    if not good_or_nan(reading) > 0.0 or not (reading.u_random or 0.0) > 0.0:
         return ReadingOutcome.BAD_QUALITY, Reason.OUT_OF_RANGE
     return ReadingOutcome.MEASURED, GOOD.reason

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from core.baseline.history import QUANTITIES
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingLimits
 from core.machine.unit import Estimator
@@ -19,15 +20,15 @@ danger."""
 
 
 def percent_of(ln: float) -> float:
-    """Return a change of ln(stiffness) in percent of the expected stiffness."""
+    """Return a change of a logarithm in percent of the expected value."""
     return 100.0 * math.expm1(ln)
 
 
 @dataclass(frozen=True)
 class ChangeLimits:
-    """Limits of the change of a film's stiffness, for increase and decrease.
+    """Limits of the change of a quantity of a film, for increase and decrease.
 
-    Changes and `deadband` are fractions of the expected stiffness: 0.035 is 3.5 %.
+    Changes and `deadband` are fractions of the expected value: 0.035 is 3.5 %.
 
     Parameters
     ----------
@@ -75,6 +76,10 @@ class ChangeLimits:
         return max(self.significance - fall, MIN_SIGNIFICANCE)
 
 
+CK_CHANGE = ChangeLimits(alert_change=0.008, danger_change=0.05, deadband=0.003)
+"""Limits of damping over stiffness, which a change of clearance moves by a third of its size."""
+
+
 @dataclass(frozen=True)
 class FilmRules:
     """Rules for monitoring the films of one unit.
@@ -83,6 +88,8 @@ class FilmRules:
     ----------
     estimators
         Estimator of the monitored stiffness, by bearing id; other bearings are not monitored.
+    change, change_ck
+        Limits of stiffness, and of damping over stiffness.
     reading_ns
         Interval between readings.
     time_lapse
@@ -96,6 +103,11 @@ class FilmRules:
     change: ChangeLimits
     reading_ns: int
     time_lapse: float = 1.0
+    change_ck: ChangeLimits = CK_CHANGE
+
+    def limits(self, quantity: str) -> ChangeLimits:
+        """Return the limits of one of the `QUANTITIES`."""
+        return self.change if QUANTITIES[quantity].value == "ln_k" else self.change_ck
 
     def lapsed_ns(self, time_ns: int) -> int:
         """Return a time multiplied by `time_lapse`, for operating state and decision."""

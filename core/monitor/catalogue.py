@@ -89,6 +89,10 @@ CATALOGUE: tuple[Quantity, ...] = (
     *_order_quantities("vortex", "vortex"),
     *_coefficients("dynamic_k", "N/m", "Film stiffness, broadband estimate", AXES),
     *_coefficients("dynamic_c", "N·s/m", "Film damping, broadband estimate", AXES),
+    *(
+        Quantity(f"dynamic_ck_{a}_s", "s", f"Film damping over stiffness, {a}", *STORED)
+        for a in ("xx", "yy")
+    ),
     *_each("dynamic_coherence_{}", "1", "Share of the bearing's motion {} that the film explains"),
     *_each("dynamic_lack_of_fit_{}", "1", "Lack of fit of the film {}, about 1 if it fits", ()),
     Quantity("dynamic_n_lines", "1", "Spectral lines used by the broadband estimate"),

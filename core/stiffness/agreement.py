@@ -97,7 +97,7 @@ def contradicting(
                 _combined(film, factors.imag / omega, covariance),
             )
             if any(map(disagree, expected, map(_without_cross_coupling, measured))):
-                doubted |= of_line[prefix] | set(of_row)
+                doubted |= of_line[prefix] | {*of_row, f"dynamic_ck_{axes}_s"}
     return doubted
 
 

@@ -39,8 +39,12 @@ RESOLUTION = 0.001
 line contains motion of neighbouring lines, which is integrated with the wrong frequency.
 Simulations without noise show 0.03 % at 0.07 Hz per bin."""
 
+CK_NAMES = ("dynamic_ck_xx_s", "dynamic_ck_yy_s")
+"""Names of direct damping over direct stiffness."""
+
 NAMES = (
     *(name for row in DYNAMIC_COEFFICIENTS for name in row),
+    *CK_NAMES,
     *(f"dynamic_{what}_{axis}" for what in ("coherence", "lack_of_fit") for axis in "xy"),
     "dynamic_n_lines",
     "dynamic_delay_s",
@@ -53,7 +57,9 @@ def dynamic_readings(bearing: Bearing, found: DynamicStiffness, quality: Quality
     damping = _damping_half_width(found, bearing.bracket, bearing.accuracy)
     quality = worst((quality, fit_quality(found, bearing.accuracy.delay_s, damping)))
     coefficients = dynamic_budgets(found, bearing.bracket, bearing.accuracy)
-    of_film = {name: (Reading(b.value, quality), b) for name, b in coefficients.items()}
+    coefficients |= _ck_budgets(found, bearing.bracket, bearing.accuracy)
+    of_film: dict[str, Budgeted] = {name: (missing(Reason.OUT_OF_RANGE), None) for name in CK_NAMES}
+    of_film |= {name: (Reading(b.value, quality), b) for name, b in coefficients.items()}
     return with_budgets(of_film | _evidence(found, bearing, damping, quality))
 
 
@@ -64,10 +70,7 @@ def dynamic_budgets(
 
     The uncertainty of a fitted mass is contained in the random part.
     """
-    mass_kg = 0.0 if bracket.mass_kg is None else mass_half_width_kg(bracket, accuracy)
-    damping = _damping_half_width(found, bracket, accuracy)
-    names = (BRACKET, MASS, DAMPING, DELAY)
-    widths = (accuracy.bracket_stiffness, mass_kg, damping, accuracy.delay_s)
+    names, widths = _bracket_half_widths(found, bracket, accuracy)
     # coefficients are inversely proportional to the shaft spectrum
     left_in = found.noise_share / (1.0 - found.noise_share)
     std, budgets = found.std, {}
@@ -83,6 +86,44 @@ def dynamic_budgets(
                 systematic_line("probe noise taken off", accuracy.probe_noise, value * left_in),
                 systematic_line("spectral resolution", RESOLUTION, direct),
                 systematic_line("film over frequency", float(found.model[row, column]), 1.0),
+            ),
+        )
+    return budgets
+
+
+def _bracket_half_widths(
+    found: DynamicStiffness, bracket: BracketDynamics, accuracy: BearingAccuracy
+) -> tuple[tuple[str, ...], tuple[float, ...]]:
+    """Return names and half-widths of the bracket's errors, in the order of `found.changes`."""
+    mass_kg = 0.0 if bracket.mass_kg is None else mass_half_width_kg(bracket, accuracy)
+    damping = _damping_half_width(found, bracket, accuracy)
+    widths = (accuracy.bracket_stiffness, mass_kg, damping, accuracy.delay_s)
+    return (BRACKET, MASS, DAMPING, DELAY), widths
+
+
+def _ck_budgets(
+    found: DynamicStiffness, bracket: BracketDynamics, accuracy: BearingAccuracy
+) -> dict[str, Budget]:
+    """Return the uncertainty budgets of damping over stiffness, for a positive stiffness.
+
+    Gains and probe noise cancel. Stiffness and damping of one fit are correlated.
+    """
+    names, widths = _bracket_half_widths(found, bracket, accuracy)
+    budgets = {}
+    for row, name in enumerate(CK_NAMES):
+        k, c = (float(found.coefficients[row, column]) for column in (row, row + 2))
+        if k <= 0.0:
+            continue
+        per = np.zeros(4)
+        per[row], per[row + 2] = -c / k**2, 1.0 / k
+        model = math.hypot(*(per * found.model[row]).tolist())
+        budgets[name] = Budget(
+            c / k,
+            (
+                random_line(STATISTICS, math.sqrt(float(per @ found.covariance[row] @ per))),
+                *map(systematic_line, names, widths, (found.changes[:, row] @ per).tolist()),
+                systematic_line("spectral resolution", RESOLUTION, math.hypot(c / k, c / k)),
+                systematic_line("film over frequency", model, 1.0),
             ),
         )
     return budgets

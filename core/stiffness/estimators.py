@@ -23,17 +23,20 @@ class EstimatorEntry:
         Name as for `stiffness`; None for equation (5), which includes damping in stiffness.
     coherence
         Name with a placeholder ``{axis}`` for "x" or "y".
+    ck
+        Damping over stiffness, with a name as for `stiffness`; None if not reported.
     """
 
     label: str
     stiffness: str
     damping: str | None
     coherence: str
+    ck: str | None = None
 
     def names(self, axes: str) -> tuple[str, ...]:
-        """Return the names of stiffness and, if reported, damping for axes "xx" or "yy"."""
+        """Return the reported names of stiffness, damping and their ratio for axes "xx" or "yy"."""
         return tuple(
-            name.format(axes=axes) for name in (self.stiffness, self.damping) if name is not None
+            name.format(axes=axes) for name in (self.stiffness, self.damping, self.ck) if name
         )
 
 
@@ -45,6 +48,7 @@ ESTIMATORS: Mapping[Estimator, EstimatorEntry] = {
         "dynamic_k_{axes}_n_per_m",
         "dynamic_c_{axes}_n_s_per_m",
         "dynamic_coherence_{axis}",
+        "dynamic_ck_{axes}_s",
     ),
     **{
         Estimator(f"transfer_{line}"): EstimatorEntry(
@@ -167,6 +171,6 @@ def _is_negative(reading: Reading) -> bool:
 
 
 def _take_out(readings: dict[str, Reading], names: tuple[str, ...]) -> None:
-    for name in names:
-        if readings[name].value is not None:
+    for name in names:  # cross-coupled coefficients have no ratio
+        if name in readings and readings[name].value is not None:
             readings[name] = missing(Reason.POLARITY)

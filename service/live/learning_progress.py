@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.baseline.history import ReadingOutcome
+from core.baseline.history import DIRECTIONS, ReadingOutcome
 from core.change.decision import JUDGED
 from core.condition.operating_state import STEADY
 from core.units import DAY_NS
@@ -120,7 +120,7 @@ def _recent(
         int(np.isin(found.state, [int(state) for state in STEADY]).sum()),
         int(found.is_settled.sum()),
         min(int((found.is_settled & row).sum()) for row in _complete(found, settings)),
-        int(is_judged.sum(axis=1).min()),
+        int(is_judged[: len(DIRECTIONS)].sum(axis=1).min()),
     )
 
 

@@ -120,7 +120,7 @@ def add_films(
         for bearing in its:
             news = films(unit, bearing)
             is_current = newest.current(unit, bearing).is_current
-            for direction, finding in zip("xy", news.findings if news else (), strict=False):
+            for direction, finding in zip("xy", news.findings[:2] if news else (), strict=False):
                 verdicts[finding.verdict] += 1
                 if is_current and finding.verdict in JUDGED and finding.change is not None:
                     labels = {"unit": unit, "bearing": bearing, "direction": direction}

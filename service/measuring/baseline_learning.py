@@ -1,6 +1,6 @@
 """Learning of baselines from stored readings, and checks of learned baselines."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial, reduce
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from core.baseline.agreement import far_readings, learning_drift, mean_difference
 from core.baseline.baseline import BearingBaseline, Origin
-from core.baseline.history import StiffnessHistory
+from core.baseline.history import QUANTITIES, StiffnessHistory
 from core.baseline.learning import learn
 from core.change.settings import FilmRules, percent_of
 from core.change.shaft_response import ShaftResponse, learn_response
@@ -79,8 +79,7 @@ class Learner:
         )
         if not baseline.quantities:
             return None
-        limit = self._settings.change.alert_change
-        doubt = drifted(found.history, is_healthy, baseline, limit)
+        doubt = drifted(found.history, is_healthy, baseline, self._settings.alert_change)
         doubt = doubt or self._disagreement(baseline, versions)
         far = far_readings(found.history, is_healthy, baseline)
         self._store.add_baseline(baseline, self._steps(baseline, doubt, far))
@@ -144,29 +143,32 @@ class Learner:
         first = self._store.baseline(origin.unit, origin.bearing, versions.first_accepted)
         if first is None or first.origin.estimator != origin.estimator:
             return "learned with another estimator than the first accepted version"
-        worst = percent_of(max(mean_difference(first, baseline).values(), key=abs, default=0.0))
-        if abs(worst) < 100.0 * self._settings.change.alert_change:
-            return None
-        return f"{worst:+.1f} % from version {versions.first_accepted} under like conditions"
+        for name, found in mean_difference(first, baseline).items():
+            if abs(percent_of(found)) >= 100.0 * self._settings.alert_change(name):
+                since = f"from version {versions.first_accepted} under like conditions"
+                return f"{QUANTITIES[name].label} differs by {percent_of(found):+.1f} % {since}"
+        return None
 
 
 def drifted(
     history: StiffnessHistory,
     is_healthy: npt.NDArray[np.bool_],
     baseline: BearingBaseline,
-    limit: float,
+    limit: Callable[[str], float],
 ) -> str | None:
-    """Describe a stiffness change during learning; None if below ``limit`` or not significant.
+    """Describe a change during learning; None if below the limit or not significant.
 
-    A significant change may be a fault of the bearing. ``limit`` is a fraction of the stiffness.
+    A significant change may be a fault of the bearing. ``limit`` returns the limit of a quantity,
+    as a fraction of its value.
     """
     for quantity in baseline.quantities:
         found = learning_drift(history, is_healthy, quantity)
         if found is None or abs(found.change) < SURE * found.std:
             continue
-        if abs(percent_of(found.change)) >= 100.0 * limit:
+        change = percent_of(found.change)
+        if abs(change) >= 100.0 * limit(quantity.quantity):
             return (
-                f"{quantity.direction} changed by {percent_of(found.change):+.1f} %"
+                f"{QUANTITIES[quantity.quantity].label} changed by {change:+.1f} %"
                 f" ± {200 * found.std:.1f} % under like conditions during learning"
             )
     return None

@@ -6,7 +6,7 @@ import numpy as np
 
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline
-from core.baseline.history import DIRECTIONS, StiffnessHistory
+from core.baseline.history import DIRECTIONS, QUANTITIES, StiffnessHistory
 from core.change.backtest import last_decision, last_operation
 from core.change.decision import INITIAL_DECISION, Decision
 from core.change.film_judge import MAX_RECENT
@@ -30,7 +30,7 @@ CATCH_UP_NS = 21 * DAY_NS
 def in_force(
     store: FilmStore, place: FilmPlace, rules: FilmRules
 ) -> tuple[BearingBaseline | None, tuple[Decision, ...]]:
-    """Return the baseline in force for a bearing, and the newest decisions x and y based on it.
+    """Return the baseline in force for a bearing, and the newest decisions based on it.
 
     Returns None and an empty tuple if no baseline for the estimator of ``place`` is in force.
     """
@@ -43,7 +43,7 @@ def in_force(
         for found in store.decisions(place.unit, place.bearing)
         if (found.baseline_version, found.estimator) == (version, place.estimator)
     ]
-    if len(stored) == len(DIRECTIONS):
+    if len(stored) == len(QUANTITIES):
         return baseline, tuple(stored)
     return baseline, _decisions(store, place, rules, baseline)
 
@@ -51,10 +51,10 @@ def in_force(
 def _decisions(
     store: FilmStore, place: FilmPlace, rules: FilmRules, baseline: BearingBaseline
 ) -> tuple[Decision, ...]:
-    """Return the decisions x and y, computed from the newest readings with a new baseline."""
+    """Return the decisions computed from the newest readings with a new baseline."""
     start_ns = _newest_ns(store, place) - round(CATCH_UP_NS / rules.time_lapse)
     found = store.history(FilmQuery(place.unit, place.bearing, place.estimator, start_ns))
-    learned = (baseline.of(direction) for direction in DIRECTIONS)
+    learned = (baseline.of(name) for name in QUANTITIES)
     return tuple(
         last_decision(found.history, found.is_settled, quantity, rules)
         if quantity
@@ -102,7 +102,7 @@ def _recent(found: Mapping[str, FilmHistory], watch: FilmWatch) -> list[FloatArr
         history = film.history.where(common[bearing])
         shaft = np.where(history.shaft_um_pk > 0.0, history.shaft_um_pk, np.nan)
         attitude = np.stack([history.attitude_deg] * 2)
-        deviation = film.deviation[:, common[bearing]]
+        deviation = film.deviation[: len(DIRECTIONS), common[bearing]]
         rises = _rises(history, watch.judge.baseline(bearing))
         columns.append(np.stack([history.ln_k, np.log(shaft), deviation, rises, attitude]))
     whole = np.concatenate(columns, axis=1)[:, :, settled]
@@ -113,7 +113,7 @@ def _rises(history: StiffnessHistory, baseline: BearingBaseline | None) -> Float
     """Return d ln(stiffness) / d ln(eccentricity ratio), (2, n); NaN without a baseline."""
     rises = np.full((len(DIRECTIONS), len(history)), np.nan)
     for row, direction in enumerate(DIRECTIONS):
-        learned = baseline.of(direction) if baseline else None
+        learned = baseline.of(f"k_{direction}") if baseline else None
         if learned is not None:
             rises[row] = learned.eccentricity_rise(history.conditions)
     return rises

@@ -137,8 +137,7 @@ class FilmMonitor:
         """Return the judgement of each direction after new readings, by film alarm id."""
         return {
             AlarmIdentity(each.reading.unit, each.reading.bearing, FILM_STIFFNESS).id: {
-                axis: alarm_condition(finding, self._films[each.reading.unit].rules.change)
-                for axis, finding in zip(DIRECTIONS, each.findings, strict=True)
+                axis: alarm_condition(each.findings, axis) for axis in DIRECTIONS
             }
             for each in news
         }

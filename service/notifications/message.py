@@ -9,6 +9,7 @@ from uuid import uuid4
 
 from core.alarms.alarm import Alarm, AlarmEvent, AlarmIdentity
 from core.alarms.kinds import ALARM_KINDS, FILM_STIFFNESS
+from core.baseline.history import QUANTITIES
 from core.change.film_judge import FilmNews
 from core.change.settings import percent_of
 from core.monitor.assessment import Assessment
@@ -29,6 +30,13 @@ CONDITION = {
     for name in ("speed_rpm", "power_mw", "eccentricity_ratio", "oil_temperature_c")
 }
 """Quantities in the `condition` of a message, by name."""
+
+
+FILM_FACTS = {
+    "ln_k": ("stiffness", "Stiffness now", 1e-9, "GN/m"),
+    "ln_ck": ("damping_over_stiffness", "Damping over stiffness now", 1e3, "ms"),
+}
+"""Key, label, scale and unit of a film quantity in a message, by its column."""
 
 
 @dataclass(frozen=True)
@@ -90,18 +98,21 @@ class LiveContext:
         )
 
     def _film(self, identity: AlarmIdentity) -> dict[str, Message]:
-        """Return stiffness, expected stiffness and deviation in the newest reading of a film."""
+        """Return value, expected value and deviation of the quantity that changed most."""
         is_film = identity.kind == FILM_STIFFNESS
         news = self._newest_film(identity.unit, identity.subject) if is_film else None
         if news is None:
             return {}
-        ln_k, found = news.reading.values[news.worst].ln_k, news.findings[news.worst]
+        found = news.findings[news.worst]
+        quantity = QUANTITIES[found.quantity]
         if found.deviation is None or found.deviation_std is None:
             return {}
+        ln = getattr(news.reading.values[quantity.row], quantity.value)
         std = math.exp(found.deviation) * 100.0 * found.deviation_std
+        key, label, scale, unit = FILM_FACTS[quantity.value]
         return {
-            "stiffness": _fact("Stiffness now", math.exp(ln_k) / 1e9, "GN/m"),
-            "expected": _fact("Expected", math.exp(ln_k - found.deviation) / 1e9, "GN/m"),
+            key: _fact(label, math.exp(ln) * scale, unit),
+            "expected": _fact("Expected", math.exp(ln - found.deviation) * scale, unit),
             "deviation": _fact("Change now", percent_of(found.deviation), "%", std),
         }
 

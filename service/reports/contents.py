@@ -7,7 +7,7 @@ import numpy as np
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import CellStatistics
-from core.baseline.history import StiffnessHistory, are_ratios
+from core.baseline.history import QUANTITIES, StiffnessHistory, are_ratios
 from core.change.cause import Attribution
 from core.change.decision import Decision
 from core.change.film_judge import FilmFinding, FilmNews
@@ -147,13 +147,15 @@ def _film(news: FilmNews) -> FilmReadingPart:
         estimator=reading.estimator.value,
         state=reading.condition.state.name.lower(),
         is_settled=reading.condition.is_settled,
-        findings=[_finding(*each) for each in zip(AXES, news.findings, strict=True)],
+        findings=[_finding(each) for each in news.findings],
     )
 
 
-def _finding(direction: Direction, found: FilmFinding) -> FindingPart:
+def _finding(found: FilmFinding) -> FindingPart:
+    quantity = QUANTITIES[found.quantity]
     return FindingPart(
-        direction=direction,
+        direction="x" if quantity.row == 0 else "y",
+        is_damping=quantity.value != "ln_k",
         verdict=found.verdict.name.lower(),
         level=None if found.level is None else LEVEL_NAMES[found.level],
         change_percent=None if found.change is None else percent_of(found.change),
@@ -261,7 +263,7 @@ def comparison(
     """
     reading, row = news.reading, AXES.index(direction)
     value, cell = reading.values[row], cell_of(news, rules)
-    learned = baseline.of(direction) if baseline else None
+    learned = baseline.of(f"k_{direction}") if baseline else None
     cells = learned.table.cells if learned else ()
     own = next((each for each in cells if each.cell == cell), None)
     found = _expected_at(learned, news.reading.conditions) if learned and own else None

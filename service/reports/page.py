@@ -137,6 +137,11 @@ def value_words(case: Case) -> str:
     return f"{alarm.value:.4g}{unit}{limit}"
 
 
+def quantity_words(found: FindingPart) -> str:
+    """Return the direction of a finding, with "c/k" if it is on damping over stiffness."""
+    return f"{found.direction}, damping over stiffness c/k" if found.is_damping else found.direction
+
+
 def change_words(found: FindingPart) -> str:
     """Return the newest deviation and the confirmed mean change of a film, in percent.
 
@@ -185,7 +190,8 @@ def finding(case: Case) -> FindingPart | None:
     film = None if case.bearing is None else case.bearing.film
     if film is None:
         return None
-    return next((each for each in film.findings if each.direction == case.direction), None)
+    own = [each for each in film.findings if each.direction == case.direction]
+    return next((each for each in own if each.level), own[0] if own else None)
 
 
 def story(case: Case) -> str:
@@ -198,7 +204,7 @@ def story(case: Case) -> str:
         return ""
     scale_h = found.time_scale_h
     hours = "" if scale_h is None else f", averaged over {scale_h:g} running hours"
-    changes = "; ".join(f"in {each.direction} {change_words(each)}" for each in moved)
+    changes = "; ".join(f"in {quantity_words(each)} {change_words(each)}" for each in moved)
     sentence = f"Stiffness of the film against the baseline under this condition: {changes}{hours}."
     cause = found.attribution
     if cause is None:
@@ -287,7 +293,10 @@ def _films(bearing: BearingPart) -> list[str]:
         if each.attribution is not None
     }
     version = ", ".join("none" if each is None else str(each) for each in versions)
-    return [bearing.bearing, *map(_said, findings), version, "; ".join(sorted(causes))]
+    said = (
+        "; c/k ".join(_said(each) for each in findings if each.direction == axis) for axis in AXES
+    )
+    return [bearing.bearing, *said, version, "; ".join(sorted(causes))]
 
 
 def _said(found: FindingPart) -> str:

@@ -176,10 +176,13 @@ class CausePart(EvidencePart):
 
 
 class FindingPart(EvidencePart):
-    """Finding about a film in one direction."""
+    """Finding about stiffness or damping of a film in one direction."""
 
     direction: Direction
-    """Direction of the stiffness."""
+    """Direction of the film."""
+
+    is_damping: bool = False
+    """Whether the finding is on damping over stiffness, c/k, instead of on stiffness."""
 
     verdict: Annotated[str, Field(examples=["alert"])]
     """Verdict: normal, alert, danger, or the reason why the film was not judged."""
@@ -188,13 +191,13 @@ class FindingPart(EvidencePart):
     """Alarm level of the film; null without an alarm."""
 
     change_percent: float | None
-    """Most significant mean deviation, % of the expected stiffness; null if there is none yet."""
+    """Most significant mean deviation, % of the expected value; null if there is none yet."""
 
     time_scale_h: float | None
     """Running hours over which `change_percent` was averaged; null if that is null."""
 
     deviation_percent: float | None
-    """Deviation of the newest reading, % of the expected stiffness; null unless it was compared."""
+    """Deviation of the newest reading, % of the expected value; null unless it was compared."""
 
     deviation_95_percent: tuple[float, float] | None
     """95 % interval of `deviation_percent`; null if that is null."""

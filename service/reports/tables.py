@@ -64,6 +64,10 @@ def orbits_table(found: Iterable[Assessment]) -> bytes | None:
     return _written(pa.concat_tables(tables)) if tables else None
 
 
+CHANGES = ("change", "change_std", "deviation", "deviation_std")
+"""Columns of damping over stiffness, in rows after those of the stiffness."""
+
+
 def trend_table(found: FilmHistory) -> bytes:
     """Return readings of a film, oldest first, as a Parquet table; NaN becomes null."""
     return _written(_trend(found))
@@ -97,6 +101,11 @@ def _trend(found: FilmHistory) -> "pa.Table":
             ("change_std", found.change_std),
             ("deviation", found.deviation),
             ("deviation_std", found.deviation_std),
+            ("ck_s", np.exp(history.ln_ck)),
+            ("u_ck", history.u_ck),
+            *((f"ck_{name}", getattr(found, name)[2:]) for name in CHANGES),
+            ("ck_verdict", WORDS[found.verdict[2:]]),
+            ("ck_level", found.level[2:]),
         )
     }
     return pa.table({name: _column(each) for name, each in (shared | pairs).items()})

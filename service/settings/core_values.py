@@ -240,6 +240,7 @@ def film_rules_of(unit: UnitSettings, settings: FilmAlarmSettings) -> FilmRules 
         change=settings.change.limits(),
         reading_ns=ns_from_s(settings.reading_period_s),
         time_lapse=settings.time_lapse,
+        change_ck=settings.change_ck.limits(),
     )
 
 

@@ -1,11 +1,13 @@
 """Settings of film monitoring: operating states, baselines and limits of stiffness change."""
 
+from dataclasses import asdict
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from core.baseline.history import QUANTITIES
 from core.baseline.settings import BaselineSettings
-from core.change.settings import ChangeLimits
+from core.change.settings import CK_CHANGE, ChangeLimits
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingLimits
 from service.settings.base import MisfitError, Settings, Share
@@ -193,6 +195,11 @@ class FilmAlarmSettings(Settings):
     change: ChangeLimitSettings = ChangeLimitSettings()
     """Limits of stiffness change."""
 
+    change_ck: ChangeLimitSettings = ChangeLimitSettings(**asdict(CK_CHANGE))
+    """Limits of the change of damping over stiffness, c/k, of the estimator `dynamic`; fractions
+    of the expected c/k. A change of clearance moves c/k by about a third of its size, a change of
+    the oil does not."""
+
     baseline: BaselineModel = BaselineModel()
     """Condition cells and learning of the baselines."""
 
@@ -207,6 +214,11 @@ class FilmAlarmSettings(Settings):
                 f"must be below {shortest_s:g} s, the shortest averaging time", "reading_period_s"
             )
         return self
+
+    def alert_change(self, quantity: str) -> float:
+        """Return the alert limit of one of the `QUANTITIES`, as a fraction of its value."""
+        is_stiffness = QUANTITIES[quantity].value == "ln_k"
+        return (self.change if is_stiffness else self.change_ck).alert_change
 
     @property
     def reading_h(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.baseline.history import DIRECTIONS, CodeArray, StiffnessHistory
+from core.baseline.history import DIRECTIONS, QUANTITIES, CodeArray, StiffnessHistory
 from core.change.decision import Decision
 from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmValue
@@ -57,7 +57,7 @@ class FilmQuery:
 
 @dataclass(frozen=True, eq=False)
 class FilmHistory:
-    """Readings of one film at n times, with the results of the change detection in x and y.
+    """Readings of one film at n times, with the results of the change detection.
 
     Parameters
     ----------
@@ -65,14 +65,14 @@ class FilmHistory:
         Numbers of `OperatingState`.
     is_settled, is_simulated : (n,)
         Whether the operating condition was settled, and whether the reading is simulated.
-    verdict, level : (2, n)
-        Numbers of `Verdict`; numbers of `AlarmLevel`, 0 for no alarm.
-    change, change_std : (2, n)
-        Most significant mean deviation of ln(stiffness) from the baseline, and its standard
-        uncertainty; NaN if unknown.
-    deviation, deviation_std : (2, n)
-        Deviation of the reading's ln(stiffness) from the baseline, and its standard uncertainty;
-        NaN if unknown.
+    verdict, level : (4, n)
+        By rows of `QUANTITIES`: numbers of `Verdict`; numbers of `AlarmLevel`, 0 for no alarm.
+    change, change_std : (4, n)
+        Most significant mean deviation from the baseline, in ln, and its standard uncertainty; NaN
+        if unknown.
+    deviation, deviation_std : (4, n)
+        Deviation of the reading from the baseline, in ln, and its standard uncertainty; NaN if
+        unknown.
     baseline_version : (n,)
         Version of the baseline, 0 for no baseline.
     """
@@ -95,12 +95,12 @@ class FilmHistory:
 
 @dataclass(frozen=True)
 class StoredDecision:
-    """Decision on direction "x" or "y" of a film, from the readings of one estimator.
+    """Decision on one of the `QUANTITIES` of a film, from the readings of one estimator.
 
     `baseline_version` is the version compared with; None without a baseline.
     """
 
-    direction: str
+    quantity: str
     estimator: Estimator
     baseline_version: int | None
     decision: Decision
@@ -110,7 +110,7 @@ CONDITION_COLUMNS = (
     *("speed_rpm", "power_mw", "eccentricity_ratio", "u_eccentricity"),
     *("attitude_deg", "oil_temperature_c"),
 )
-MEASURED_COLUMNS = ("ln_k", "u_random", "shaft_um_pk", "bearing_um_pk")
+MEASURED_COLUMNS = ("ln_k", "u_random", "shaft_um_pk", "bearing_um_pk", "ln_ck", "u_ck")
 CHANGE_COLUMNS = ("change", "change_std", "deviation", "deviation_std")
 VALUE_COLUMNS = (*MEASURED_COLUMNS, "evidence", "reason")
 FINDING_COLUMNS = (
@@ -120,7 +120,8 @@ FINDING_COLUMNS = (
 COLUMNS = (
     *("series", "estimator", "time_ns", "provenance", "operating_state", "is_settled"),
     *CONDITION_COLUMNS,
-    *(f"{name}_{d}" for d in DIRECTIONS for name in (*VALUE_COLUMNS, *FINDING_COLUMNS)),
+    *(f"{name}_{d}" for d in DIRECTIONS for name in VALUE_COLUMNS),
+    *(f"{name}_{q}" for q in QUANTITIES for name in FINDING_COLUMNS),
     "baseline_version",
 )
 INSERT = insert("film_reading", COLUMNS) + " ON CONFLICT (series, estimator, time_ns) DO NOTHING"
@@ -130,16 +131,13 @@ MEASURED_THEN = f"""
 """  # noqa: S608
 SET_DECISION = upsert(
     "film_decision",
-    ("series", "direction", "estimator", "baseline_version", "document"),
-    ("series", "direction"),
+    ("series", "quantity", "estimator", "baseline_version", "document"),
+    ("series", "quantity"),
 )
 READ_NUMBERS = (
     *("time_ns", "operating_state", "is_settled", *CONDITION_COLUMNS, "baseline_version"),
-    *(
-        f"{name}_{d}"
-        for name in (*MEASURED_COLUMNS, "evidence", "verdict", "level", *CHANGE_COLUMNS)
-        for d in DIRECTIONS
-    ),
+    *(f"{name}_{d}" for name in (*MEASURED_COLUMNS, "evidence") for d in DIRECTIONS),
+    *(f"{name}_{q}" for name in ("verdict", "level", *CHANGE_COLUMNS) for q in QUANTITIES),
 )
 """Numeric columns that are read into the arrays of `FilmHistory`."""
 
@@ -163,11 +161,9 @@ def insert_film_news(
         reading = each.reading
         series = series_of(writer, reading.unit, reading.bearing)
         writer.execute(INSERT, _row(writer, series, each, provenance))
-        for direction, finding, decision in zip(
-            DIRECTIONS, each.findings, each.decisions, strict=True
-        ):
-            version, document = finding.baseline_version, to_json(decision)
-            writer.execute(SET_DECISION, (series, direction, reading.estimator, version, document))
+        for finding, decision in zip(each.findings, each.decisions, strict=True):
+            rest = (reading.estimator, finding.baseline_version, to_json(decision))
+            writer.execute(SET_DECISION, (series, finding.quantity, *rest))
 
 
 def _row(
@@ -181,11 +177,8 @@ def _row(
         provenance.value,
         *(int(reading.condition.state), int(reading.condition.is_settled)),
         *measured,
-        *(
-            cell
-            for value, finding in zip(reading.values, news.findings, strict=True)
-            for cell in (*_value_cells(value), *_finding_cells(finding))
-        ),
+        *(cell for value in reading.values for cell in _value_cells(value)),
+        *(cell for finding in news.findings for cell in _finding_cells(finding)),
         news.findings[0].baseline_version,
     )
 
@@ -209,7 +202,7 @@ def _or_null(value: float) -> float | None:
 
 
 def select_decisions(reader: Connection, unit: str, bearing: str) -> list[StoredDecision]:
-    """Return the stored decisions on the film of a bearing, one per direction.
+    """Return the stored decisions on the film of a bearing, in the order of `QUANTITIES`.
 
     Raises
     ------
@@ -217,19 +210,19 @@ def select_decisions(reader: Connection, unit: str, bearing: str) -> list[Stored
         If the document of a decision is invalid.
     """
     rows = reader.execute(
-        "SELECT direction, estimator, baseline_version, document FROM film_decision"
-        " JOIN series ON series.id = film_decision.series WHERE unit = ? AND bearing = ?"
-        " ORDER BY direction",
+        "SELECT quantity, estimator, baseline_version, document FROM film_decision"
+        " JOIN series ON series.id = film_decision.series WHERE unit = ? AND bearing = ?",
         (unit, bearing),
     )
     try:
-        return [
-            StoredDecision(direction, Estimator(estimator), version, from_json(Decision, document))
-            for direction, estimator, version, document in rows
-        ]
+        found = {
+            name: StoredDecision(name, Estimator(estimator), version, from_json(Decision, document))
+            for name, estimator, version, document in rows
+        }
     except ValueError as error:
         name = f"stored decision of unit {unit} bearing {bearing}"
         raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
+    return [found[name] for name in QUANTITIES if name in found]
 
 
 def select_film_history(reader: Connection, query: FilmQuery) -> FilmHistory:
@@ -258,8 +251,8 @@ def _history(
     column: dict[str, npt.NDArray[np.float64]],
     is_simulated: npt.NDArray[np.bool_],
 ) -> FilmHistory:
-    def pair(name: str) -> npt.NDArray[np.float64]:
-        return np.stack([column[f"{name}_{direction}"] for direction in DIRECTIONS])
+    def pair(name: str, ends: Iterable[str] = DIRECTIONS) -> npt.NDArray[np.float64]:
+        return np.stack([column[f"{name}_{end}"] for end in ends])
 
     def codes(values: npt.NDArray[np.float64]) -> npt.NDArray[np.int8]:
         return np.nan_to_num(values).astype(np.int8)
@@ -274,8 +267,8 @@ def _history(
         state=codes(column["operating_state"]),
         is_settled=column["is_settled"] > 0.0,
         is_simulated=is_simulated.astype(np.bool_),
-        verdict=codes(pair("verdict")),
-        level=codes(pair("level")),
-        **{name: pair(name) for name in CHANGE_COLUMNS},
+        verdict=codes(pair("verdict", QUANTITIES)),
+        level=codes(pair("level", QUANTITIES)),
+        **{name: pair(name, QUANTITIES) for name in CHANGE_COLUMNS},
         baseline_version=np.nan_to_num(column["baseline_version"]).astype(np.int64),
     )

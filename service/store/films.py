@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.baseline.history import DIRECTIONS, ReadingOutcome
+from core.baseline.history import DIRECTIONS, QUANTITIES, ReadingOutcome
 from core.change.film_judge import FilmNews
 from core.machine.unit import Estimator
 from core.quality import GOOD, Reason, bad
@@ -131,12 +131,13 @@ def _film_rows(series: int, estimator: Estimator, films: FilmHistory) -> list[tu
         outcome = films.history.outcome[row]
         for name in MEASURED_COLUMNS:
             columns[f"{name}_{d}"] = _numbers(getattr(films.history, name)[row])
-        for name in CHANGE_COLUMNS:
-            columns[f"{name}_{d}"] = _numbers(getattr(films, name)[row])
         columns[f"evidence_{d}"] = outcome.tolist()
-        columns[f"verdict_{d}"] = films.verdict[row].tolist()
-        columns[f"level_{d}"] = _nullable(films.level[row], films.level[row] > 0)
         columns[f"reason_{d}"] = [REASONS[code] for code in outcome.tolist()]
+    for row, name in enumerate(QUANTITIES):
+        for change in CHANGE_COLUMNS:
+            columns[f"{change}_{name}"] = _numbers(getattr(films, change)[row])
+        columns[f"verdict_{name}"] = films.verdict[row].tolist()
+        columns[f"level_{name}"] = _nullable(films.level[row], films.level[row] > 0)
     nothing: list[object] = [None] * n
     return list(zip(*(columns.get(name, nothing) for name in COLUMNS), strict=True))
 
@@ -191,19 +192,23 @@ DIRECTION_COLUMNS = """
     u_random_{d} REAL,
     shaft_um_pk_{d} REAL,
     bearing_um_pk_{d} REAL,
+    ln_ck_{d} REAL,
+    u_ck_{d} REAL,
     evidence_{d} INTEGER NOT NULL,
     reason_{d} TEXT NOT NULL,
-    verdict_{d} INTEGER NOT NULL,
-    level_{d} INTEGER CHECK (level_{d} IN (1, 2)),
-    change_{d} REAL,
-    change_std_{d} REAL,
-    time_scale_h_{d} REAL,
-    deviation_{d} REAL,
-    deviation_std_{d} REAL,
-    cause_{d} TEXT,
-    cause_reason_{d} TEXT,
 """
-"""SQL columns of a film reading in one direction, as created by this migration."""
+FINDING_COLUMNS = """
+    verdict_{q} INTEGER NOT NULL,
+    level_{q} INTEGER CHECK (level_{q} IN (1, 2)),
+    change_{q} REAL,
+    change_std_{q} REAL,
+    time_scale_h_{q} REAL,
+    deviation_{q} REAL,
+    deviation_std_{q} REAL,
+    cause_{q} TEXT,
+    cause_reason_{q} TEXT,
+"""
+"""SQL columns of a film reading for a direction, and for a quantity, created by this migration."""
 
 FILM_TABLES = f"""
     CREATE TABLE film_reading (
@@ -219,8 +224,8 @@ FILM_TABLES = f"""
         u_eccentricity REAL,
         attitude_deg REAL,
         oil_temperature_c REAL,
-        {DIRECTION_COLUMNS.format(d="x")}
-        {DIRECTION_COLUMNS.format(d="y")}
+        {"".join(DIRECTION_COLUMNS.format(d=d) for d in DIRECTIONS)}
+        {"".join(FINDING_COLUMNS.format(q=q) for q in QUANTITIES)}
         baseline_version INTEGER,
         PRIMARY KEY (series, estimator, time_ns)
     ) STRICT, WITHOUT ROWID;
@@ -231,11 +236,11 @@ FILM_TABLES = f"""
     ) STRICT;
     CREATE TABLE film_decision (
         series INTEGER NOT NULL REFERENCES series (id),
-        direction TEXT NOT NULL CHECK (direction IN ('x', 'y')),
+        quantity TEXT NOT NULL,
         estimator TEXT NOT NULL,
         baseline_version INTEGER,
         document TEXT NOT NULL,
-        PRIMARY KEY (series, direction)
+        PRIMARY KEY (series, quantity)
     ) STRICT, WITHOUT ROWID;
     CREATE TABLE baseline (
         id INTEGER PRIMARY KEY AUTOINCREMENT,

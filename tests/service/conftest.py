@@ -16,7 +16,7 @@ from rigs.memory_folder import memory_folder
 from core.baseline.history import ReadingOutcome, StiffnessHistory
 from core.change.backtest import operation_history
 from core.change.decision import INITIAL_DECISION, Verdict
-from core.change.film_judge import FilmFinding, FilmNews
+from core.change.film_judge import FilmNews, unjudged
 from core.change.film_reading import FilmReading, FilmValue
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingLimits, OperatingState
@@ -110,12 +110,12 @@ def film_news() -> Callable[..., list[FilmNews]]:
         history: StiffnessHistory, limits: OperatingLimits = OPERATING, bearing: str = "UJB"
     ) -> list[FilmNews]:
         found = operation_history(history.time_ns, history.speed_rpm, history.power_mw, limits)
-        said = FilmFinding(Verdict.NO_BASELINE)
+        said = unjudged(Verdict.NO_BASELINE)
         return [
             FilmNews(
                 reading_at(history, i, bearing, int(found.state[i]), bool(found.is_settled[i])),
-                (said, said),
-                (INITIAL_DECISION, INITIAL_DECISION),
+                said,
+                (INITIAL_DECISION,) * len(said),
             )
             for i in range(len(history))
         ]
@@ -136,6 +136,8 @@ def reading_at(
             if np.isfinite(history.ln_k[row, i])
             else ReadingOutcome.BAD_QUALITY,
             Reason.OK if np.isfinite(history.ln_k[row, i]) else Reason.LOW_COVERAGE,
+            float(history.ln_ck[row, i]),
+            float(history.u_ck[row, i]),
         )
         for row in range(2)
     )

@@ -1,5 +1,6 @@
 """Simulation of years of stiffness readings of a unit, together with the true state."""
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -15,6 +16,8 @@ from acquisition.simulated.life.operation import HeldLoad, Operation
 from acquisition.simulated.life.shaft import ConditionChange
 from acquisition.simulated.life.truth import (
     BEARING_NOISE_UM,
+    CK_CORRELATION,
+    CK_SHARE,
     OIL_RESOLUTION_C,
     SHAFT_NOISE_UM,
     U_RANDOM_KNOWN,
@@ -33,6 +36,11 @@ def ln_stiffness(film: FilmColumns) -> FloatArray:
     return np.log(np.stack([film.k_xx_n_per_m, film.k_yy_n_per_m]))
 
 
+def ln_damping_over_stiffness(film: FilmColumns) -> FloatArray:
+    """Return the natural logarithm of direct damping over stiffness in x and y, in s, (2, n)."""
+    return np.log(film.c_n_s_per_m[[0, 2]]) - ln_stiffness(film)
+
+
 def readings(
     random: np.random.Generator,
     bearing: LifeBearing,
@@ -45,7 +53,7 @@ def readings(
     The shaft must turn at all rows. Stiffness is force divided by motion, k = |X_b| / |U| · k_b
     with bracket motion X_b, film motion U and the configured bracket stiffness k_b (Brito et al.,
     equation 5; other estimators compute the ratio differently). Errors of accelerometer, probe and
-    bracket stiffness therefore affect it.
+    bracket stiffness therefore affect it. They cancel in damping over stiffness.
     """
     n = len(operation)
     probe_gain = chain.probe_gain[:, np.newaxis] * truth.altered.probe_gain
@@ -53,7 +61,12 @@ def readings(
     apparent = np.log(bearing_gain / probe_gain / truth.altered.bracket)
     u = u_random(hydraulic_force_n(operation.load))
     ln_k = truth.ln_k + apparent + chain.ln_k_error
-    ln_k += u * random.standard_normal((2, n))
+    error = random.standard_normal((2, n))
+    ln_k += u * error
+    # its own stream, so that the other readings are those of a life without damping
+    of_ck, u_ck = random.spawn(1)[0], CK_SHARE * u
+    own = math.sqrt(1.0 - CK_CORRELATION**2) * of_ck.standard_normal((2, n))
+    ln_ck = truth.ln_ck + chain.ln_ck_error + u_ck * (CK_CORRELATION * error + own)
     measured = chain.evidence == ReadingOutcome.MEASURED
     shaft_um_pk, bearing_um_pk = _amplitudes_um_pk(random, truth, chain, probe_gain, bearing_gain)
     out_of_order = chain.evidence == ReadingOutcome.BAD_QUALITY
@@ -71,6 +84,8 @@ def readings(
         shaft_um_pk=np.where(out_of_order, np.nan, shaft_um_pk),
         bearing_um_pk=np.where(out_of_order, np.nan, bearing_um_pk),
         outcome=chain.evidence,
+        ln_ck=np.where(measured, ln_ck, np.nan),
+        u_ck=np.where(measured, u_ck * _known(of_ck, n), np.nan),
     )
 
 
@@ -220,6 +235,7 @@ def _truth(life: _BearingLife, order1: ComplexArray) -> BearingLifeTruth:
         film=life.course.film,
         ln_k=ln_stiffness(life.course.film),
         ln_k_healthy=ln_stiffness(life.healthy.film),
+        ln_ck=ln_damping_over_stiffness(life.course.film),
         clearance_um=life.course.clearance_um,
         centre_um=life.course.centre_um,
         oil_temperature_c=life.thermal.oil_temperature_c,

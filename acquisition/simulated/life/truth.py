@@ -18,11 +18,19 @@ REFERENCE_FORCE_N = 20.0e3
 """Relative random uncertainty of the estimator `dynamic` over 5 min, and the hydraulic force at
 which it is valid (benchmarks/accuracy.py)."""
 
+CK_SHARE, CK_CORRELATION = 1.5, -0.95
+"""Random uncertainty of damping over stiffness, divided by that of stiffness, and correlation of
+their errors, over 5 min with pads (`benchmarks/accuracy.py`)."""
+
 U_RANDOM_KNOWN = 0.1
 """Relative error of the random uncertainty that a reading states."""
 
 COMMON_ERRORS = ((4.0 * 3600.0, 0.004), (8.0 * 86_400.0, 0.003))
 """Time constant and relative rms of slow stiffness errors: transducers, excitation."""
+
+CK_ERRORS = ((4.0 * 3600.0, 0.001), (8.0 * 86_400.0, 0.002))
+"""As `COMMON_ERRORS`, of damping over stiffness. Assumption: gains cancel, and phases between probe
+and accelerometer drift by 0.03° at 1×."""
 
 GAIN_HALF_WIDTH = 0.05
 """Accuracy class of probes and accelerometers (Brito et al., section 2.2.1)."""
@@ -57,8 +65,9 @@ class Chain:
     ----------
     probe_gain, gap_gain, accelerometer_gain : (2,)
         Ratio of true to configured sensitivity, without damage; `gap_gain` is for mean gaps.
-    ln_k_error : (2, n)
-        Logarithmic stiffness error, correlated over hours and days.
+    ln_k_error, ln_ck_error : (2, n)
+        Logarithmic errors of stiffness and of damping over stiffness, correlated over hours and
+        days.
     position_error_um : (2, n)
         Error of the shaft position measured by the gaps.
     oil_error_c : (n,)
@@ -73,6 +82,7 @@ class Chain:
     gap_gain: FloatArray
     accelerometer_gain: FloatArray
     ln_k_error: FloatArray
+    ln_ck_error: FloatArray
     position_error_um: FloatArray
     oil_error_c: FloatArray
     runout_um_pk: ComplexArray
@@ -88,8 +98,10 @@ def draw_chain(random: np.random.Generator, operation: Operation) -> Chain:
     """Draw the errors of the measuring chain of one bearing."""
     n, step_s = len(operation), operation.step_s
 
-    def wanders(parts: tuple[tuple[float, float], ...]) -> FloatArray:
-        return np.stack([sum((wander(random, n, step_s, *p) for p in parts), 0.0) for _ in "xy"])
+    def wanders(
+        parts: tuple[tuple[float, float], ...], draws: np.random.Generator = random
+    ) -> FloatArray:
+        return np.stack([sum((wander(draws, n, step_s, *p) for p in parts), 0.0) for _ in "xy"])
 
     position_error_um = wanders(GAP_DRIFT) + REFERENCE_UM_RMS * random.standard_normal((2, 1))
     phase = np.exp(2j * np.pi * random.uniform(size=2))
@@ -98,6 +110,7 @@ def draw_chain(random: np.random.Generator, operation: Operation) -> Chain:
         gap_gain=_gains(random, GAP_GAIN_HALF_WIDTH),
         accelerometer_gain=_gains(random, GAIN_HALF_WIDTH),
         ln_k_error=wanders(COMMON_ERRORS),
+        ln_ck_error=wanders(CK_ERRORS, random.spawn(1)[0]),
         position_error_um=position_error_um,
         oil_error_c=OIL_OFFSET_C_RMS * random.standard_normal()
         + wander(random, n, step_s, *OIL_WANDER),
@@ -159,12 +172,15 @@ class BearingLifeTruth(BearingMoments):
     ----------
     ln_k, ln_k_healthy : (2, n)
         Logarithm of the film stiffness, with and without damage.
+    ln_ck : (2, n)
+        Logarithm of damping over stiffness in s.
     order1_um_pk : (4, n)
         Phasors of u_x, u_y, x_b, y_b at 1×.
     """
 
     ln_k: FloatArray
     ln_k_healthy: FloatArray
+    ln_ck: FloatArray
     order1_um_pk: ComplexArray
 
     @property

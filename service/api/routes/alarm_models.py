@@ -315,8 +315,11 @@ def _awaited(alarm: Alarm, films: LiveFilms) -> str | None:
     level, timers = alarm.level, [alarm.timers]
     if news is not None and rules is not None:
         timers = [(each.alert, each.danger) for each in news.decisions]
-        changes = [abs(each.change or 0.0) for each in news.findings]
-        if level is AlarmLevel.ALERT and max(changes) >= rules.change.danger_change:
+        changes = [
+            abs(each.change or 0.0) / rules.limits(each.quantity).danger_change
+            for each in news.findings
+        ]
+        if level is AlarmLevel.ALERT and max(changes) >= 1.0:
             return LEVEL_NAMES[AlarmLevel.DANGER]  # large, but not certain yet
     after = next_level(level, timers)
     if after is level or alarm.is_latched:

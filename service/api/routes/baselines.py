@@ -93,7 +93,7 @@ def _remark(entry: BaselineEntry, own: list[StoredStep]) -> str:
 
 def baseline_model(baseline: BearingBaseline, about: BaselineVersionModel) -> BaselineModel:
     """Return the API model of a baseline with its cells."""
-    x, y = (baseline.of(direction) for direction in ("x", "y"))
+    x, y = (baseline.of(f"k_{direction}") for direction in ("x", "y"))
     grid = next((found.grid for found in (x, y) if found), None)
     return BaselineModel.of(
         baseline.origin,

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from fastapi import APIRouter, Query, Request, Response
 
-from core.baseline.history import ReadingOutcome, absolute_and_ratio
+from core.baseline.history import DIRECTIONS, ReadingOutcome, absolute_and_ratio
 from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
 from service.api.answers import in_thread
@@ -76,6 +76,24 @@ class FilmSeriesModel(ApiModel):
 
     deviation_percent: list[float | None]
     """Deviation of the reading from the baseline, %; null if the reading was not compared."""
+
+    ck_s: list[float | None]
+    """Damping over stiffness, s."""
+
+    u_random_ck_s: list[float | None]
+    """Random standard uncertainty of damping over stiffness, s."""
+
+    ck_verdict: list[VerdictName]
+    """Verdict on damping over stiffness when the reading was made."""
+
+    ck_level: list[LevelHeldName | None]
+    """Alarm level of damping over stiffness; null without a level."""
+
+    ck_change_percent: list[float | None]
+    """Most significant mean change of damping over stiffness, %; null if unknown."""
+
+    ck_deviation_percent: list[float | None]
+    """Deviation of damping over stiffness from the baseline, %; null if it was not compared."""
 
 
 class FilmReadingsModel(BearingHistory):
@@ -182,6 +200,16 @@ def _series(found: FilmHistory, direction: int, rows: Rows) -> FilmSeriesModel:
     def column(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         return np.asarray(values[direction, rows])
 
+    def decided(row: int, prefix: str = "") -> dict[str, Any]:
+        verdicts, levels = found.verdict[row, rows], found.level[row, rows]
+        return {
+            f"{prefix}verdict": [verdict_name(Verdict(code)) for code in verdicts],
+            f"{prefix}level": [level_name(int(code) or None) for code in levels],
+            f"{prefix}change_percent": listed(100.0 * np.expm1(found.change[row, rows])),
+            f"{prefix}deviation_percent": listed(100.0 * np.expm1(found.deviation[row, rows])),
+        }
+
+    ck_s = np.exp(column(history.ln_ck))
     ln_k = column(history.ln_k)
     k, of_kb = absolute_and_ratio(np.exp(ln_k), ln_k)
     u_k, u_of_kb = absolute_and_ratio(np.exp(ln_k) * column(history.u_random), ln_k)
@@ -193,10 +221,10 @@ def _series(found: FilmHistory, direction: int, rows: Rows) -> FilmSeriesModel:
         shaft_um_pk=listed(column(history.shaft_um_pk)),
         bearing_um_pk=listed(column(history.bearing_um_pk)),
         evidence=[EVIDENCE_NAMES[ReadingOutcome(code)] for code in column(history.outcome)],
-        verdict=[verdict_name(Verdict(code)) for code in column(found.verdict)],
-        level=[level_name(int(code) or None) for code in column(found.level)],
-        change_percent=listed(100.0 * np.expm1(column(found.change))),
-        deviation_percent=listed(100.0 * np.expm1(column(found.deviation))),
+        **decided(direction),
+        ck_s=listed(ck_s),
+        u_random_ck_s=listed(ck_s * column(history.u_ck)),
+        **decided(direction + len(DIRECTIONS), "ck_"),
     )
 
 
@@ -210,6 +238,7 @@ UNITS = {
     "_ratio": "1",
     "_deg": "deg",
     "_c": "°C",
+    "_s": "s",
 }
 """Units of table columns, by suffix of the column name."""
 

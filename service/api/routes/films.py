@@ -4,13 +4,13 @@ import math
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
-from typing import Annotated, Literal, cast
+from typing import Annotated, Any, Literal, cast
 
 from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
-from core.baseline.history import DIRECTIONS, are_ratios
+from core.baseline.history import DIRECTIONS, QUANTITIES, are_ratios
 from core.change.decision import Decision, Verdict
 from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading
@@ -49,10 +49,10 @@ LevelHeldName = Literal["alert", "danger"]
 
 
 class FilmChangeModel(ApiModel):
-    """Mean deviation of stiffness from the baseline, at its most significant averaging time."""
+    """Mean deviation from the baseline, at its most significant averaging time."""
 
     percent: Annotated[float, Field(examples=[-19.2])]
-    """Mean change, % of the expected stiffness; negative if softer. The alarm limits apply to it.
+    """Mean change, % of the expected value; negative if softer. The alarm limits apply to it.
     After a sudden change, it follows the deviation of the newest reading with delay."""
 
     time_scale_h: Annotated[float, Field(examples=[4.0])]
@@ -70,7 +70,7 @@ class FilmChangeModel(ApiModel):
 
 
 class FilmDeviationModel(ApiModel):
-    """Deviation of the stiffness of one reading from the baseline."""
+    """Deviation of one reading from the baseline."""
 
     percent: float
     """Deviation, % of the expected stiffness."""
@@ -99,8 +99,8 @@ class FilmCauseModel(ApiModel):
     """Standard uncertainty of `film_share`; null if `film_share` is null."""
 
 
-class FilmDirectionModel(ApiModel):
-    """State of an oil film in one direction, x or y."""
+class FilmQuantityModel(ApiModel):
+    """Decision on a quantity of an oil film in one direction, x or y."""
 
     verdict: Annotated[VerdictName, ByName]
     """Verdict on the newest reading. Only "normal", "alert" and "danger" judge the film. The other
@@ -116,11 +116,28 @@ class FilmDirectionModel(ApiModel):
     """Alarm level in force, also while the newest reading cannot be judged; null if none."""
 
     change: FilmChangeModel | None
-    """Change of stiffness; null without a baseline, until the shortest averaging time has passed,
-    and without a current reading."""
+    """Change against the baseline; null without a baseline, until the shortest averaging time has
+    passed, and without a current reading."""
 
     deviation: FilmDeviationModel | None
     """Deviation of the newest reading alone; null if this reading was not compared."""
+
+    cause: FilmCauseModel | None
+    """Cause of the change while a level is in force; otherwise null."""
+
+
+class FilmDampingModel(FilmQuantityModel):
+    """Decision on damping over stiffness, c/k."""
+
+    ck_s: float | None
+    """Damping over stiffness of the newest reading, s; null if it could not be determined."""
+
+    expected_s: float | None
+    """Damping over stiffness that the baseline expects, s; null if it was not compared."""
+
+
+class FilmDirectionModel(FilmQuantityModel):
+    """State of an oil film in one direction, x or y: stiffness, and damping over stiffness."""
 
     stiffness_n_per_m: float | None
     """Stiffness of the newest reading, N/m; null if it could not be determined."""
@@ -135,18 +152,18 @@ class FilmDirectionModel(ApiModel):
     expected_of_kb: float | None
     """Expected stiffness as such a ratio; null if the bracket stiffness is known."""
 
-    cause: FilmCauseModel | None
-    """Cause of the change while a level is in force; otherwise null."""
+    damping: FilmDampingModel
+    """Damping over stiffness, of the estimator "dynamic"."""
 
 
 class FilmLimitsModel(ApiModel):
-    """Alarm limits for the mean change of stiffness, as increase and as decrease."""
+    """Alarm limits for a mean change, as increase and as decrease."""
 
     alert_percent: Annotated[float, Field(examples=[3.5])]
-    """Limit for an alert, % of the expected stiffness."""
+    """Limit for an alert, % of the expected value."""
 
     danger_percent: Annotated[float, Field(examples=[15.0])]
-    """Limit for danger, % of the expected stiffness."""
+    """Limit for danger, % of the expected value."""
 
 
 class FilmModel(BearingAnswer):
@@ -177,7 +194,10 @@ class FilmModel(BearingAnswer):
     """Version of the baseline in force; null if no baseline is in force."""
 
     limits: FilmLimitsModel | None
-    """Alarm limits; null if the film is not watched."""
+    """Alarm limits of the stiffness; null if the film is not watched."""
+
+    damping_limits: FilmLimitsModel | None
+    """Alarm limits of damping over stiffness; null if the film is not watched."""
 
     x: FilmDirectionModel | None
     """State in x; null if the film is not watched."""
@@ -293,6 +313,7 @@ def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
         condition=seen and _condition(seen),
         baseline_version=seen and _version(seen.baseline),
         limits=seen and _limits(seen.rules.change),
+        damping_limits=seen and _limits(seen.rules.change_ck),
         x=x,
         y=y,
     )
@@ -363,49 +384,69 @@ def _condition(seen: WatchedFilm) -> FilmConditionModel | None:
 
 def _directions(seen: WatchedFilm) -> tuple[FilmDirectionModel, FilmDirectionModel]:
     if seen.news is None or seen.why_not_current is not None:
-        levels = [f.level for f in seen.news.findings] if seen.news else [None, None]
-        x, y = (_unread(seen.why_not_current or "", level_name(level)) for level in levels)
+        levels = [f.level for f in seen.news.findings] if seen.news else [None] * len(QUANTITIES)
+        reason = seen.why_not_current or ""
+        x, y = (_unread(reason, *map(level_name, levels[row::2])) for row in range(2))
         return x, y
     x, y = (_direction(seen, seen.news, row) for row in range(len(DIRECTIONS)))
     return x, y
 
 
-def _unread(reason: str, level: LevelHeldName | None) -> FilmDirectionModel:
-    """Return the state in a direction without a current reading: a reason and the alarm level."""
-    unknown = dict.fromkeys(("change", "deviation", *chain(*STIFFNESS_NAMES), "cause"))
-    return FilmDirectionModel.of(verdict="no_reading", reason=reason, level=level, **unknown)
+def _unread(
+    reason: str, level: LevelHeldName | None, ck_level: LevelHeldName | None
+) -> FilmDirectionModel:
+    """Return the state in a direction without a current reading: a reason and the alarm levels."""
+    why = {"verdict": "no_reading", "reason": reason}
+    unknown = dict.fromkeys(("change", "deviation", "cause"), None)
+    ck = FilmDampingModel.of(**why, level=ck_level, **unknown, ck_s=None, expected_s=None)
+    values = dict.fromkeys(chain(*STIFFNESS_NAMES), None)
+    return FilmDirectionModel.of(**why, level=level, **unknown, **values, damping=ck)
 
 
 def _direction(seen: WatchedFilm, news: FilmNews, row: int) -> FilmDirectionModel:
-    finding, ln_k = news.findings[row], news.reading.values[row].ln_k
-    ln_expected = math.nan if finding.deviation is None else ln_k - finding.deviation
+    ck = row + len(DIRECTIONS)
+    k_n_per_m, expected_n_per_m = _with_expected(news, row)
+    names = STIFFNESS_NAMES[bool(are_ratios(news.reading.values[row].ln_k))]
+    values = dict.fromkeys(chain(*STIFFNESS_NAMES), None)
+    ck_s, expected_s = _with_expected(news, ck)
     return FilmDirectionModel.of(
-        verdict=finding.verdict,
-        reason=_reason(seen, news.reading, finding, row),
-        level=level_name(finding.level),
-        change=_change(finding, news.decisions[row], seen.rules),
-        deviation=_deviation(finding),
-        **_stiffness(ln_k, ln_expected),
-        cause=finding.attribution,
+        **_decided(seen, news, row),
+        **values | dict(zip(names, (k_n_per_m, expected_n_per_m), strict=True)),
+        damping=FilmDampingModel.of(**_decided(seen, news, ck), ck_s=ck_s, expected_s=expected_s),
     )
 
 
-def _stiffness(ln_k: float, ln_expected: float) -> dict[str, float | None]:
-    """Return stiffness and expected stiffness; ratios to an unknown k_b under their own names."""
-    found = [None if math.isnan(each) else math.exp(each) for each in (ln_k, ln_expected)]
-    names = STIFFNESS_NAMES[bool(are_ratios(ln_k))]
-    return dict.fromkeys(chain(*STIFFNESS_NAMES)) | dict(zip(names, found, strict=True))
+def _decided(seen: WatchedFilm, news: FilmNews, row: int) -> dict[str, Any]:
+    """Return the fields of `FilmQuantityModel`, of a row of `QUANTITIES`."""
+    finding, rules = news.findings[row], seen.rules
+    return {
+        "verdict": finding.verdict,
+        "reason": _reason(seen, news.reading, finding),
+        "level": level_name(finding.level),
+        "change": _change(finding, news.decisions[row], rules),
+        "deviation": _deviation(finding),
+        "cause": finding.attribution,
+    }
 
 
-def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding, row: int) -> str:
+def _with_expected(news: FilmNews, row: int) -> list[float | None]:
+    """Return the value and the expected value of a row of `QUANTITIES`; None if unknown."""
+    finding = news.findings[row]
+    quantity = QUANTITIES[finding.quantity]
+    value = getattr(news.reading.values[quantity.row], quantity.value)
+    expected = math.nan if finding.deviation is None else value - finding.deviation
+    return [None if math.isnan(each) else math.exp(each) for each in (value, expected)]
+
+
+def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding) -> str:
     match finding.verdict:
         case Verdict.NO_BASELINE:
-            learned = seen.baseline.of(DIRECTIONS[row]) if seen.baseline else None
+            learned = seen.baseline.of(finding.quantity) if seen.baseline else None
             return "none_in_force" if learned is None else _unseen(learned, reading)
         case Verdict.TRANSIENT:
             return "not_settled"
         case _:
-            return reading.values[row].reason.value
+            return reading.values[QUANTITIES[finding.quantity].row].reason.value
 
 
 def _unseen(learned: QuantityBaseline, reading: FilmReading) -> str:
@@ -423,7 +464,7 @@ def _change(finding: FilmFinding, decision: Decision, rules: FilmRules) -> FilmC
         finding,
         percent=percent_of(change),
         significance=abs(change) / std,
-        significance_wanted=rules.change.significance_threshold(time_scale_h),
+        significance_wanted=rules.limits(finding.quantity).significance_threshold(time_scale_h),
         as_of=None if counted_ns is None else round(counted_ns / rules.time_lapse),
     )
 

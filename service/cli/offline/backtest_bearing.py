@@ -170,7 +170,7 @@ class PeriodRun:
 
     def stiffness(self, direction: str) -> QuantityBaseline | None:
         """Return the stiffness baseline of a direction; None without a baseline."""
-        return self.baseline.of(direction) if self.baseline else None
+        return self.baseline.of(f"k_{direction}") if self.baseline else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,12 +237,14 @@ def _run(
         )
         baseline = learn(healthy, is_settled[begin:learned], origin, settings)
         limit = rules.change.alert_change
-        doubt = drifted(healthy, is_settled[begin:learned], baseline, limit)
+        doubt = drifted(healthy, is_settled[begin:learned], baseline, lambda _: limit)
         far = far_readings(history.rows(begin, end), is_settled[begin:end], baseline)
     later, settled = history.rows(learned, end), is_settled[learned:end]
     run = PeriodRun(period, baseline, {}, doubt or "", far or "")
     decided = {
-        direction: decide_all(later, settled, direction, run.stiffness(direction), rules.change)
+        direction: decide_all(
+            *(later, settled, f"k_{direction}", run.stiffness(direction), rules.change)
+        )
         for direction in DIRECTIONS
     }
     return replace(run, decided=decided)

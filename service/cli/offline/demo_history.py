@@ -1,13 +1,14 @@
 """Simulated year before the first start: readings, a baseline learned from them, and trends."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
-from core.baseline.history import DIRECTIONS, StiffnessHistory
+from core.baseline.history import DIRECTIONS, QUANTITIES, StiffnessHistory
 from core.baseline.learning import learn
 from core.change.backtest import DecisionHistory, OperationHistory, decide_all, operation_history
 from core.change.settings import FilmRules
@@ -77,6 +78,9 @@ def _fill_unit(
     settled = []
     for bearing, estimator in rules.estimators.items():
         history = past[bearing]
+        if ESTIMATORS[estimator].ck is None:
+            nothing = np.full(history.ln_ck.shape, np.nan)
+            history = replace(history, ln_ck=nothing, u_ck=nothing)
         operation = operation_history(
             *(history.time_ns, history.speed_rpm, history.power_mw, rules.operating),
             history.oil_temperature_c,
@@ -105,16 +109,17 @@ def judged(
 ) -> FilmHistory:
     """Return a history with the decisions of its comparison with a baseline learned from it.
 
-    Raises `ValueError` if a direction has no baseline.
+    Raises `ValueError` if the stiffness in a direction has no baseline.
     """
-    found = [learned.of(direction) for direction in DIRECTIONS]
-    quantities = [quantity for quantity in found if quantity is not None]
-    if len(quantities) < len(DIRECTIONS):
+    if any(learned.of(f"k_{direction}") is None for direction in DIRECTIONS):
         raise ValueError(f"bearing {learned.origin.bearing}: too few readings for a baseline")
     decided = [
-        decide_all(history, operation.is_settled, q.direction, q, rules.change) for q in quantities
+        decide_all(history, operation.is_settled, name, learned.of(name), rules.limits(name))
+        for name in QUANTITIES
     ]
-    deviations = [_deviation(history, operation.is_settled, q) for q in quantities]
+    deviations = [
+        _deviation(history, operation.is_settled, learned.of(name)) for name in QUANTITIES
+    ]
     return FilmHistory(
         history=history,
         state=operation.state,
@@ -136,10 +141,11 @@ def _std(decided: DecisionHistory) -> FloatArray:
 
 
 def _deviation(
-    history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], learned: QuantityBaseline
+    history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], learned: QuantityBaseline | None
 ) -> tuple[FloatArray, FloatArray]:
-    row = DIRECTIONS.index(learned.direction)
-    found = learned.compare(history.conditions, history.ln_k[row], history.u_random[row])
+    if learned is None:
+        return np.full(len(history), np.nan), np.full(len(history), np.nan)
+    found = learned.compare_history(history)
     is_compared = is_settled & (found.place >= 0)
     std = np.hypot(found.scatter, found.surface_std)
     return np.where(is_compared, found.deviation, np.nan), np.where(is_compared, std, np.nan)
@@ -157,6 +163,8 @@ def _trends(history: StiffnessHistory, estimator: Estimator) -> dict[str, FloatA
         k_n_per_m = np.exp(history.ln_k[row])
         for name in ("stiffness_{axes}_n_per_m", ESTIMATORS[estimator].stiffness):
             columns[name.format(axes=direction * 2)] = k_n_per_m
+        if (ck := ESTIMATORS[estimator].ck) is not None:
+            columns[ck.format(axes=direction * 2)] = np.exp(history.ln_ck[row])
         columns[f"order1_shaft_{direction}_um_pk"] = history.shaft_um_pk[row]
         columns[f"order1_bearing_{direction}_um_pk"] = history.bearing_um_pk[row]
     return columns

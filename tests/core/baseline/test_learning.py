@@ -29,7 +29,7 @@ def baseline_of(
 def learned(
     history: StiffnessHistory, settings: BaselineSettings | None = None
 ) -> QuantityBaseline:
-    found = baseline_of(history, settings).of("x")
+    found = baseline_of(history, settings).of("k_x")
     assert found is not None
     return found
 

@@ -31,7 +31,7 @@ class Watch:
 
     def whole(self, limits: ChangeLimits = LIMITS) -> DecisionHistory:
         """Decide over all that came later at once."""
-        return decide_all(self.later, self.is_settled, "x", self.baseline, limits)
+        return decide_all(self.later, self.is_settled, "k_x", self.baseline, limits)
 
     def steps(
         self, limits: ChangeLimits = LIMITS, begin: Decision = INITIAL_DECISION
@@ -68,7 +68,7 @@ def watch(film_life: Callable[..., StiffnessHistory]) -> Callable[..., Watch]:
         if key not in learned:
             origin = Origin("U1", "UJB", "dynamic", 1, "Ada", int(until_ns))
             of_all = learn(history.rows(0, n), is_settled[:n], origin, BaselineSettings())
-            found = of_all.of("x")
+            found = of_all.of("k_x")
             assert found is not None
             learned[key] = found
         return Watch(learned[key], history.rows(n, len(history)), is_settled[n:])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from core.baseline.baseline import BearingBaseline, Origin
-from core.baseline.history import StiffnessHistory
+from core.baseline.history import QUANTITIES, StiffnessHistory
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.cause import Attribution, Cause
@@ -40,6 +40,14 @@ FOUND = FilmFinding(
 )
 
 
+def findings(*own: FilmFinding) -> tuple[FilmFinding, ...]:
+    """The findings as those on the first quantities, and of the rest that it is normal."""
+    return tuple(
+        replace(own[n] if n < len(own) else FilmFinding(Verdict.NORMAL), quantity=name)
+        for n, name in enumerate(QUANTITIES)
+    )
+
+
 def query(**changes: object) -> FilmQuery:
     return replace(FilmQuery("U1", "UJB", Estimator.DYNAMIC), **changes)  # type: ignore[arg-type]
 
@@ -51,7 +59,9 @@ def test_readings_are_read_back_to_the_last_bit(store, film_news, film_life):
     outcome = np.where(np.isnan(ln_k), 2, 0).astype(np.int8)
     history = replace(history, ln_k=ln_k, outcome=outcome)
     news = film_news(history)
-    news[7] = replace(news[7], findings=(FOUND, FilmFinding(Verdict.NORMAL, baseline_version=3)))
+    news[7] = replace(
+        news[7], findings=findings(FOUND, FilmFinding(Verdict.NORMAL, baseline_version=3))
+    )
 
     store.append([], [], [], news)
     found = store.films.history(query())
@@ -63,8 +73,8 @@ def test_readings_are_read_back_to_the_last_bit(store, film_news, film_life):
         np.testing.assert_array_equal(written, read, column.name)
     assert found.is_settled.tolist() == [n.reading.condition.is_settled for n in news]
     assert found.state.tolist() == [n.reading.condition.state for n in news]
-    assert found.verdict[:, 7].tolist() == [Verdict.ALERT, Verdict.NORMAL]
-    assert found.level[:, 7].tolist() == [1, 0]
+    assert found.verdict[:, 7].tolist() == [Verdict.ALERT] + 3 * [Verdict.NORMAL]
+    assert found.level[:, 7].tolist() == [1, 0, 0, 0]
     assert (found.change[0, 7], found.deviation_std[0, 7]) == (-0.1, 0.02)
     assert found.baseline_version[[6, 7]].tolist() == [0, 3]
     assert not found.is_simulated.any()
@@ -105,14 +115,14 @@ def test_readings_written_twice_count_once_and_simulated_stay_marked(store, film
 
 def test_decisions_go_on_where_they_stood(store, film_news, film_life):
     first, second, *_ = film_news(film_life(2, days=1))
-    store.append([], [], [], [replace(first, findings=(FOUND, FOUND))])
+    store.append([], [], [], [replace(first, findings=findings(FOUND))])
     store.append(
-        [], [], [], [replace(second, decisions=(DECISION, DECISION), findings=(FOUND,) * 2)]
+        [], [], [], [replace(second, decisions=(DECISION,) * 4, findings=findings(*[FOUND] * 4))]
     )
 
-    x, y = store.films.decisions("U1", "UJB")
-    assert (x.direction, y.direction) == ("x", "y")
-    assert x.decision == y.decision == DECISION
+    x, *others = store.films.decisions("U1", "UJB")
+    assert [each.quantity for each in (x, *others)] == list(QUANTITIES)
+    assert {each.decision for each in (x, *others)} == {DECISION}
     assert (x.baseline_version, x.estimator) == (3, Estimator.DYNAMIC)
     assert store.films.decisions("U1", "LJB") == []
 

@@ -12,7 +12,7 @@ from core.alarms.life_cycle import update
 from core.alarms.operation import Acknowledge, operate
 from core.baseline.history import ReadingOutcome
 from core.change.decision import INITIAL_DECISION, Verdict
-from core.change.film_judge import FilmFinding, FilmNews
+from core.change.film_judge import FilmNews, unjudged
 from core.change.film_reading import FilmReading, FilmValue
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
@@ -94,8 +94,8 @@ def _film(seed: int, number: int) -> FilmNews:
         *(92.3, 300.0, numbers[8], 0.001, 30.0, numbers[9]),
         (values[0], values[1]),
     )
-    said = FilmFinding(Verdict.NO_BASELINE)
-    return FilmNews(reading, (said, said), (INITIAL_DECISION, INITIAL_DECISION))
+    said = unjudged(Verdict.NO_BASELINE)
+    return FilmNews(reading, said, (INITIAL_DECISION,) * len(said))
 
 
 def letters(alarm: Alarm, event: AlarmEvent) -> Iterator[OutboxMessage]:

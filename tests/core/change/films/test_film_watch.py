@@ -12,11 +12,11 @@ from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.backtest import decide_all, last_decision, last_operation, operation_history
 from core.change.decision import JUDGED, Verdict
-from core.change.film_judge import FilmFinding, FilmJudge, alarm_condition
+from core.change.film_judge import FilmFinding, FilmJudge, alarm_condition, unjudged
 from core.change.film_reading import film_reading
 from core.change.film_watch import FilmWatch
 from core.condition.operating_state import OperatingState
-from core.limits import AlarmLevel
+from core.limits import AlarmLevel, Judgement
 from core.quality import Reading, Reason, missing, uncertain
 from core.stiffness.bracket_ratio import as_ratios
 
@@ -38,8 +38,8 @@ def test_results_one_by_one_are_judged_as_their_whole_history_is(films, rules):
     assert [n.reading.time_ns for n in news] == said.time_ns.tolist()
     assert [n.reading.condition.is_settled for n in news] == settled.tolist()
     for row, direction in enumerate("xy"):
-        learned = films.baseline.of(direction)
-        whole = decide_all(said, settled, direction, learned, rules.change)
+        learned = films.baseline.of(f"k_{direction}")
+        whole = decide_all(said, settled, f"k_{direction}", learned, rules.change)
         findings = [n.findings[row] for n in news]
         assert [f.verdict for f in findings] == whole.verdict.tolist()
         assert [f.level or 0 for f in findings] == whole.level.tolist()
@@ -102,7 +102,7 @@ def test_decisions_caught_up_with_are_those_that_would_have_been_made(films, rul
     made = films.watched(history)
     settled = np.array([n.reading.condition.is_settled for n in made])
     for row, direction in enumerate("xy"):
-        learned = films.baseline.of(direction)
+        learned = films.baseline.of(f"k_{direction}")
         caught = last_decision(history.rows(1, len(history)), settled, learned, rules)
         through = made[-1].decisions[row]
         assert (caught.verdict, caught.level) == (through.verdict, through.level)
@@ -115,7 +115,7 @@ def test_decisions_caught_up_with_are_those_that_would_have_been_made(films, rul
 def test_without_a_baseline_nothing_is_called_normal(films):
     news = films.watched(films.life(3, days=2), films.watch(has_baseline=False))
     verdicts = {finding.verdict for told in news for finding in told.findings}
-    assert verdicts == {Verdict.NO_BASELINE, Verdict.TRANSIENT}
+    assert verdicts == {Verdict.NO_BASELINE, Verdict.TRANSIENT, Verdict.BAD_QUALITY}  # no damping
 
 
 def test_readings_are_as_far_apart_as_they_should_be_however_often_results_come(films):
@@ -189,22 +189,48 @@ def test_results_say_the_condition_that_they_were_found_under(films):
     assert blind.condition.cell is None
 
 
+def condition_in_x(*own: FilmFinding) -> Judgement:
+    """What an alarm says of findings in x; damping is not judged unless given."""
+    found = {each.quantity: each for each in (*unjudged(Verdict.NO_BASELINE), *own)}
+    return alarm_condition(tuple(found.values()), "x")
+
+
 @pytest.mark.parametrize("verdict", [v for v in Verdict if v not in JUDGED])
-def test_what_is_not_judged_is_neither_an_alarm_nor_a_return(rules, verdict):
+def test_what_is_not_judged_is_neither_an_alarm_nor_a_return(verdict):
     held = FilmFinding(verdict, AlarmLevel.ALERT, -0.1, 0.01, 4.0)
-    condition = alarm_condition(held, rules.change)
+    condition = condition_in_x(held)
     assert not condition.is_known
     assert condition.reason == verdict.name.lower()
 
 
 def test_an_alarm_says_by_how_much_and_which_limit(rules):
-    alert = alarm_condition(FilmFinding(Verdict.ALERT, AlarmLevel.ALERT, -0.1), rules.change)
-    danger = alarm_condition(FilmFinding(Verdict.DANGER, AlarmLevel.DANGER, 0.3), rules.change)
+    alert = condition_in_x(FilmFinding(Verdict.ALERT, AlarmLevel.ALERT, -0.1))
+    limit = rules.change.danger_change
+    danger = condition_in_x(FilmFinding(Verdict.DANGER, AlarmLevel.DANGER, 0.3, limit=limit))
     assert (alert.level, alert.limit) == (1, pytest.approx(-100.0 * rules.change.alert_change))
     assert (danger.level, danger.limit) == (2, pytest.approx(100.0 * rules.change.danger_change))
     assert alert.value == pytest.approx(100.0 * (math.exp(-0.1) - 1.0))
     assert danger.value == pytest.approx(100.0 * (math.exp(0.3) - 1.0))
-    assert alarm_condition(FilmFinding(Verdict.NORMAL), rules.change).level is None
+    assert condition_in_x(FilmFinding(Verdict.NORMAL)).level is None
+
+
+def test_an_alarm_is_about_the_quantity_that_is_furthest_beyond_its_limit():
+    softer = FilmFinding(Verdict.ALERT, AlarmLevel.ALERT, -0.05)
+    damped = replace(softer, change=0.02, quantity="ck_x", limit=0.005)
+    assert condition_in_x(softer, damped).limit == pytest.approx(0.5)
+    assert condition_in_x(FilmFinding(Verdict.NORMAL), damped).value == pytest.approx(
+        2.02, abs=0.01
+    )
+    assert not condition_in_x(FilmFinding(Verdict.TRANSIENT)).is_known
+
+
+def test_damping_that_is_not_judged_holds_its_alarm_but_hinders_no_verdict():
+    silent = FilmFinding(Verdict.BAD_QUALITY, quantity="ck_x")
+    assert condition_in_x(FilmFinding(Verdict.NORMAL), silent).is_known
+    held = replace(silent, level=AlarmLevel.DANGER)
+    assert not condition_in_x(FilmFinding(Verdict.NORMAL), held).is_known
+    softer = FilmFinding(Verdict.ALERT, AlarmLevel.ALERT, -0.05)
+    assert condition_in_x(softer, held).level is AlarmLevel.DANGER
 
 
 def test_time_that_passes_faster_asks_for_fewer_hours(films, rules):

@@ -100,7 +100,7 @@ class Machine:
 
     def _learned(self, direction: str) -> float:
         """What was learned of the upper bearing under that condition, in ln."""
-        learned = self._service.films.baseline("U1", "UJB").of(direction)
+        learned = self._service.films.baseline("U1", "UJB").of(f"k_{direction}")
         newest = self._lived.conditions.rows(np.array([len(self._lived) - 1]))
         return float(learned.surface.at(newest)[0])
 

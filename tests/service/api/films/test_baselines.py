@@ -52,7 +52,7 @@ async def test_a_bearing_without_a_baseline_says_how_far_learning_is(service, ma
 async def test_cells_and_export_are_what_was_learned(learned):
     found = await learned.json(f"{BASELINES}/1")
 
-    baseline = learned.store.films.baseline("U1", "UJB", 1).of("x")
+    baseline = learned.store.films.baseline("U1", "UJB", 1).of("k_x")
     cells, stored = found["x"]["cells"], baseline.table.cells
     assert {len(column) for column in cells.values() if column} == {len(stored)}
     assert cells["stiffness_n_per_m"] == pytest.approx([np.exp(c.location) for c in stored])

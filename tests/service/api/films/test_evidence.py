@@ -28,8 +28,8 @@ HOSTILE = '<script>alert("1")</script><img src=x onerror=alert(2)>'
 def raised(service: Any, machine: Any) -> AlarmNews:
     """A film that has lost a third raises its alarm."""
     machine.run(30, ln_change=-0.4)
-    rules, told = service.films.rules("U1"), service.films.newest("U1", "UJB")
-    found = {a: alarm_condition(f, rules.change) for a, f in zip("xy", told.findings, strict=True)}
+    told = service.films.newest("U1", "UJB")
+    found = {axis: alarm_condition(told.findings, axis) for axis in "xy"}
     condition = film_judgement(found, NEVER_JUDGED)
     assert condition.level is not None
     alarm = Alarm(AlarmIdentity("U1", "UJB", "film_stiffness"))

@@ -14,7 +14,7 @@ from rigs.tiers import fast_and_long
 from core.baseline.history import ReadingOutcome
 from core.change.backtest import DecisionHistory
 from core.change.decision import INITIAL_DECISION, Verdict
-from core.change.film_judge import FilmFinding, FilmNews
+from core.change.film_judge import FilmNews, unjudged
 from core.change.film_reading import FilmReading, FilmValue
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
@@ -200,7 +200,7 @@ STORED_STEP_NS = 600 * 10**9
 N = 50
 NAN = float("nan")
 EVIDENCE = [ReadingOutcome(n % 10 if n % 10 < 3 else 0) for n in range(N)]
-FINDING = FilmFinding(Verdict.NO_BASELINE)
+FINDINGS = unjudged(Verdict.NO_BASELINE)
 
 
 def value(n: int, shift: float) -> FilmValue:
@@ -238,7 +238,7 @@ def filled(plant_path: Path) -> Path:
     """A plant file whose database has readings of two bearings."""
     store = SqliteStore(plant_path.parent / "data" / "padwatch.sqlite3")
     store.films.add_simulated(
-        FilmNews(film_reading(n, bearing), (FINDING, FINDING), (INITIAL_DECISION, INITIAL_DECISION))
+        FilmNews(film_reading(n, bearing), FINDINGS, (INITIAL_DECISION,) * len(FINDINGS))
         for bearing in ("UJB", "LJB")
         for n in range(N)
     )

@@ -84,10 +84,10 @@ def test_alarms_are_those_that_core_decides(two_units, found):
             origin = Origin(unit, bearing, "unspecified", 1, "back-test", 0)
             baseline = learn(history.rows(0, n), is_settled[:n], origin, BaselineSettings())
             for direction in DIRECTIONS:
-                film = baseline.of(direction)
+                film = baseline.of(f"k_{direction}")
                 assert film is not None
                 later = history.rows(n, len(history))
-                decided = decide_all(later, is_settled[n:], direction, film, ChangeLimits())
+                decided = decide_all(later, is_settled[n:], f"k_{direction}", film, ChangeLimits())
                 active = np.concatenate([[0], decided.level > 0, [0]])
                 begins = np.flatnonzero(np.diff(active) == 1)
                 expected += [
@@ -157,7 +157,7 @@ def test_causes_are_told_by_the_newest_readings_of_all_bearings(two_units, found
 
 def _film(baselines: Any, bearing: str, direction: str) -> Any:
     (baseline,) = (b for b in baselines if b.origin.bearing == bearing)
-    return baseline.of(direction)
+    return baseline.of(f"k_{direction}")
 
 
 def _deviation(history: Any, film: Any, direction: str) -> Any:
