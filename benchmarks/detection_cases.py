@@ -7,7 +7,7 @@ import numpy as np
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.shaft import ConditionChange
 from benchmarks.detection_unit import DAY_NS, Later, LearnedUnit
-from core.baseline.history import DIRECTIONS
+from core.baseline.history import DIRECTIONS, QUANTITIES
 from core.change.cause import Cause
 from core.change.decision import Verdict
 
@@ -125,9 +125,9 @@ def find_damage(
     later = unit.later([damage])
     end = _end(later, onset, case)
     alarms = [
-        (int(row), (bearing, direction))
-        for direction in DIRECTIONS
-        for row in unit.decide(later, bearing, direction).raised()
+        (int(row), (bearing, QUANTITIES[quantity].direction))
+        for quantity in QUANTITIES
+        for row in unit.decide(later, bearing, quantity).raised()
         if onset <= row < end
     ]
     by_fixed = any(
@@ -162,7 +162,7 @@ def false_alarms(unit: LearnedUnit, band: float) -> tuple[int, int]:
 
 
 def _alarms(unit: LearnedUnit, later: Later, first: int, end: int, band: float) -> tuple[int, int]:
-    decided = [unit.decide(later, *place).raised() for place in unit.places()]
+    decided = [unit.decide(later, *place).raised() for place in unit.watched()]
     fixed = [_fixed(unit, later, *place, band) for place in unit.places()]
     decisions, crossings = (
         sum(int(np.sum((rows >= first) & (rows < end))) for rows in found)
@@ -241,7 +241,7 @@ def leave_support(
     later = unit.later(damage, [cooling_failure(start_ns, OUTSIDE_DAYS, OIL_OFFSET_C)])
     first_ns, end_ns = start_ns + DAY_NS, start_ns + round(OUTSIDE_DAYS * DAY_NS)
     first, end = (int(np.searchsorted(later.time_ns, ns)) for ns in (first_ns, end_ns))
-    verdicts = np.stack([unit.decide(later, *place).verdict for place in unit.places()])
+    verdicts = np.stack([unit.decide(later, *place).verdict for place in unit.watched()])
     said = verdicts[:, first:end]
     said = said[~np.isin(said, WITHOUT_NUMBER)]
     share = float(np.mean(said == Verdict.NO_BASELINE)) if said.size else float("nan")

@@ -14,13 +14,13 @@ from acquisition.simulated.plant.rotor import RotorParameters
 from benchmarks.detection_fixed import BANDS, FixedThreshold
 from core.arrays import FloatArray
 from core.baseline.baseline import Origin, QuantityBaseline
-from core.baseline.history import DIRECTIONS, StiffnessHistory
+from core.baseline.history import DIRECTIONS, QUANTITIES, StiffnessHistory
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.backtest import DecisionHistory, decide_all, operation_history
 from core.change.cause import Attribution, UnitReadings, attribute
 from core.change.decision import JUDGED
-from core.change.settings import ChangeLimits
+from core.change.settings import CK_CHANGE, ChangeLimits
 from core.change.shaft_response import MEAN_READINGS, FilmDirection, film_columns, learn_response
 from core.condition.operating_state import OperatingLimits
 
@@ -32,7 +32,8 @@ YEARS = 2.0
 LEARNING_DAYS = 365
 BRACKETS_N_PER_M = {b.bearing: b.stiffness_n_per_m for b in RotorParameters().brackets}
 SETTINGS = BaselineSettings()
-LIMITS = ChangeLimits()
+LIMITS = {"ln_k": ChangeLimits(), "ln_ck": CK_CHANGE}
+"""Limits by column of the quantity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,24 +74,27 @@ class LearnedUnit:
         """The same life, damaged or changed."""
         return _later(live(self.seed, START_NS, YEARS, damage, changes))
 
-    def decide(self, later: Later, bearing: str, direction: str) -> DecisionHistory:
-        found = self.stiffness(bearing, direction)
-        return decide_all(
-            later.histories[bearing], later.is_settled, f"k_{direction}", found, LIMITS
-        )
+    def decide(self, later: Later, bearing: str, quantity: str) -> DecisionHistory:
+        limits = LIMITS[QUANTITIES[quantity].value]
+        columns = later.histories[bearing], later.is_settled
+        return decide_all(*columns, quantity, self.learned(bearing, quantity), limits)
 
-    def stiffness(self, bearing: str, direction: str) -> QuantityBaseline:
-        found = self.baselines[bearing].of(f"k_{direction}")
+    def learned(self, bearing: str, quantity: str) -> QuantityBaseline:
+        found = self.baselines[bearing].of(quantity)
         if found is None:
-            raise RuntimeError(f"unit {self.seed} has learned nothing of {bearing} {direction}")
+            raise RuntimeError(f"unit {self.seed} has learned nothing of {bearing} {quantity}")
         return found
+
+    def watched(self) -> list[tuple[str, str]]:
+        """Bearing and name of each quantity that is decided on."""
+        return [(bearing, quantity) for bearing in self.baselines for quantity in QUANTITIES]
 
     def places(self) -> list[FilmDirection]:
         return [(bearing, direction) for bearing in self.baselines for direction in DIRECTIONS]
 
     def judged_rows(self, bearing: str) -> npt.NDArray[np.int64]:
         """Rows in which the healthy bearing is judged in both directions."""
-        verdicts = [self.decide(self.healthy, bearing, d).verdict for d in DIRECTIONS]
+        verdicts = [self.decide(self.healthy, bearing, q).verdict for q in ("k_x", "k_y")]
         return np.flatnonzero(np.all(np.isin(verdicts, [int(v) for v in JUDGED]), axis=0))
 
     def attribution(self, later: Later, place: FilmDirection, row: int) -> Attribution:
@@ -103,7 +107,7 @@ class LearnedUnit:
 
     def place_readings(self, later: Later) -> UnitReadings:
         """All of a unit's settled readings."""
-        places = [(later.histories[b], self.stiffness(b, d)) for b, d in self.places()]
+        places = [(later.histories[b], self.learned(b, f"k_{d}")) for b, d in self.places()]
         rises = [film.eccentricity_rise(history.conditions) for history, film in places]
         return UnitReadings(
             *film_columns(later.histories),
@@ -113,7 +117,7 @@ class LearnedUnit:
         )
 
     def _deviation(self, later: Later, bearing: str, direction: str) -> FloatArray:
-        history, baseline = later.histories[bearing], self.stiffness(bearing, direction)
+        history, baseline = later.histories[bearing], self.learned(bearing, f"k_{direction}")
         found = baseline.compare_history(history)
         return np.where(later.is_settled, found.deviation, np.nan)
 

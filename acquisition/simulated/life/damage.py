@@ -23,6 +23,7 @@ class DamageKind(StrEnum):
 
 
 GAINS = frozenset({DamageKind.PROBE_GAIN, DamageKind.ACCELEROMETER_GAIN})
+SIGNED = GAINS | {DamageKind.OIL_DEGRADATION}
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,8 @@ class Damage:
     size
         Final size, by kind. Stiffness loss and clearance growth: relative loss of film stiffness at
         a constant eccentricity ratio. Oil and bracket: relative loss of viscosity and of bracket
-        stiffness. Pivot wear: recession of the pad divided by the configured clearance. Gains:
-        signed relative change, -0.2 is a decrease by 20 %.
+        stiffness, negative for a more viscous oil. Pivot wear: recession of the pad divided by the
+        configured clearance. Gains: signed relative change, -0.2 is a decrease by 20 %.
     ramp_days
         Duration of the linear growth from 0 to `size`; 0 is a step.
     directions
@@ -55,7 +56,7 @@ class Damage:
     directions: tuple[str, ...] = field(default=DIRECTIONS)
 
     def __post_init__(self) -> None:
-        minimum = -1.0 if self.kind in GAINS else 0.0
+        minimum = -1.0 if self.kind in SIGNED else 0.0
         if not (minimum < self.size < 1.0 and self.size != 0.0):
             limits = f"between {minimum:g} and 1, and not 0"
             raise ValueError(f"size = {self.size:g} of {self.kind} must be {limits}")

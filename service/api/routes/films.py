@@ -223,6 +223,12 @@ class FilmWordModel(ApiModel):
     """Deviation of the newest reading alone, % of the expected stiffness; null if this reading was
     not compared."""
 
+    ck_level: LevelHeldName | None
+    """Alarm level of damping over stiffness in force; null without a level."""
+
+    ck_change_percent: float | None
+    """Most significant mean change of damping over stiffness, %; null if unknown."""
+
     stiffness_n_per_m: float | None
     """Stiffness of the newest reading, N/m; null if it could not be determined."""
 
@@ -338,6 +344,8 @@ def _word(found: FilmDirectionModel) -> FilmWordModel:
         found,
         change_percent=found.change and found.change.percent,
         deviation_percent=found.deviation and found.deviation.percent,
+        ck_level=found.damping.level,
+        ck_change_percent=found.damping.change and found.damping.change.percent,
     )
 
 

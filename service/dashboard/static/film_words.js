@@ -80,6 +80,14 @@ export function nowSentence(film) {
   return film.deviation_percent === null ? `${now} ${unit}.` : `${now}, ${expectedWords(film)} (${signedPercent(film.deviation_percent)}).`;
 }
 
+/** `c/k now 27.1, expected 26.5 ms (+2.3 %).`, with its change and cause if it has changed; nothing without a reading. */
+export function dampingSentences(damping) {
+  const { ck_s: now, expected_s: expected, deviation, level, cause } = damping;
+  const value = now === null ? "" : `c/k now ${formatFixed(1000 * now, 1)}`;
+  const words = expected === null ? value && `${value} ms.` : `${value}, expected ${formatFixed(1000 * expected, 1)} ms (${signedPercent(deviation.percent)}).`;
+  return level === null ? words : [words, changeSentence(damping), causeSentence(cause)].filter(Boolean).join(" ");
+}
+
 /** `expected 0.330 GN/m`; nothing where nothing is. */
 export function expectedWords({ expected_n_per_m: expected, expected_of_kb: ratio }) {
   const { value, unit } = stiffnessShown(expected, ratio);

@@ -42,7 +42,8 @@ function filmVerdict(film) {
 
 function changeWords(film, { directions, value, condition_reason: reason }) {
   const said = [...directions].map((axis) => {
-    const change = film[axis]?.change_percent ?? value;
+    const { level, ck_level: damped, ck_change_percent: ck, change_percent: change = value } = film[axis] ?? {};
+    if (damped && !level) return [axis, `c/k ${ck < 0 ? "lower" : "higher"}`];
     return [axis, change === null ? "changed" : change < 0 ? "softer" : "stiffer"];
   });
   const [[axis, how]] = said;

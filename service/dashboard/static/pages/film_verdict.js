@@ -1,7 +1,7 @@
 /** What is said of a film now, in words: verdict, change with its uncertainty, cause, condition. */
 
 import { element, setText } from "../dom.js";
-import { changeSentence, causeSentence, conditionWords, limitWords, nowSentence, pendingSentence, verdictMark, whyUnjudged } from "../film_words.js";
+import { changeSentence, causeSentence, conditionWords, dampingSentences, limitWords, nowSentence, pendingSentence, verdictMark, whyUnjudged } from "../film_words.js";
 import { formatTime } from "../format.js";
 import { mark } from "../parts/mark.js";
 import { estimatorWords } from "../words.js";
@@ -48,9 +48,10 @@ function directionRow(direction) {
     node: element("div", { class: "verdict", "data-direction": direction }, element("span", { class: "axis" }, direction), verdict.node, element("span", {}, change, " ", said)),
     draw(found, limits) {
       const now = { ...found, deviation_percent: found.deviation?.percent ?? null };
-      verdict.draw(...verdictMark(now, limits));
+      const onlyDamped = found.level === null && found.damping.level !== null;
+      verdict.draw(...(onlyDamped ? [found.damping.level, "c/k changed"] : verdictMark(now, limits)));
       setText(change, nowSentence(now));
-      setText(said, [whyUnjudged(found), changeSentence(found), pendingSentence(found, limits), causeSentence(found.cause)].filter(Boolean).join(" "));
+      setText(said, [whyUnjudged(found), changeSentence(found), pendingSentence(found, limits), causeSentence(found.cause), dampingSentences(found.damping)].filter(Boolean).join(" "));
     },
   };
 }

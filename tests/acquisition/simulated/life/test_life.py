@@ -121,6 +121,19 @@ def test_readings_scatter_by_what_they_say_and_by_what_is_alike_for_hours(two_ye
     assert np.all(readings.u_eccentricity < 0.02)
 
 
+def test_clearance_moves_damping_over_stiffness_and_oil_and_gains_do_not(two_years, day_ns):
+    usual, onset_ns = two_years(0), day_ns(400)
+    later = usual.operation.time_ns >= onset_ns
+    for kind, size, low, high in (
+        (DamageKind.CLEARANCE_GROWTH, 0.249, 0.015, 0.04),
+        (DamageKind.OIL_DEGRADATION, 0.2, -1e-9, 1e-9),
+        (DamageKind.ACCELEROMETER_GAIN, -0.05, -1e-9, 1e-9),
+    ):
+        ill = two_years(0, Damage(kind, "UJB", onset_ns, size))
+        moved = (ill.readings["UJB"].ln_ck - usual.readings["UJB"].ln_ck)[:, later]
+        assert low < np.nanmean(moved) < high, kind
+
+
 def test_little_load_means_little_excitation_and_more_uncertainty(two_years):
     life = two_years(0)
     readings, load = life.readings["UJB"], life.operation.load
