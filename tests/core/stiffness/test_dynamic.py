@@ -200,7 +200,7 @@ def test_the_stated_uncertainty_is_the_scatter_also_where_integration_alone_limi
 
 
 def test_damping_over_stiffness_scatters_as_it_says_and_no_gain_or_bracket_moves_it(recording):
-    unit = Bearing("UJB", ("a", "b", "c", "d"), 400.0, 1.18e9, bracket=BRACKET)
+    unit = Bearing("UJB", 1.18e9, "ux", "uy", "vx", "vy", 500.0, (2000.0, 2000.0))
     said = [
         dynamic_readings(unit, found(recording(seed, bearing_um=0.3)), GOOD)[0]
         for seed in range(100)

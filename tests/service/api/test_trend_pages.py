@@ -205,7 +205,7 @@ def simulated_past(n: int) -> FilmHistory:
         shaft_um_pk=two,
         bearing_um_pk=two,
     )
-    nothing, codes = np.full((2, n), np.nan), np.zeros((2, n), np.int8)
+    nothing, codes = np.full((4, n), np.nan), np.zeros((4, n), np.int8)
     state, flags = np.full(n, OperatingState.FULL_LOAD, np.int8), np.ones(n, bool)
     version = np.zeros(n, np.int64)
     numbers = (nothing, nothing, nothing, nothing)
