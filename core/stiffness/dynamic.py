@@ -27,9 +27,17 @@ from core.stiffness.dynamic_lines import (
     probe_noise_power,
     used_lines,
 )
-from core.stiffness.film_covariance import FilmFits
-from core.stiffness.film_fit import N_ITERATIONS, FilmLines, line_weights
-from core.stiffness.fitted_films import DAMPING, DELAY, LAGS, MASS, PARTS, STIFFNESS
+from core.stiffness.film_covariance import LAGS, FilmFits
+from core.stiffness.film_fit import N_ITERATIONS, FilmLines, WeightedTerms, line_weights
+from core.stiffness.fitted_films import (
+    DAMPING,
+    DELAY,
+    MASS,
+    N_LAGS,
+    N_PARTS,
+    STIFFNESS,
+    FilmInputs,
+)
 
 MIN_LINES = 12
 """Smallest number of usable lines for a result."""
@@ -213,15 +221,17 @@ def _fitted(
     changes[:, DAMPING] = 1j * omega
     moves = np.ones(len(measured), dtype=np.bool_)
     turn_rad_s = math.pi * sum(turn_hz)
-    constant = np.zeros((len(measured), len(PARTS))), np.zeros((len(measured), 1))
+    no_parts, no_share = np.zeros((len(measured), 2, N_PARTS)), np.zeros((len(measured), 1))
 
     def fit() -> tuple[FilmFits, npt.NDArray[np.bool_]]:
         bracket_n_per_m = stiffness - mass_kg * omega**2 + 1j * omega * damping
         # a delay turns the phase back by ω times the delay
         changes[:, DELAY] = 1j * omega * bracket_n_per_m
-        weight, moving = line_weights(lines, bracket_n_per_m)
         errors = smear_share, n_segments, floor_std
-        found = FilmFits(lines, weight, bracket_n_per_m, changes, *errors, turn_rad_s, *constant)
+        inputs = FilmInputs(lines, bracket_n_per_m, changes.copy(), *errors, turn_rad_s)
+        terms = inputs.terms(no_share)
+        weight, moving = line_weights(terms, inputs.force_power)
+        found = FilmFits(inputs, WeightedTerms(terms, weight), no_parts, no_share)
         return found, moves & moving
 
     found, moves = fit()
@@ -237,9 +247,9 @@ def _fitted(
     is_late, odds = late_share(found), found.constant_odds()
     dropped = np.where(seeks | ~moves, 1.0, is_late)[:, np.newaxis]
     kept = np.nan_to_num((1.0 - dropped) / (1.0 + CONSTANT_ODDS * odds[:, np.newaxis]))
-    lagging = found.with_parts(kept, LAGS)
+    lagging = found.with_parts(kept, N_LAGS)
     delay = _delay(lagging, is_late > 0.0)
-    fits = lagging.with_parts(kept, PARTS)
+    fits = lagging.with_parts(kept, N_PARTS)
     results = _results(fits, dropped, delay, mass_kg[:, 0], seeks, bin_hz)
     return [
         result if moving else None for result, moving in zip(results, moves.tolist(), strict=True)
@@ -251,7 +261,7 @@ def late_share(fits: FilmFits) -> FloatArray:
 
     The share is continuous, so that results do not jump between averages.
     """
-    (*_, lags), delay = fits.posterior(LAGS), fits.delay_significance()
+    lags, delay = fits.of_lags[2], fits.delay_significance()
     certain = np.clip((delay - DELAY_DOUBTFUL) / (DELAY_CERTAIN - DELAY_DOUBTFUL), 0.0, 1.0)
     is_delay = 1.0 - np.clip((lags / delay - AS_DELAY) / (AS_LAGS - AS_DELAY), 0.0, 1.0)
     return np.nan_to_num(certain * is_delay)
@@ -285,27 +295,28 @@ def _results(
     of_doubt, left = fits.parts_left(dropped)
     variance = np.maximum(np.einsum("nruu->nru", left), 0.0) + tapered**2
     model = np.sqrt(3.0 * variance)
-    covariance = fits.film_covariance(fits.through_parts()) + of_doubt
+    covariance = fits.film_covariance() + of_doubt
     mass_std_kg, whole = np.zeros(len(mass_kg)), np.zeros(len(mass_kg), dtype=np.bool_)
     if seeks_mass.any():
         masses_kg, of_mass = fits.estimate([MASS])
         whole = seeks_mass & ~np.isnan(masses_kg[:, 0])
-        std = np.sqrt(fits.covariance(of_mass)[:, 0, 0, 0])
+        std = np.sqrt(fits.covariance(of_mass)[:, 0, 0])
         mass_std_kg = np.where(whole, std, 0.0)
-        covariance[whole] = fits.film_covariance(fits.through([MASS], of_mass))[whole]
+        covariance[whole] = fits.film_covariance_with([MASS])[whole]
     # what is fitted follows a change of what is not
-    per = fits.per[:, :4] + np.einsum("npc,npru->ncru", fits.parts_follow(), fits.per[:, PARTS])
+    per = fits.per_change_with_parts()
     for change in (STIFFNESS, DAMPING, DELAY) if whole.any() else ():
         follows = np.where(whole[:, np.newaxis], fits.follow(change, [MASS]), 0.0)
-        per[:, change] += np.einsum("np,npru->nru", follows, fits.per[:, [MASS]])
-    lines = fits.lines
+        per[..., change] += follows[..., np.newaxis] * fits.per_change[..., MASS]
+    per = per.transpose(0, 3, 1, 2)
+    lines = fits.inputs.lines
     scale = (lines.omega_unit ** (0.0, 0.0, 1.0, 1.0))[:, np.newaxis]
     coefficients = fits.unknowns / scale
     covariance /= scale[..., np.newaxis] * scale[..., np.newaxis, :]
     model, per = model / scale, per / scale[:, np.newaxis]
     coherence, segments, lack = fits.coherence, fits.coherence_segments, fits.lack_of_fit
     noise_um2_per_hz = lines.noise_power / phasor_power_per_density(bin_hz)
-    signal_share = fits.signal_share
+    signal_share = fits.weighted.signal_share
     unseparable = np.isnan(delay_s)
     sizes = lines.counted.sum(axis=(1, 2)).astype(int).tolist()
     return [

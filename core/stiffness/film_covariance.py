@@ -22,20 +22,18 @@ from core.spectra.cross_spectrum import (
     WHITE_PRODUCTS,
     correlated_sum,
 )
-from core.stiffness.dynamic_lines import own_power
 from core.stiffness.film_fit import N_UNKNOWNS
 from core.stiffness.fitted_films import (
     DAMPING,
     DELAY,
-    LAGS,
-    MASS,
-    PARTS,
+    N_LAGS,
+    N_PARTS,
+    N_TERMS,
     FittedFilms,
-    real_product,
     times,
 )
 
-PART_PRODUCTS: FloatArray = np.array(
+ERROR_PRODUCTS: FloatArray = np.array(
     [
         *[WHITE_PRODUCTS] * 2,  # residual times the shaft's motion
         SMEARED_IN_PHASE,
@@ -47,16 +45,20 @@ PART_PRODUCTS: FloatArray = np.array(
     ]
 ).T
 """Correlation between lines 0, 1 and 2 bins apart, (3, 11), of the parts of the error: real parts
-of the six of `FilmFits._parts`, then imaginary parts of the first five."""
+of the six of `FilmFits._errors`, then imaginary parts of the first five."""
 
-N_PARTS = 6
+N_ERRORS = 6
 
-FITTED = (DELAY, MASS)
-"""Bracket properties that can be fitted together with the film."""
+N_CHANGES = 4
 
-N_INFLUENCES = N_UNKNOWNS + len(FITTED) + 3
-LAGGING, TILTING = slice(N_INFLUENCES - 3, N_INFLUENCES - 1), N_INFLUENCES - 1
-"""Influences of the lagging motions, and of their lag."""
+CHANGES = slice(N_TERMS, N_TERMS + N_CHANGES)
+"""Effects of the bracket properties through the film, after the terms of a row."""
+
+LAGS = range(4, 8)
+"""Indices of the lagging parts of both rows, after the bracket properties."""
+
+OF_ROW = [[*range(N_CHANGES), *LAGS[:2], 8], [*range(N_CHANGES), *LAGS[2:], 9]]
+"""Indices of the bracket properties and of the parts that a row depends on."""
 
 
 class FilmFits(FittedFilms):
@@ -65,12 +67,12 @@ class FilmFits(FittedFilms):
     def delay_significance(self) -> FloatArray:
         """Return the squared significance of a delay of the bearing channels, (n,)."""
         value, information = self.estimate([DELAY])[0], self._information[:, DELAY, DELAY]
-        return value[:, 0] ** 2 * information / self._size[:, 0, 0]
+        return value[:, 0] ** 2 * information / self.inputs.size[:, 0]
 
     @cached_property
     def coherence(self) -> FloatArray:
         """Share of each bearing channel's weighted power explained by the film, (n, 2), 0 to 1."""
-        whole = _summed(self.weight, self.force_power)
+        whole = _summed(self.weight, self.inputs.force_power)
         share: FloatArray = 1.0 - _summed(self.weight, self.residual) / whole
         return np.minimum(np.maximum(share, 0.0), 1.0)
 
@@ -82,13 +84,13 @@ class FilmFits(FittedFilms):
         residual and power, with relative errors of ``1 / √n`` that are correlated by their ratio.
         The residual enters a second time through the weights.
         """
-        left, whole = self.weight * self.residual, self.weight * self.force_power
+        left, whole = self.weight * self.residual, self.weight * self.inputs.force_power
         left /= left.sum(axis=-1, keepdims=True)
         whole /= whole.sum(axis=-1, keepdims=True)
-        moves = left + (whole - left) @ self.lines.smoothing.swapaxes(1, 2)
-        shared = 2.0 * moves * whole * self.residual / self.force_power
+        moves = left + (whole - left) @ self.inputs.lines.smoothing.swapaxes(1, 2)
+        shared = 2.0 * moves * whole * self.residual / self.inputs.force_power
         squares = (moves**2 + whole**2 - shared).sum(axis=-1)
-        variance = CORRELATED_LINES * squares / (self.n_segments - 2.0)  # two fitted inputs
+        variance = CORRELATED_LINES * squares / (self.inputs.n_segments - 2.0)  # two fitted inputs
         found: FloatArray = 1.0 + 2.0 * self.coherence / variance
         return found
 
@@ -99,14 +101,83 @@ class FilmFits(FittedFilms):
         The expected value is 1 if stiffness and damping are constant over the lines: the residual
         is then correlated with the shaft only by chance, according to `n_segments`.
         """
-        shaft, (x, y) = self.lines.shaft, self._common.swapaxes(0, 2).swapaxes(1, 2)
+        shaft, (x, y) = self.inputs.lines.shaft, self.common.swapaxes(0, 2).swapaxes(1, 2)
         xx, yy = shaft[:, 0, 0, np.newaxis].real, shaft[:, 1, 1, np.newaxis].real
         yx = shaft[:, 1, 0, np.newaxis]
         own = np.abs(x) ** 2 * yy + np.abs(y) ** 2 * xx - 2.0 * (x.conj() * yx * y).real
         power = own / (xx * yy - np.abs(yx) ** 2)
         whole = _summed(self.weight, self.residual)
-        found: FloatArray = self.n_segments * _summed(self.weight, power) / (2.0 * whole)
+        found: FloatArray = self.inputs.n_segments * _summed(self.weight, power) / (2.0 * whole)
         return found
+
+    @cached_property
+    def per_change(self) -> FloatArray:
+        """Derivatives of the unknowns with respect to each bracket property, (n, 2, 4, 4)."""
+        normal, of_force = self.weighted.normal[..., :N_UNKNOWNS, :N_UNKNOWNS], self._changed[0]
+        return np.asarray(np.linalg.solve(normal, of_force), dtype=np.float64)
+
+    @cached_property
+    def _changed(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Weighted products of changed forces: all for each row and change.
+
+        Returns
+        -------
+        Products of the changed brackets' forces with the first functions, (n, 2, 4, 4), and of the
+        films' forces, changed in the same proportion, with all functions, (n, 2, 8, 4), with each
+        other, (n, 2, 4, 4), and with the residual, (n, 2, 4).
+        """
+        weight, functions = self.weight[:, :, np.newaxis], self.weighted.terms.functions
+        relative = self.inputs.relative[:, np.newaxis]
+        changes = relative.view(np.float64).swapaxes(2, 3)
+
+        def products(force: ComplexArray, n_functions: int) -> FloatArray:
+            weighted = (weight * force.conj())[:, :, np.newaxis]
+            moments = functions[:, :, :n_functions, np.newaxis] * weighted
+            flat = moments.view(np.float64).reshape(*moments.shape[:2], 2 * n_functions, -1)
+            return np.asarray(flat @ changes)
+
+        power = (self.moved * self.film.conj()).real.sum(axis=2, keepdims=True) * weight
+        squared = (relative * power).view(np.float64) @ changes
+        rest = (self.film.conj() * self.common).sum(axis=2, keepdims=True) * weight
+        left = (rest.view(np.float64) @ changes)[:, :, 0]
+        return products(self.inputs.force, 2), products(self.moved, 4), squared, left
+
+    @cached_property
+    def _sensitivity(self) -> FloatArray:
+        """Residual per unit of each change and part after a new fit, (n, 2, 10, 11).
+
+        The changes of both rows are expressed by the terms of each row and by its `CHANGES`.
+        """
+        through = np.zeros((len(self.parts), 2, 10, N_TERMS + N_CHANGES))
+        through[:, :, :N_CHANGES, :N_UNKNOWNS] = -self.per_change.swapaxes(2, 3)
+        through[:, :, :N_CHANGES, CHANGES] = np.eye(N_CHANGES)
+        own = np.concatenate([self.solved[..., 1:].swapaxes(2, 3), self._own_parts], axis=3)
+        for row, of_row in enumerate(OF_ROW):
+            through[:, row, of_row[N_CHANGES:], :N_TERMS] = own[:, row]
+        return through
+
+    @cached_property
+    def _own_parts(self) -> FloatArray:
+        """Residual force of the parts of a row, per unit of each, (n, 2, 3, 3)."""
+        return np.zeros((len(self.parts), 2, 1, 1)) - np.eye(N_PARTS)
+
+    @cached_property
+    def _information(self) -> FloatArray:
+        """Information on the changes and parts in the residual, (n, 10, 10)."""
+        _, to_functions, squared, _ = self._changed
+        gram = np.empty((*self.gram.shape[:2], N_TERMS + N_CHANGES, N_TERMS + N_CHANGES))
+        gram[..., :N_TERMS, :N_TERMS], gram[..., CHANGES, CHANGES] = self.gram, squared
+        to_terms = self._of_terms.swapaxes(2, 3) @ to_functions
+        gram[..., :N_TERMS, CHANGES] = to_terms
+        gram[..., CHANGES, :N_TERMS] = to_terms.swapaxes(2, 3)
+        through = self._sensitivity
+        return np.asarray((through @ gram @ through.swapaxes(2, 3)).sum(axis=1))
+
+    @cached_property
+    def _score(self) -> FloatArray:
+        """Products of the residual with its changes, (n, 10, 1)."""
+        left = np.concatenate([self.left, self._changed[3]], axis=2)[..., np.newaxis]
+        return np.asarray((self._sensitivity @ left).sum(axis=1))
 
     def follow(self, change: int, fitted: Sequence[int]) -> FloatArray:
         """Return how a wrong bracket property shifts those that are fitted, (n, n_fitted).
@@ -118,7 +189,7 @@ class FilmFits(FittedFilms):
         return -(inverse @ self._information[:, fitted, change, np.newaxis])[..., 0]
 
     def estimate(self, fitted: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-        """Return joint estimates of some of the `FITTED` changes and `PARTS`, and their influences.
+        """Return joint estimates of some bracket properties and `LAGS`, and their influences.
 
         The estimation is one Gauss-Newton step. It uses the shaft's motion through the fitted film
         instead of the bearing's motion, whose noise would bias the estimates.
@@ -126,167 +197,144 @@ class FilmFits(FittedFilms):
         Returns
         -------
         Estimates, (n, n_fitted), NaN where the data do not separate the changes; and the weights of
-        the influences in them as a single group of `covariance`.
+        the influences in them, as `covariance` takes them.
         """
         inverse, separate = _inverse(self._information[:, fitted][..., fitted])
-        weighted = (self.weight[:, :, np.newaxis] * self._common)[:, np.newaxis]
-        score = real_product(self._left[:, fitted], weighted)
-        value = np.where(separate[:, np.newaxis], -(inverse @ score)[..., 0], np.nan)
-        return value, self._influences(inverse, fitted)
-
-    def _influences(self, inverse: FloatArray, fitted: Sequence[int]) -> FloatArray:
-        """Return weights of the influences in estimates with an inverse information matrix."""
-        own = np.zeros((len(inverse), 2, len(fitted), N_INFLUENCES))
-        own[..., :N_UNKNOWNS] = self.per[:, fitted].swapaxes(1, 2)
-        for n, change in enumerate(fitted):
-            if change in FITTED:
-                own[..., n, N_UNKNOWNS + FITTED.index(change)] = -1.0
-            elif change in LAGS:
-                row, column = divmod(change - LAGS.start, 2)
-                own[:, row, n, LAGGING.start + column] = 1.0
-            else:
-                own[:, change - LAGS.stop, n, TILTING] = 1.0
-        return (inverse[:, np.newaxis] @ own)[:, np.newaxis]
+        steps = -inverse
+        value = (steps @ self._score[:, fitted])[..., 0]
+        influences = steps[:, np.newaxis] @ self._sensitivity[:, :, fitted]
+        return np.where(separate[:, np.newaxis], value, np.nan), influences
 
     def delay(self, fitted: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return `DELAY`, first of joint estimates, its uncertainty and per `DAMPING`, (n,)."""
         value, influences = self.estimate(fitted)
-        std = np.sqrt(self.covariance(influences)[:, 0, 0, 0])
+        std = np.sqrt(self.covariance(influences[:, :, :1])[:, 0, 0])
         return value[:, 0], std, self.follow(DAMPING, fitted)[:, 0]
 
     def parts_left(self, dropped: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return covariances of the unknowns from what of `PARTS` is left, (n, 2, 4, 4) by row.
+        """Return covariances of the unknowns from what of the parts is left, (n, 2, 4, 4) by row.
 
         The first is from the doubt whether there are any, which differs between averages; the
         second from the error of the prior, and from a share `dropped` (n, 1) that is not estimated.
         """
-        mean, covariance = self.of_parts
-        of_prior = covariance @ (self._prior[..., np.newaxis] * covariance)
-        whole = covariance + mean[..., np.newaxis] * mean[:, np.newaxis]
-        kept, per = self.kept[..., np.newaxis], self.per[:, PARTS].transpose(0, 2, 3, 1)
+        mean, covariance, _ = self.of_parts
+        of_prior = covariance @ (self.prior[..., np.newaxis] * covariance)
+        whole = covariance + mean[..., np.newaxis] * mean[..., np.newaxis, :]
+        kept, per = self.kept[..., np.newaxis, np.newaxis], self.per_part
         doubt = kept * (1.0 - kept) * whole
-        left = kept * of_prior + dropped[..., np.newaxis] * whole
-        of_doubt, of_rest = (
-            np.asarray(per @ each[:, np.newaxis] @ per.swapaxes(2, 3)) for each in (doubt, left)
-        )
-        return of_doubt, of_rest
+        left = kept * of_prior + dropped[..., np.newaxis, np.newaxis] * whole
+        return per @ doubt @ per.swapaxes(2, 3), per @ left @ per.swapaxes(2, 3)
 
-    def through_parts(self) -> FloatArray:
-        """Return weights of the influences in the unknowns through the kept `PARTS`, by row."""
-        inverse = self.kept[..., np.newaxis] * self.of_parts[1] / self._size
-        return self.through(PARTS, self._influences(inverse, PARTS))
+    def per_change_with_parts(self) -> FloatArray:
+        """Return the derivatives of the unknowns if the kept parts follow, (n, 2, 4, 4)."""
+        follow = np.empty((len(self.parts), 2, N_PARTS, N_CHANGES))
+        for row, of_row in enumerate(OF_ROW):
+            follow[:, row] = self._information[:, of_row[N_CHANGES:], :N_CHANGES]
+        follow /= -self.inputs.size[..., np.newaxis, np.newaxis]
+        kept = self.kept[..., np.newaxis, np.newaxis]
+        return self.per_change + self.per_part @ (kept * self.of_parts[1] @ follow)
 
-    def parts_follow(self) -> FloatArray:
-        """Return the change of the kept `PARTS` per wrong bracket property, (n, 6, 4)."""
-        information = self._information[:, PARTS, :4] / self._size
-        return -self.kept[..., np.newaxis] * (self.of_parts[1] @ information)
+    def film_covariance(self) -> FloatArray:
+        """Return the covariance of the films' unknowns with the kept parts, (n, 2, 4, 4) by row."""
+        kept = (self.kept / self.inputs.size)[..., np.newaxis, np.newaxis]
+        steps = kept * self.per_part @ self.of_parts[1]
+        of_parts = np.concatenate([self.solved[..., 1:].swapaxes(2, 3), self._own_parts], axis=3)
+        covariance, slope = self._spread(self._inverse_normal - steps @ of_parts)
+        return covariance + slope @ slope.swapaxes(2, 3)
 
-    def through(self, fitted: Sequence[int], influences: FloatArray) -> FloatArray:
-        """Return weights of the influences in the unknowns through fitted changes, by row."""
-        of_each = np.moveaxis(influences, 3, 1)[:, :, :, :, np.newaxis]
-        return np.asarray((self.per[:, fitted][..., np.newaxis, :, np.newaxis] * of_each).sum(1))
-
-    def film_covariance(self, through: FloatArray | float = 0.0) -> FloatArray:
-        """Return the covariance of the films' unknowns, (n, 2, 4, 4).
-
-        `through` holds the weights through changes that were fitted with the film.
-        """
-        through = np.zeros((len(self.weight), 2, 2, N_UNKNOWNS, N_INFLUENCES)) + through
-        inverse = np.linalg.inv(self._normal[0])
+    def film_covariance_with(self, fitted: Sequence[int]) -> FloatArray:
+        """Return the covariance of the unknowns with bracket properties fitted, (n, 2, 4, 4)."""
+        influences, own = self.estimate(fitted)[1], self._inverse_normal
+        found = []
         for row in (0, 1):
-            through[:, row, row, :, :N_UNKNOWNS] += inverse[:, row]
-        return self.covariance(through)
+            weights = self.per_change[:, np.newaxis, row][..., fitted] @ influences
+            weights[:, row, :, :N_TERMS] += own[:, row]
+            found.append(self.covariance(weights))
+        return np.stack(found, axis=1)
+
+    @cached_property
+    def _inverse_normal(self) -> FloatArray:
+        """Weights of the influences in the unknowns, if nothing else is fitted, (n, 2, 4, 7)."""
+        weights = np.zeros((len(self.parts), 2, N_UNKNOWNS, N_TERMS))
+        normal = self.weighted.normal[..., :N_UNKNOWNS, :N_UNKNOWNS]
+        weights[..., :N_UNKNOWNS] = np.linalg.inv(normal)
+        return weights
 
     def covariance(self, weights: FloatArray) -> FloatArray:
-        """Return the covariance of groups of estimates, (n, n_groups, n_estimates, n_estimates).
+        """Return the covariance of estimates, (n, n_estimates, n_estimates).
 
         Parameters
         ----------
-        weights : (n, n_groups, 2, n_estimates, 9)
+        weights : (n, 2, n_estimates, 7 or 11)
             Weights of the influences in the estimates, through the residual of each row.
         """
-        covariance, slope = self._spread
-        own = (weights @ covariance[:, np.newaxis] @ weights.swapaxes(-1, -2)).sum(axis=2)
-        through = (weights @ slope[:, np.newaxis]).sum(axis=2)
-        own += through @ through.swapaxes(-1, -2)
-        return np.asarray(own)
+        own, slope = self._spread(weights)
+        through = slope.sum(axis=1)
+        return np.asarray(own.sum(axis=1) + through @ through.swapaxes(1, 2))
 
-    @cached_property
-    def _spread(self) -> tuple[FloatArray, FloatArray]:
-        """Covariance of the influences' sums, (n, 2, 9, 9), and its part from the noise floor.
+    def _spread(self, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the covariance from the residual of each row, and the part of the noise floor.
 
-        The second array, (n, 2, 9, 2), holds the change of the sums per standard uncertainty of
-        each probe's noise power.
+        The first, (n, 2, n_estimates, n_estimates), is without the second, (n, 2, n_estimates, 2):
+        the change of the estimates per standard uncertainty of each probe's noise power.
         """
-        lines, parts = self.lines, self._parts
-        ratio = lines.ratio[:, np.newaxis, np.newaxis, np.newaxis]
-        relative = self._relative[:, np.newaxis, FITTED]
-        moved = (self.film[:, :, :, np.newaxis] * parts).sum(axis=2)
-        moved = relative[:, :, :, np.newaxis] * moved[:, :, np.newaxis]
-        terms = np.empty((*parts.shape[:2], N_INFLUENCES, 2 * N_PARTS - 1, parts.shape[-1]))
-        terms[:, :, :2, :N_PARTS] = parts.real
-        terms[:, :, :2, N_PARTS:] = parts.imag[..., : N_PARTS - 1, :]
-        np.multiply(-ratio, parts.imag, out=terms[:, :, 2:4, :N_PARTS])
-        np.multiply(ratio, terms[:, :, :2, : N_PARTS - 1], out=terms[:, :, 2:4, N_PARTS:])
-        lag, per_deviation = (each[:, :, np.newaxis, np.newaxis] for each in self._lag)
-        tilting = per_deviation * (self._lagging[..., np.newaxis] * parts).sum(2, keepdims=True)
-        moved = np.concatenate([moved, lag * parts, tilting], axis=2)
-        terms[:, :, 4:, :N_PARTS] = moved.real
-        terms[:, :, 4:, N_PARTS:] = moved.imag[..., : N_PARTS - 1, :]
+        lines, n_estimates = self.inputs.lines, weights.shape[2]
+        # influence of motion in x and in y on each estimate
+        tilt = weights[..., N_TERMS - 1 : N_TERMS] * self.kept_parts[:, :, np.newaxis, :N_LAGS]
+        of_functions = np.concatenate([weights[..., : N_TERMS - 1], tilt], axis=3)
+        by_motion = of_functions.reshape(*weights.shape[:3], 4, 2).swapaxes(3, 4)
+        functions = self.weighted.terms.functions.view(np.float64)
+        flat = by_motion.reshape(*weights.shape[:2], 2 * n_estimates, 4) @ functions
+        influence = flat.reshape(*weights.shape[:3], 2, -1).view(np.complex128)
+        if weights.shape[3] > N_TERMS:
+            relative = self.inputs.relative.view(np.float64)[:, np.newaxis]
+            changed = (weights[..., CHANGES] @ relative).view(np.complex128)
+            influence += changed[:, :, :, np.newaxis] * self.film[:, :, np.newaxis]
+        errors = self._errors[:, :, np.newaxis]
+        moved = influence[..., 0, np.newaxis, :] * errors[:, :, :, 0]
+        moved += influence[..., 1, np.newaxis, :] * errors[:, :, :, 1]
+        terms = np.concatenate([moved.real, moved.imag[..., : N_ERRORS - 1, :]], axis=3)
         # the real part of conj(x) e with circular e has half its power (Bendat and Piersol, 9.2)
-        covariance = correlated_sum(terms, lines.lines, PART_PRODUCTS)
-        covariance /= 2.0 * self.n_segments[..., np.newaxis, np.newaxis]
+        covariance = correlated_sum(terms, lines.lines, ERROR_PRODUCTS)
+        covariance /= 2.0 * self.inputs.n_segments[..., np.newaxis, np.newaxis]
         # per unit of noise power
-        weight = self.weight[:, :, np.newaxis]
-        weighted = weight * self.film
-        slope = np.empty((*parts.shape[:2], N_INFLUENCES, 2))
-        slope[:] = 0.0
-        np.einsum("...ii->...i", slope[:, :, :2])[...] = weighted.real.sum(axis=-1)
-        np.einsum("...ii->...i", slope[:, :, 2:4])[...] = (ratio[:, 0] * weighted.imag).sum(axis=-1)
-        power = weight * (self.film.real**2 + self.film.imag**2)
-        slope[:, :, 4:6] = relative.real @ power.swapaxes(-1, -2)
-        turned = [
-            (each.conj() * weighted).real.sum(axis=-1)
-            for each in (lag[..., 0, :], per_deviation[..., 0, :])
-        ]
-        np.einsum("...ii->...i", slope[:, :, LAGGING])[...] = turned[0]
-        slope[:, :, TILTING] = self._lagging[..., 0] * turned[1]
-        slope *= (lines.noise_power * self.floor_std)[:, np.newaxis, np.newaxis]
+        weighted = (self.weight[:, :, np.newaxis] * self.film)[:, :, np.newaxis]
+        products = influence.view(np.float64) * weighted.view(np.float64)
+        slope = products.sum(axis=-1) * (lines.noise_power * self.inputs.floor_std)[:, None, None]
         return covariance, slope
 
     @cached_property
-    def _parts(self) -> ComplexArray:
+    def _errors(self) -> ComplexArray:
         """Six independent parts of the error per unit of motion, (n, 2 rows, 2, 6, n_used).
 
         Integration errors of neighbouring lines cancel in the part of an influence in phase with a
         row's force. Their sizes use smoothed powers, which are free of the scatter of single lines.
         """
-        lines, shaft = self.lines, self.lines.shaft
-        root, across = _hermitian_root(shaft), self.film.conj()
-        moved = times(self.film, shaft)
+        lines, weight = self.inputs.lines, self.weight
+        root, across = lines.shaft_root, self.film.conj()
+        moved = times(self.film, lines.shaft)
         force = (moved * across).real.sum(axis=2)
         shared = moved.conj() / force[:, :, np.newaxis]
-        smear = lines.smoothed(self.force_power) * self.smear_share
-        smeared = np.minimum(self.weight * smear, 1.0)  # fraction of the residual, 1 / weight
-        rest = np.sqrt(self.weight**2 * self.residual * (1.0 - smeared))
-        smeared_root = np.sqrt(self.weight * smeared)
-        power = own_power(shaft)
-        smooth_root = np.sqrt(lines.smoothed(power) / power)[:, :, np.newaxis] * root
+        smear = self.inputs.smooth_force_power * self.inputs.smear_share
+        smeared = np.minimum(weight * smear, 1.0)  # fraction of the residual, 1 / weight
+        rest = weight * np.sqrt(self.residual * (1.0 - smeared))
+        smeared_root = np.sqrt(weight * smeared)
+        smooth_root = lines.smooth_shaft_root
         apart = (
             smooth_root[:, np.newaxis]
             - shared[:, :, :, np.newaxis] * times(self.film, smooth_root)[:, :, np.newaxis]
         )
-        parts = np.empty((*self.weight.shape[:2], 2, N_PARTS, shaft.shape[-1]), dtype=np.complex128)
-        parts[:, :, :, :2] = rest[:, :, np.newaxis, np.newaxis] * root[:, np.newaxis]
+        errors = np.empty((*weight.shape[:2], 2, N_ERRORS, weight.shape[-1]), dtype=np.complex128)
+        errors[:, :, :, :2] = rest[:, :, np.newaxis, np.newaxis] * root[:, np.newaxis]
         size = smeared_root * np.sqrt(lines.smoothed(force))
-        parts[:, :, :, 2] = size[:, :, np.newaxis] * shared
-        parts[:, :, :, 3:5] = smeared_root[:, :, np.newaxis, np.newaxis] * apart
+        errors[:, :, :, 2] = size[:, :, np.newaxis] * shared
+        errors[:, :, :, 3:5] = smeared_root[:, :, np.newaxis, np.newaxis] * apart
         # The probes' noise is in the residual and in the shaft's motion, with a common phase:
         # E[x*e x*e] is not 0 as for independent signals (Isserlis 1918). The resulting reduction of
         # some variances is neglected.
         noise = lines.noise_power[:, np.newaxis, :, np.newaxis]
-        parts[:, :, :, 5] = self.weight[:, :, np.newaxis] * noise * across
-        return parts
+        errors[:, :, :, 5] = weight[:, :, np.newaxis] * noise * across
+        return errors
 
 
 def _summed(weight: FloatArray, values: FloatArray) -> FloatArray:
@@ -303,15 +351,3 @@ def _inverse(information: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]
     separate = (information[:, 0, 0] > 0.0) & (np.linalg.det(information) > 0.0)
     safe = np.where(separate[:, np.newaxis, np.newaxis], information, np.eye(len(information[0])))
     return np.linalg.inv(safe), separate
-
-
-def _hermitian_root(shaft: ComplexArray) -> ComplexArray:
-    """Return the Hermitian square roots of cross-spectra, (n, 2, 2, n_lines)."""
-    own = own_power(shaft)
-    determinant = own[:, 0] * own[:, 1] - np.abs(shaft[:, 0, 1]) ** 2
-    root = np.sqrt(np.maximum(determinant, 0.0))
-    # closed form of the 2 × 2 square root, by the theorem of Cayley and Hamilton
-    whole = shaft.copy()
-    np.einsum("niil->nil", whole)[...] += root[:, np.newaxis]
-    whole /= np.sqrt(own.sum(axis=1) + 2.0 * root)[:, np.newaxis, np.newaxis]
-    return whole

@@ -8,6 +8,7 @@ Bearing comes first in all arrays, line last, so that each step is one operation
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -32,9 +33,37 @@ N_ITERATIONS = 4
 
 N_UNKNOWNS = 4
 
+N_FUNCTIONS = 4
+"""Number of functions of frequency in a film: 1, iω, the shape of a lag, and its derivative."""
+
+_PAIRS = [(a, b) for b in range(N_FUNCTIONS) for a in range(b + 1)]
+
+PAIRS: npt.NDArray[np.intp] = np.array(_PAIRS).T
+"""Pairs of functions, (2, 10), ordered by the second: those of fewer functions come first."""
+
+N_PRODUCTS = 5
+"""Number of products of a pair of functions: with xx, xy, yx and yy of the shaft, and without."""
+
+_DIRECTIONS = (*np.ndindex(2, 2), (0, 0))
+
+FACTORS: npt.NDArray[np.intp] = np.array(
+    [(2 * a + j, 2 * b + k) for a, b in _PAIRS for j, k in _DIRECTIONS]
+).T
+"""Coefficients that are factors of each product in the power of a film's force, (2, 50)."""
+
+MULTIPLES: FloatArray = np.array([[2.0 - (a == b)] * 4 + [0.0] for a, b in _PAIRS]).ravel()
+"""How often each product occurs in the power of a film's force, (50,)."""
+
+PLACES: npt.NDArray[np.intp] = np.zeros((2 * N_FUNCTIONS,) * 2, dtype=np.intp)
+"""Indices of the products in the normal equations, (8, 8)."""
+
+for _place, (_row, _column, _multiple) in enumerate(zip(*FACTORS, MULTIPLES, strict=True)):
+    if _multiple:
+        PLACES[_row, _column] = PLACES[_column, _row] = _place
+
 
 class FilmLines:
-    """Cross-spectra at the used lines of n bearings, and the normal equations of their films.
+    """Cross-spectra at the used lines of n bearings.
 
     The unknowns are stiffness and damping times `omega_unit`, both in N/m. Bearings with fewer
     lines than others are filled up with their last line, which then has no weight.
@@ -100,68 +129,128 @@ class FilmLines:
         return np.ascontiguousarray(own_power(self.bearing))
 
     @cached_property
-    def _gram(self) -> FloatArray:
-        """Real parts of the products of (u_1, u_2, iω u_1, iω u_2), (n, 16, n_used)."""
-        scale, (n, n_used) = self.ratio[:, np.newaxis, np.newaxis], self.ratio.shape
-        gram = np.empty((n, N_UNKNOWNS, N_UNKNOWNS, n_used))
-        gram[:, :2, :2] = self.shaft.real
-        np.multiply(scale, self.shaft.imag, out=gram[:, :2, 2:])
-        np.negative(gram[:, :2, 2:], out=gram[:, 2:, :2])
-        np.multiply(scale**2, gram[:, :2, :2], out=gram[:, 2:, 2:])
-        return gram.reshape(n, -1, n_used)
+    def motion(self) -> ComplexArray:
+        """Cross-spectra of the shaft's motion without the probes' noise, (n, 2, 2, n_used)."""
+        motion = self.shaft.copy()
+        np.einsum("niil->nil", motion)[...] -= self.noise_power[..., np.newaxis]
+        return motion
 
     @cached_property
-    def _noise(self) -> FloatArray:
-        """Diagonal of the products of the probes' noise, (n, 4, n_used)."""
-        noise = np.ones_like(self.ratio)[:, np.newaxis] * self.noise_power[..., np.newaxis]
-        return np.concatenate([noise, self.ratio[:, np.newaxis] ** 2 * noise], axis=1)
+    def shaft_root(self) -> ComplexArray:
+        """Hermitian square roots of the shaft's cross-spectra, (n, 2, 2, n_used)."""
+        own = own_power(self.shaft)
+        determinant = own[:, 0] * own[:, 1] - np.abs(self.shaft[:, 0, 1]) ** 2
+        root = np.sqrt(np.maximum(determinant, 0.0))
+        # closed form of the 2 × 2 square root, by the theorem of Cayley and Hamilton
+        whole = self.shaft.copy()
+        np.einsum("niil->nil", whole)[...] += root[:, np.newaxis]
+        whole /= np.sqrt(own.sum(axis=1) + 2.0 * root)[:, np.newaxis, np.newaxis]
+        return whole
 
-    def normal(self, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the normal equations of both rows, (n, 2, 4, 4), and the least share of motion.
-
-        The share, (n,), is the smallest fraction of motion in the weighted shaft spectra of any
-        direction of motion, for the worse row. The weights are (n, 2, n_used).
-        """
-        whole = (weight @ self._gram.swapaxes(1, 2)).reshape(-1, 2, N_UNKNOWNS, N_UNKNOWNS)
-        noise = weight @ self._noise.swapaxes(1, 2)
-        share = 1.0 - _largest_share(noise[..., :2], whole[..., :2, :2]).max(axis=1)
-        np.einsum("...ii->...i", whole)[...] -= noise
-        return whole, share
-
-    def moments(self, weight: FloatArray, stiffness_n_per_m: ComplexArray) -> FloatArray:
-        """Return moments of the shaft's motion with the force of brackets, (n, 2, 4, n_brackets).
-
-        `stiffness_n_per_m` holds the dynamic stiffnesses of the brackets, (n, n_brackets, n_used).
-        """
-        weighted = weight[:, :, np.newaxis] * self.cross
-        scaled = np.concatenate([weighted, self.ratio[:, np.newaxis, np.newaxis] * weighted], 2)
-        summed = scaled @ stiffness_n_per_m[:, np.newaxis].swapaxes(-1, -2)
-        return np.concatenate([summed[:, :, :2].real, summed[:, :, 2:].imag], axis=2)
-
-    def force_moments(self, stiffness_n_per_m: ComplexArray) -> FloatArray:
-        """Return the moments of the force of one bracket at each line, (n, 2, 4, n_used)."""
-        force = stiffness_n_per_m[:, np.newaxis, np.newaxis] * self.cross
-        scaled = self.ratio[:, np.newaxis, np.newaxis] * force.imag
-        return np.concatenate([force.real, scaled], axis=2)
-
-    def modelled_power(self, unknowns: FloatArray) -> FloatArray:
-        """Return the power of the film's force for (n, 2, 4) unknowns, (n, 2, n_used)."""
-        squares = unknowns[..., np.newaxis] * unknowns[..., np.newaxis, :]
-        power: FloatArray = squares.reshape(-1, 2, N_UNKNOWNS**2) @ self._gram
-        return power
-
-    def film(self, unknowns: FloatArray) -> ComplexArray:
-        """Return the dynamic stiffness of films, (n, ..., 2, n_used), of (n, ..., 4) unknowns."""
-        ratio = self.ratio.reshape(len(self.ratio), *(1,) * (unknowns.ndim - 1), -1)
-        film = np.empty((*unknowns.shape[:-1], 2, ratio.shape[-1]), dtype=np.complex128)
-        film.real = unknowns[..., :2, np.newaxis]
-        film.imag = ratio * unknowns[..., 2:, np.newaxis]
-        return film
+    @cached_property
+    def smooth_shaft_root(self) -> ComplexArray:
+        """`shaft_root` with the smoothed powers of the shaft's motion, (n, 2, 2, n_used)."""
+        power = own_power(self.shaft)
+        scale = np.sqrt(self.smoothed(power) / power)
+        return np.asarray(scale[:, :, np.newaxis] * self.shaft_root)
 
     def smoothed(self, power: FloatArray) -> FloatArray:
         """Return power spectra (n, n_spectra, n_used), smoothed by regression of the logarithm."""
         smooth: FloatArray = np.exp(np.log(power) @ self.smoothing)
         return smooth
+
+
+class FilmTerms:
+    """Products, at each line, of the terms of which a film consists; they give normal equations.
+
+    The force of a row is a sum of terms ``θ φ(ω) u`` with real coefficients θ, functions φ, and the
+    shaft's motion u in x and y. Coefficients are ordered by function, then by motion.
+
+    Parameters
+    ----------
+    functions : (n, 1, 4, n_used) or (n, 2, 4, n_used)
+        Functions of both rows, or of each; the first are 1 and iω over `omega_unit`.
+    force : (n, 2, 2, n_used)
+        Cross-spectra of the brackets' forces with the shaft's (conjugated) motion.
+    """
+
+    def __init__(self, lines: FilmLines, functions: ComplexArray, force: ComplexArray) -> None:
+        self.lines, self.functions = lines, functions
+        n, n_rows, _, n_used = functions.shape
+        pairs = functions[:, :, PAIRS[0]].conj() * functions[:, :, PAIRS[1]]
+        shaft = lines.shaft.reshape(n, 1, 1, 4, n_used)
+        products = np.empty((n, n_rows, pairs.shape[2], N_PRODUCTS, n_used))
+        np.multiply(pairs.real[..., np.newaxis, :], shaft.real, out=products[..., :4, :])
+        products[..., :4, :] += pairs.imag[..., np.newaxis, :] * shaft.imag
+        products[..., 4, :] = pairs.real
+        self._products = products.reshape(n, n_rows, -1, n_used)
+        with_force = functions[:, :, :, np.newaxis].conj() * force[:, :, np.newaxis]
+        self._moments = with_force.real.reshape(n, 2, -1, n_used)
+
+    def normal(
+        self, weight: FloatArray, n_functions: int = N_FUNCTIONS
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the normal equations of both rows, (n, 2, p, p), and the least share of motion.
+
+        The share, (n,), is the smallest fraction of motion in the weighted shaft spectra of any
+        direction of motion, for the worse row. Where it is below `MIN_SHARE` the equations may be
+        singular and are replaced by the identity. The weights are (n, 2, n_used).
+        """
+        n_products = N_PRODUCTS * n_functions * (n_functions + 1) // 2
+        summed = (self._products[:, :, :n_products] @ weight[..., np.newaxis])[..., 0]
+        by_pair = summed.reshape(*summed.shape[:2], -1, N_PRODUCTS)
+        noise = by_pair[..., 4:] * self.lines.noise_power[:, np.newaxis, np.newaxis]
+        share = 1.0 - _largest_share(noise[:, :, 0], by_pair[:, :, 0, :4]).max(axis=1)
+        by_pair[..., :4:3] -= noise
+        normal = summed[..., PLACES[: 2 * n_functions, : 2 * n_functions]]
+        normal[~(share >= MIN_SHARE)] = np.eye(2 * n_functions)
+        return normal, share
+
+    def moments(self, weight: FloatArray, n_functions: int = N_FUNCTIONS) -> FloatArray:
+        """Return the moments of the terms with the brackets' forces, (n, 2, p)."""
+        summed: FloatArray = self._moments[:, :, : 2 * n_functions] @ weight[..., np.newaxis]
+        return summed[..., 0]
+
+    def residual(self, power: FloatArray, coefficients: FloatArray) -> FloatArray:
+        """Return the power of the residual force, (n, 2, n_used), of films with coefficients.
+
+        The brackets' forces have the `power`, (n, 2, n_used); `coefficients` are (n, 2, p).
+        """
+        n_functions = coefficients.shape[-1] // 2
+        n_products = N_PRODUCTS * n_functions * (n_functions + 1) // 2
+        first, second = FACTORS[:, :n_products]
+        squares = coefficients[..., first] * coefficients[..., second] * MULTIPLES[:n_products]
+        modelled = squares[:, :, np.newaxis] @ self._products[:, :, :n_products]
+        common = coefficients[:, :, np.newaxis] @ self._moments[:, :, : 2 * n_functions]
+        left: FloatArray = power - 2.0 * common[:, :, 0] + modelled[:, :, 0]
+        return np.maximum(left, 0.0)
+
+
+@dataclass(frozen=True)
+class WeightedTerms:
+    """Terms of films with the weights of the lines, (n, 2, n_used), and their sums over lines."""
+
+    terms: FilmTerms
+    weight: FloatArray
+
+    @cached_property
+    def _normal(self) -> tuple[FloatArray, FloatArray]:
+        return self.terms.normal(self.weight)
+
+    @property
+    def normal(self) -> FloatArray:
+        """Normal equations of both rows, (n, 2, 8, 8)."""
+        return self._normal[0]
+
+    @property
+    def signal_share(self) -> FloatArray:
+        """Smallest fraction of motion in the weighted shaft spectra of any direction, (n,)."""
+        return self._normal[1]
+
+    @cached_property
+    def moments(self) -> FloatArray:
+        """Moments of the terms with the brackets' forces, (n, 2, 8)."""
+        return self.terms.moments(self.weight)
 
 
 def _largest_share(part: FloatArray, whole: FloatArray) -> FloatArray:
@@ -171,12 +260,13 @@ def _largest_share(part: FloatArray, whole: FloatArray) -> FloatArray:
     ----------
     part : (..., 2)
         Diagonal of the first, which is diagonal.
-    whole : (..., 2, 2)
-        Second, symmetric.
+    whole : (..., 4)
+        Second, symmetric: xx, xy, yx and yy.
     """
-    x, y = whole[..., 0, 0], whole[..., 1, 1]
-    determinant = x * y - whole[..., 0, 1] ** 2
-    singular = ~(determinant > ROUNDING * x * y)
+    x, y = whole[..., 0], whole[..., 3]
+    product = x * y
+    determinant = product - whole[..., 1] ** 2
+    singular = ~(determinant > ROUNDING * product)
     # largest root of det(part - share · whole) = 0
     mixed = part[..., 0] * y + part[..., 1] * x
     left = part[..., 0] * part[..., 1]
@@ -185,39 +275,37 @@ def _largest_share(part: FloatArray, whole: FloatArray) -> FloatArray:
 
 
 def line_weights(
-    lines: FilmLines, stiffness_n_per_m: ComplexArray
+    terms: FilmTerms, force_power: FloatArray
 ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
     """Return the weights of the lines: reciprocals of the smoothed residual power.
 
-    Fit and weights are iterated. The first weights are the reciprocals of the bearing's power that
-    is incoherent with the shaft, times the coherence.
+    Fit of constant coefficients and weights are iterated. The first weights are the reciprocals of
+    the bearing's power that is incoherent with the shaft, times the coherence.
 
     Parameters
     ----------
-    stiffness_n_per_m : (n, n_used)
-        Dynamic stiffness of the brackets.
+    force_power : (n, 2, n_used)
+        Power of the brackets' forces.
 
     Returns
     -------
     Weights, (n, 2, n_used); and a mask, (n,), of the bearings in which the fraction of motion in
     the shaft spectra was at least `MIN_SHARE` throughout.
     """
-    power = np.abs(stiffness_n_per_m[:, np.newaxis]) ** 2 * lines.bearing_power
-    force, least = lines.force_moments(stiffness_n_per_m), ROUNDING * power
+    lines, least = terms.lines, ROUNDING * force_power
     rest = conditional_power(lines.bearing, lines.shaft, lines.cross) / lines.bearing_power
-    weight = lines.counted * (1.0 - rest) / lines.smoothed(np.maximum(power * rest, least))
-    normal, share = lines.normal(weight)
+    smooth = lines.smoothed(np.maximum(force_power * rest, least))
+    weight = lines.counted * (1.0 - rest) / smooth
+    normal, share = terms.normal(weight, 2)
     moves = share >= MIN_SHARE
     for _ in range(N_ITERATIONS):
         if not moves.any():
             break
-        normal[~moves] = np.eye(N_UNKNOWNS)
-        moment = force @ weight[..., np.newaxis]
-        unknowns = np.asarray(np.linalg.solve(normal, moment)[..., 0], dtype=np.float64)
-        common = (unknowns[..., np.newaxis, :] @ force)[..., 0, :]
-        residual = power - 2.0 * common + lines.modelled_power(unknowns)
+        moments = terms.moments(weight, 2)[..., np.newaxis]
+        unknowns = np.asarray(np.linalg.solve(normal, moments)[..., 0], dtype=np.float64)
+        residual = terms.residual(force_power, unknowns)
         weight = lines.counted / lines.smoothed(np.maximum(residual, least))
-        normal, share = lines.normal(weight)
+        normal, share = terms.normal(weight, 2)
         moves &= share >= MIN_SHARE
     return weight, moves
 

@@ -2,10 +2,13 @@
 
 A film is ``K + iωC + R s(ω)``, with the shape s of `tilt_lag` (decision 37). Given R, the
 unknowns K and C follow from normal equations; R and its lag are estimated from the residual force.
+
+The force of a row depends on the coefficients of this row alone. Whatever is summed over lines is
+therefore a small matrix for each row over its terms: four of K and C, the two lagging parts, the
+lag, and the bracket properties that can change.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
@@ -13,7 +16,7 @@ import numpy as np
 
 from core.arrays import ComplexArray, FloatArray
 from core.spectra.cross_spectrum import CORRELATED_LINES
-from core.stiffness.film_fit import MIN_SHARE, N_UNKNOWNS, ROUNDING, FilmLines
+from core.stiffness.film_fit import N_UNKNOWNS, ROUNDING, FilmLines, FilmTerms, WeightedTerms
 
 TILT_LAG_RAD, TILT_LAG_STD = 0.135, 0.2
 """Prior mean and relative standard deviation of the angle by which the shaft turns during the lag.
@@ -34,13 +37,11 @@ STIFFNESS, MASS, DAMPING, DELAY = range(4)
 """Indices of the bracket properties that can change: relative stiffness, mass in kg, damping in
 N·s/m, and delay of the bearing channels in s."""
 
-LAGS = range(4, 8)
-"""Indices of the parts of a film that lag because its pads tilt, after the bracket properties: from
-x and y to the force in x, then to that in y; in N/m."""
+N_LAGS, N_PARTS = 2, 3
+"""Number of lagging parts of a row, from motion in x and in y, in N/m; and with the deviation of
+the lag from its prior mean, in standard deviations of the prior."""
 
-PARTS = range(4, 10)
-"""Indices of `LAGS` and of the deviations of the lags of the forces in x and in y from their prior
-mean, in standard deviations of the prior."""
+N_TERMS = N_UNKNOWNS + N_PARTS
 
 
 def tilt_lag(
@@ -52,33 +53,34 @@ def tilt_lag(
 
     Parameters
     ----------
-    omega : (n, 1, n_lines)
+    omega : (n, n_lines)
         Angular frequencies.
     deviation : (n, k)
         Deviations of the lag τ from its prior mean, in standard deviations of the prior.
     """
     deviation = np.clip(deviation, -MAX_DEVIATION, MAX_DEVIATION)[..., np.newaxis]
-    lag_s = TILT_LAG_RAD / turn_rad_s * (1.0 + TILT_LAG_STD * deviation)
-    std_s = TILT_LAG_RAD / turn_rad_s * TILT_LAG_STD
+    relative = 1.0 + TILT_LAG_STD * deviation
+    orders = np.empty((len(omega), 1, omega.shape[1] + 1))
+    orders[:, 0, :-1], orders[..., -1] = omega / turn_rad_s, 1.0  # the last is 1×
+    turned = 1j * (TILT_LAG_RAD * relative * orders)
+    share = 1.0 / (1.0 + turned)
+    shape = turned * turned * share
+    slope = shape * (1.0 + share) * (TILT_LAG_STD / relative)
+    return _beside_turn(shape, orders), _beside_turn(slope, orders)
 
-    def beside_turn(shape: Callable[[ComplexArray], ComplexArray]) -> ComplexArray:
-        turns, at_turn = np.asarray(1j * omega * lag_s), shape(np.asarray(1j * turn_rad_s * lag_s))
-        return shape(turns) - at_turn.real - 1j * at_turn.imag * omega / turn_rad_s
 
-    return (
-        beside_turn(lambda turn: turn**2 / (1.0 + turn)),
-        beside_turn(lambda turn: turn**2 * (2.0 + turn) / (1.0 + turn) ** 2 / lag_s * std_s),
-    )
+def _beside_turn(shape: ComplexArray, orders: FloatArray) -> ComplexArray:
+    """Return a dynamic stiffness less the stiffness and damping of its last value, at 1×."""
+    at_turn = shape[..., -1:]
+    return shape[..., :-1] - at_turn.real - 1j * (at_turn.imag * orders[..., :-1])
 
 
 @dataclass(frozen=True)
-class FittedFilms:
-    """Weighted least-squares fits of the films of n bearings.
+class FilmInputs:
+    """Measured lines of n bearings with their brackets, to which films are fitted.
 
     Parameters
     ----------
-    weight : (n, 2, n_used)
-        Weights from `core.stiffness.film_fit.line_weights`.
     bracket_n_per_m : (n, n_used)
         Dynamic stiffness of the brackets.
     changes : (n, 4, n_used)
@@ -92,196 +94,225 @@ class FittedFilms:
         Relative standard uncertainty of each probe's noise power; zero if it is known.
     turn_rad_s
         Angular velocity of the shaft.
-    parts : (n, 6)
-        Estimates of the `PARTS`; zero for a film that is constant over frequency.
-    kept : (n, 1)
-        Probability that the film has `parts`, by which they are multiplied.
     """
 
     lines: FilmLines
-    weight: FloatArray
     bracket_n_per_m: ComplexArray
     changes: ComplexArray
     smear_share: FloatArray
     n_segments: FloatArray
     floor_std: FloatArray
     turn_rad_s: float
-    parts: FloatArray
-    kept: FloatArray
 
     @cached_property
-    def _normal(self) -> tuple[FloatArray, FloatArray]:
-        normal, share = self.lines.normal(self.weight)
-        normal[~(share >= MIN_SHARE)] = np.eye(N_UNKNOWNS)  # may be singular
-        return normal, share
-
-    @property
-    def signal_share(self) -> FloatArray:
-        """Smallest fraction of motion in the weighted shaft spectra of any direction, (n,)."""
-        return self._normal[1]
-
-    @cached_property
-    def _solved(self) -> FloatArray:
-        """Unknowns, and their derivatives with respect to each change, (n, 2, 4, 5)."""
-        brackets = np.concatenate([self.bracket_n_per_m[:, np.newaxis], self.changes], axis=1)
-        moments = self.lines.moments(self.weight, brackets)
-        return np.asarray(np.linalg.solve(self._normal[0], moments), dtype=np.float64)
-
-    @property
-    def unknowns(self) -> FloatArray:
-        """Coefficients (k_i1, k_i2, c_i1, c_i2) of each row, in N/m, (n, 2, 4)."""
-        lagging = self.kept * self.parts[:, : len(LAGS)]
-        shift = np.einsum("npru,np->nru", self.per[:, LAGS], lagging)
-        return np.asarray(self._solved[..., 0] + shift)
-
-    @cached_property
-    def _lag(self) -> tuple[ComplexArray, ComplexArray]:
-        """Dynamic stiffness per unit of a row's `LAGS`, and its derivative, (n, 2, n_used)."""
-        deviation = self.kept * self.parts[:, len(LAGS) :]
-        return tilt_lag(self.lines.omega[:, np.newaxis], self.turn_rad_s, deviation)
-
-    @cached_property
-    def _lagging(self) -> FloatArray:
-        """Lagging parts of the film in N/m, (n, 2, 2, 1)."""
-        return (self.kept * self.parts[:, : len(LAGS)]).reshape(-1, 2, 2, 1)
-
-    @cached_property
-    def _part_films(self) -> ComplexArray:
-        """Dynamic stiffness of a film per unit of each of the `PARTS`, (n, 6, 2, 2, n_used)."""
-        lag, per_deviation = self._lag
-        of_parts = np.zeros((len(lag), len(PARTS), 2, 2, lag.shape[-1]), dtype=np.complex128)
-        for row, column in np.ndindex(2, 2):
-            of_parts[:, 2 * row + column, row, column] = lag[:, row]
-            of_parts[:, len(LAGS) + row, row] = self._lagging[:, row] * per_deviation[:, row, None]
-        return of_parts
-
-    @cached_property
-    def per(self) -> FloatArray:
-        """Derivatives of the unknowns with respect to each change, (n, 10, 2, 4).
-
-        The changes are those of the bracket, and the `PARTS`.
-        """
-        force = times(self._part_films, self._motion[:, np.newaxis])
-        ratio = self.lines.ratio[:, np.newaxis, np.newaxis, np.newaxis]
-        moments = np.concatenate([force.real, ratio * force.imag], axis=3)
-        summed = moments @ self.weight[:, np.newaxis, :, :, np.newaxis]
-        of_parts = -np.linalg.solve(self._normal[0][:, np.newaxis], summed)[..., 0]
-        return np.concatenate([self._solved[..., 1:].transpose(0, 3, 1, 2), of_parts], axis=1)
-
-    @cached_property
-    def film(self) -> ComplexArray:
-        """Dynamic stiffness of the films in N/m, (n, 2, 2, n_used)."""
-        lagging = self._lagging * self._lag[0][:, :, np.newaxis]
-        return self.lines.film(self.unknowns) + lagging
-
-    @cached_property
-    def force_power(self) -> FloatArray:
-        """Power of the brackets' forces in (N/m)² µm², for each row, (n, 2, n_used)."""
-        power = np.abs(self.bracket_n_per_m[:, np.newaxis]) ** 2 * self.lines.bearing_power
-        return np.asarray(power)
-
-    @cached_property
-    def _force(self) -> ComplexArray:
+    def force(self) -> ComplexArray:
         """Cross-spectra of the brackets' forces with the shaft's motion, (n, 2, 2, n_used)."""
         force: ComplexArray = self.bracket_n_per_m[:, np.newaxis, np.newaxis] * self.lines.cross
         return force
 
     @cached_property
-    def residual(self) -> FloatArray:
-        """Power of the residual force in (N/m)² µm², (n, 2, n_used)."""
-        common = (self._force * self.film.conj()).real.sum(axis=2)
-        modelled = (times(self.film, self.lines.shaft) * self.film.conj()).real.sum(axis=2)
-        left: FloatArray = self.force_power - 2.0 * common + modelled
-        return np.maximum(left, 0.0)
+    def force_power(self) -> FloatArray:
+        """Power of the brackets' forces in (N/m)² µm², for each row, (n, 2, n_used)."""
+        squared = self.bracket_n_per_m.real**2 + self.bracket_n_per_m.imag**2
+        power: FloatArray = squared[:, np.newaxis] * self.lines.bearing_power
+        return power
 
     @cached_property
-    def _common(self) -> ComplexArray:
-        """Residual times the shaft's conjugated motion without noise, (n, 2, 2, n_used)."""
-        return self._force - times(self.film, self._motion)
+    def smooth_force_power(self) -> FloatArray:
+        """Smoothed `force_power`, (n, 2, n_used)."""
+        return self.lines.smoothed(self.force_power)
 
     @cached_property
-    def _motion(self) -> ComplexArray:
-        """Cross-spectra of the shaft's motion without the probes' noise, (n, 2, 2, n_used)."""
-        motion = self.lines.shaft.copy()
-        np.einsum("niil->nil", motion)[...] -= self.lines.noise_power[..., np.newaxis]
-        return motion
-
-    @cached_property
-    def _relative(self) -> ComplexArray:
+    def relative(self) -> ComplexArray:
         """Changes relative to the bracket's dynamic stiffness, (n, 4, n_used)."""
         return self.changes / self.bracket_n_per_m[:, np.newaxis]
 
-    @cached_property
-    def _left(self) -> ComplexArray:
-        """Residual per unit of each change in `per` after a new fit, (n, ..., 2, 2, n_used)."""
-        through = -self.lines.film(self.per)
-        through[:, :4] += self._relative[:, :, np.newaxis, np.newaxis] * self.film[:, np.newaxis]
-        through[:, PARTS] -= self._part_films
-        return through
+    @property
+    def size(self) -> FloatArray:
+        """Scale of the covariance of estimates, (n, 1)."""
+        return CORRELATED_LINES / (2.0 * self.n_segments)
+
+    def terms(self, deviation: FloatArray) -> FilmTerms:
+        """Return the terms of films whose lags deviate, (n, 1) or (n, 2), from the prior mean."""
+        lines = self.lines
+        shape, slope = tilt_lag(lines.omega, self.turn_rad_s, deviation)
+        functions = np.empty((*shape.shape[:2], 4, shape.shape[2]), dtype=np.complex128)
+        functions[:, :, 0], functions[:, :, 1] = 1.0, 1j * lines.ratio[:, np.newaxis]
+        functions[:, :, 2], functions[:, :, 3] = shape, slope
+        return FilmTerms(lines, functions, self.force)
+
+
+@dataclass(frozen=True)
+class FittedFilms:
+    """Weighted least-squares fits of the films of n bearings.
+
+    Parameters
+    ----------
+    weighted
+        Terms with the lags of `parts`, and weights of the lines.
+    parts : (n, 2, 3)
+        Estimates of the lagging parts of each row, in N/m, and of the deviation of their lag; zero
+        for a film that is constant over frequency.
+    kept : (n, 1)
+        Probability that the film has `parts`, by which they are multiplied.
+    """
+
+    inputs: FilmInputs
+    weighted: WeightedTerms
+    parts: FloatArray
+    kept: FloatArray
 
     @cached_property
-    def _information(self) -> FloatArray:
-        """Information on the changes in the residual, (n, 10, 10)."""
-        moved = times(self._left, self._motion[:, np.newaxis])
-        moved *= self.weight[:, np.newaxis, :, np.newaxis]
-        return real_product(moved, self._left)
-
-    @cached_property
-    def _prior(self) -> FloatArray:
-        """Information of the prior on the `PARTS`, which is normal about zero, (n, 6)."""
-        direct = np.einsum("nrr->nr", self._solved[:, :, :2, 0])
-        direct = np.hypot(direct, np.einsum("nrr->nr", self._solved[:, :, 2:, 0]))
-        of_lags = np.repeat(1.0 / (LAG_PRIOR * direct) ** 2, 2, axis=1)
-        return np.concatenate([of_lags, np.ones_like(direct)], axis=1)
+    def kept_parts(self) -> FloatArray:
+        """Parts times the probability that the film has them, (n, 2, 3)."""
+        return self.kept[..., np.newaxis] * self.parts
 
     @property
-    def _size(self) -> FloatArray:
-        """Scale of the covariance of estimates, (n, 1, 1)."""
-        return CORRELATED_LINES / (2.0 * self.n_segments[..., np.newaxis])
+    def weight(self) -> FloatArray:
+        """Weights of the lines, (n, 2, n_used)."""
+        return self.weighted.weight
 
     @cached_property
-    def of_parts(self) -> tuple[FloatArray, FloatArray]:
-        """Mean, (n, 6), and covariance, (n, 6, 6), of the `PARTS` by spectra and prior."""
-        return self.posterior(PARTS)[:2]
+    def _of_terms(self) -> FloatArray:
+        """Functions with which each term begins, (n, 2, 8, 7)."""
+        of_terms = np.zeros((len(self.parts), 2, 8, N_TERMS))
+        of_terms[..., : N_TERMS - 1] = np.eye(8)[:, : N_TERMS - 1]
+        of_terms[..., 6:, N_TERMS - 1] = self.kept_parts[..., :N_LAGS]
+        return of_terms
+
+    @cached_property
+    def gram(self) -> FloatArray:
+        """Weighted products of the terms of each row, (n, 2, 7, 7)."""
+        product: FloatArray = self._of_terms.swapaxes(2, 3) @ self.weighted.normal @ self._of_terms
+        return product
+
+    @cached_property
+    def solved(self) -> FloatArray:
+        """Unknowns of constant coefficients, and per unit of the parts' force, (n, 2, 4, 4)."""
+        normal, moments = self.weighted.normal, self.weighted.moments
+        right = np.empty((len(normal), 2, N_UNKNOWNS, 1 + N_PARTS))
+        right[..., 0] = moments[..., :N_UNKNOWNS]
+        right[..., 1:] = self.gram[..., :N_UNKNOWNS, N_UNKNOWNS:]
+        solved = np.linalg.solve(normal[..., :N_UNKNOWNS, :N_UNKNOWNS], right)
+        return np.asarray(solved, dtype=np.float64)
+
+    @property
+    def per_part(self) -> FloatArray:
+        """Derivatives of the unknowns of a row with respect to its parts, (n, 2, 4, 3)."""
+        return -self.solved[..., 1:]
+
+    @property
+    def unknowns(self) -> FloatArray:
+        """Coefficients (k_i1, k_i2, c_i1, c_i2) of each row, in N/m, (n, 2, 4)."""
+        return self.coefficients[..., :N_UNKNOWNS]
+
+    @cached_property
+    def coefficients(self) -> FloatArray:
+        """Coefficients of the film's six terms: unknowns and lagging parts, (n, 2, 6)."""
+        lags = self.kept_parts[..., :N_LAGS]
+        shift = (self.solved[..., 1 : 1 + N_LAGS] @ lags[..., np.newaxis])[..., 0]
+        return np.concatenate([self.solved[..., 0] - shift, lags], axis=2)
+
+    @cached_property
+    def film(self) -> ComplexArray:
+        """Dynamic stiffness of the films in N/m, (n, 2, 2, n_used)."""
+        functions = self.weighted.terms.functions.view(np.float64)[:, :, :3]
+        by_motion = self.coefficients.reshape(-1, 2, 3, 2).swapaxes(2, 3)
+        return np.asarray(by_motion @ functions).view(np.complex128)
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Power of the residual force in (N/m)² µm², (n, 2, n_used)."""
+        return self.weighted.terms.residual(self.inputs.force_power, self.coefficients)
+
+    @cached_property
+    def moved(self) -> ComplexArray:
+        """Cross-spectra of the films' forces with the shaft's motion, (n, 2, 2, n_used)."""
+        return times(self.film, self.inputs.lines.motion)
+
+    @cached_property
+    def common(self) -> ComplexArray:
+        """Residual times the shaft's conjugated motion without noise, (n, 2, 2, n_used)."""
+        return self.inputs.force - self.moved
+
+    @cached_property
+    def left(self) -> FloatArray:
+        """Moments of the residual with the terms of each row, (n, 2, 7)."""
+        modelled = self.weighted.normal[..., :6] @ self.coefficients[..., np.newaxis]
+        rest = self.weighted.moments[..., np.newaxis] - modelled
+        return np.asarray((self._of_terms.swapaxes(2, 3) @ rest)[..., 0])
+
+    @cached_property
+    def _parts_information(self) -> FloatArray:
+        """Information on the parts of each row in the residual, (n, 2, 3, 3)."""
+        to_parts, own = self.gram[..., N_UNKNOWNS:, :N_UNKNOWNS], self.gram[..., 4:, 4:]
+        information: FloatArray = own - to_parts @ self.solved[..., 1:]
+        return information / self.inputs.size[..., np.newaxis, np.newaxis]
+
+    @cached_property
+    def prior(self) -> FloatArray:
+        """Information of the prior on the parts, which is normal about zero, (n, 2, 3)."""
+        direct = np.hypot(
+            np.einsum("nrr->nr", self.solved[:, :, :2, 0]),
+            np.einsum("nrr->nr", self.solved[:, :, 2:, 0]),
+        )
+        prior = np.ones((*direct.shape, N_PARTS))
+        prior[..., :N_LAGS] = 1.0 / (LAG_PRIOR * direct[..., np.newaxis]) ** 2
+        return prior
+
+    @cached_property
+    def of_lags(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Mean, covariance and significance of the lagging parts by spectra and prior."""
+        return self._posterior(N_LAGS)
+
+    @cached_property
+    def of_parts(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Mean, covariance and significance of all parts by spectra and prior."""
+        return self._posterior(N_PARTS)
 
     def constant_odds(self) -> FloatArray:
-        """Return the ratio of the marginal likelihoods of no `LAGS` and of any, (n,)."""
-        _, covariance, significance = self.posterior(LAGS)
-        prior = self._prior[:, np.newaxis, : len(LAGS)]
-        shrinkage = np.linalg.slogdet(covariance * prior)[1]
-        return np.asarray(np.exp(-0.5 * (significance + shrinkage)))
+        """Return the ratio of the marginal likelihoods of no lagging parts and of any, (n,)."""
+        _, covariance, significance = self.of_lags
+        shrinkage = np.linalg.slogdet(covariance * self.prior[..., np.newaxis, :N_LAGS])[1]
+        return np.asarray(np.exp(-0.5 * (significance + shrinkage.sum(axis=1))))
 
-    def posterior(self, fitted: range) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return mean, covariance and significance of `LAGS` or `PARTS` by spectra and prior.
+    def _posterior(self, n_parts: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return mean, covariance and significance of the first parts of each row.
 
         Returns
         -------
-        Mean, (n, p); covariance, (n, p, p); and the squared significance beside none, (n,), if the
-        film has none: chi-squared with four degrees of freedom.
+        Mean, (n, 2, p); covariance, (n, 2, p, p); and the squared significance beside none, (n,),
+        if the film has none: chi-squared with four degrees of freedom.
         """
-        places = range(len(fitted))
-        common = self.weight[:, :, np.newaxis] * self._common
-        score = -real_product(self._left[:, fitted], common[:, np.newaxis]) / self._size
-        information = self._information[:, fitted][..., fitted] / self._size
-        prior = self._prior[:, places, np.newaxis] * np.eye(len(fitted))
-        covariance = np.asarray(np.linalg.inv(information + prior), dtype=np.float64)
-        old = (self.kept * self.parts)[:, places, np.newaxis]
-        mean = (covariance @ (score + information @ old))[..., 0]
-        significance = (score.swapaxes(1, 2) @ covariance @ score)[:, 0, 0]
-        return mean, covariance, significance
+        fitted = slice(N_UNKNOWNS, N_UNKNOWNS + n_parts)
+        score = (self.left[..., fitted] / self.inputs.size[..., np.newaxis])[..., np.newaxis]
+        information = self._parts_information[..., :n_parts, :n_parts]
+        precision = information.copy()
+        np.einsum("...ii->...i", precision)[...] += self.prior[..., :n_parts]
+        covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
+        mean = covariance @ (score + information @ self.kept_parts[..., :n_parts, np.newaxis])
+        significance = (score * (covariance @ score)).sum(axis=(1, 2, 3))
+        return mean[..., 0], covariance, significance
 
-    def with_parts(self, kept: FloatArray, fitted: range) -> Self:
-        """Return fits with a share (n, 1) of their `LAGS` or `PARTS`, and with their weights."""
-        fits = self
+    def with_parts(self, kept: FloatArray, n_parts: int) -> Self:
+        """Return fits with a share (n, 1) of the first parts of each row, and their weights."""
+        fits, inputs = self, self.inputs
+        any_kept = kept[..., np.newaxis] > 0.0
         for iteration in range(N_REWEIGHTED + 1 if kept.any() else 0):
             parts = self.parts.copy()
-            parts[:, : len(fitted)] = fits.posterior(fitted)[0]
-            fits = replace(fits, parts=np.where(kept > 0.0, parts, 0.0), kept=kept)
+            found = fits.of_lags if n_parts == N_LAGS else fits.of_parts
+            parts[..., :n_parts] = found[0]
+            parts = np.where(any_kept, parts, 0.0)
+            weighted = fits.weighted
+            if n_parts == N_PARTS:
+                terms = inputs.terms(kept * parts[..., N_LAGS])
+                weighted = WeightedTerms(terms, weighted.weight)
+            fits = type(self)(inputs, weighted, parts, kept)
             if iteration < N_REWEIGHTED:
-                least = ROUNDING * fits.force_power
-                weight = fits.lines.counted / fits.lines.smoothed(np.maximum(fits.residual, least))
-                weight = np.where(kept[..., np.newaxis] > 0.0, weight, self.weight)
-                fits = replace(fits, weight=weight)
+                least = ROUNDING * inputs.force_power
+                smooth = inputs.lines.smoothed(np.maximum(fits.residual, least))
+                weight = np.where(any_kept, inputs.lines.counted / smooth, self.weight)
+                fits = type(self)(inputs, WeightedTerms(weighted.terms, weight), parts, kept)
         return fits
 
 
@@ -289,11 +320,3 @@ def times(first: ComplexArray, second: ComplexArray) -> ComplexArray:
     """Return the products of (..., n, 2, n_lines) and (..., 2, 2, n_lines) matrices."""
     x, y = first[..., 0, np.newaxis, :], first[..., 1, np.newaxis, :]
     return x * second[..., np.newaxis, 0, :, :] + y * second[..., np.newaxis, 1, :, :]
-
-
-def real_product(first: ComplexArray, second: ComplexArray) -> FloatArray:
-    """Return the real inner products of p and q arrays of each bearing, (n, p, q)."""
-    p, q = (np.ascontiguousarray(array) for array in (first, second))
-    parts = [array.reshape(*array.shape[:2], -1).view(np.float64) for array in (p, q)]
-    product: FloatArray = parts[0] @ parts[1].swapaxes(1, 2)
-    return product
