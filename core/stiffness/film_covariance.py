@@ -2,9 +2,8 @@
 
 Every estimate is a linear function of ``Σ_lines w Σ_segments conj(f u) e``, with the weight w of a
 line, the residual force e, and the influence f of the shaft's motion u on the estimate. All
-influences are sums of the same nine: the four regressors of a film, the effects of the bracket's
-`FITTED` properties through the film, the two lagging motions, and the effect of their lag. Their
-covariance is therefore calculated once.
+influences of a row are sums of its terms (`core.stiffness.fitted_films`) with the effects of the
+bracket's properties through the film.
 """
 
 from collections.abc import Sequence
@@ -151,15 +150,17 @@ class FilmFits(FittedFilms):
         through = np.zeros((len(self.parts), 2, 10, N_TERMS + N_CHANGES))
         through[:, :, :N_CHANGES, :N_UNKNOWNS] = -self.per_change.swapaxes(2, 3)
         through[:, :, :N_CHANGES, CHANGES] = np.eye(N_CHANGES)
-        own = np.concatenate([self.solved[..., 1:].swapaxes(2, 3), self._own_parts], axis=3)
         for row, of_row in enumerate(OF_ROW):
-            through[:, row, of_row[N_CHANGES:], :N_TERMS] = own[:, row]
+            through[:, row, of_row[N_CHANGES:], :N_TERMS] = self._part_sensitivity[:, row]
         return through
 
     @cached_property
-    def _own_parts(self) -> FloatArray:
-        """Residual force of the parts of a row, per unit of each, (n, 2, 3, 3)."""
-        return np.zeros((len(self.parts), 2, 1, 1)) - np.eye(N_PARTS)
+    def _part_sensitivity(self) -> FloatArray:
+        """Residual per unit of each part of a row after a new fit, by its terms, (n, 2, 3, 7)."""
+        through = np.empty((len(self.parts), 2, N_PARTS, N_TERMS))
+        through[..., :N_UNKNOWNS] = self.solved[..., 1:].swapaxes(2, 3)
+        through[..., N_UNKNOWNS:] = -np.eye(N_PARTS)
+        return through
 
     @cached_property
     def _information(self) -> FloatArray:
@@ -238,8 +239,8 @@ class FilmFits(FittedFilms):
         """Return the covariance of the films' unknowns with the kept parts, (n, 2, 4, 4) by row."""
         kept = (self.kept / self.inputs.size)[..., np.newaxis, np.newaxis]
         steps = kept * self.per_part @ self.of_parts[1]
-        of_parts = np.concatenate([self.solved[..., 1:].swapaxes(2, 3), self._own_parts], axis=3)
-        covariance, slope = self._spread(self._inverse_normal - steps @ of_parts)
+        weights = self._inverse_normal - steps @ self._part_sensitivity
+        covariance, slope = self._spread(weights)
         return covariance + slope @ slope.swapaxes(2, 3)
 
     def film_covariance_with(self, fitted: Sequence[int]) -> FloatArray:
@@ -300,7 +301,8 @@ class FilmFits(FittedFilms):
         # per unit of noise power
         weighted = (self.weight[:, :, np.newaxis] * self.film)[:, :, np.newaxis]
         products = influence.view(np.float64) * weighted.view(np.float64)
-        slope = products.sum(axis=-1) * (lines.noise_power * self.inputs.floor_std)[:, None, None]
+        floor = lines.noise_power * self.inputs.floor_std
+        slope = products.sum(axis=-1) * floor[:, np.newaxis, np.newaxis]
         return covariance, slope
 
     @cached_property

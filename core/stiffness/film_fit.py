@@ -203,7 +203,9 @@ class FilmTerms:
         share = 1.0 - _largest_share(noise[:, :, 0], by_pair[:, :, 0, :4]).max(axis=1)
         by_pair[..., :4:3] -= noise
         normal = summed[..., PLACES[: 2 * n_functions, : 2 * n_functions]]
-        normal[~(share >= MIN_SHARE)] = np.eye(2 * n_functions)
+        singular = ~(share >= MIN_SHARE)
+        if singular.any():
+            normal[singular] = np.eye(2 * n_functions)
         return normal, share
 
     def moments(self, weight: FloatArray, n_functions: int = N_FUNCTIONS) -> FloatArray:
