@@ -161,7 +161,7 @@ class FilmLines:
 
 
 class FilmTerms:
-    """Products, at each line, of the terms of which a film consists; they give normal equations.
+    """Products, at each line, of the terms of films, for the normal equations of the fits.
 
     The force of a row is a sum of terms ``θ φ(ω) u`` with real coefficients θ, functions φ, and the
     shaft's motion u in x and y. Coefficients are ordered by function, then by motion.
