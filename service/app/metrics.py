@@ -40,7 +40,7 @@ async def measuring_metrics(
     add_samples(families, live, units, sources, now_ns)
     add_units(families, live, units)
     add_films(families, live, analysis.films.newest, units)
-    add_alarms(families, analysis.alarms, list(units))
+    add_alarms(families, analysis.alarms.alarms, analysis.alarms.count(), list(units))
     add_store(families, bus, analysis.recorder, live)
     add_integrity(families, analysis.soundness)
     add_disks(families, analysis.space)

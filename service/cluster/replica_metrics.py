@@ -41,7 +41,7 @@ async def replica_metrics(
         families.add("unit_silence_seconds", units.silence_s(unit), unit=unit)
     add_units(families, units, bearings)
     add_films(families, units, live.films.newest, bearings)
-    add_alarms(families, live.alarms, list(bearings))
+    add_alarms(families, live.alarms.alarms, live.alarms.count(), list(bearings))
     add_deliveries(families, receivers, clock.now_ns())
     families.include(ProcessCollector(registry=None))
     return families.text

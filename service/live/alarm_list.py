@@ -1,12 +1,14 @@
-"""`AlarmList`: list of all alarms for API, metrics and reports, and numbers of alarms by state."""
+"""List of all alarms in the serving process, and numbers of alarms by state."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState
+from pydantic import ConfigDict
+
+from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmState
 from core.alarms.statistics import ChatterRule
 from core.limits import AlarmLevel
+from service.live.snapshot import UnitSnapshot
 from service.settings.alarm_kinds import ANALYSIS_GONE, SAMPLES_LOST
 
 HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
@@ -14,31 +16,30 @@ HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 
 @dataclass(frozen=True)
 class AlarmCount:
-    """Numbers of alarms by state.
+    """Counts of alarms by state."""
 
-    Parameters
-    ----------
-    n_active
-        Number of active alarms that are not hidden.
-    n_danger
-        Number of active alarms at danger level that are not hidden.
-    n_unacknowledged
-        Number of alarms that are not hidden and whose newest occurrence is not acknowledged.
-    n_hidden
-        Number of alarms that are shelved, suppressed or out of service.
-    n_unjudged
-        Number of alarms that are neither active nor hidden, and whose condition is now unknown.
-    """
+    __pydantic_config__ = ConfigDict(
+        extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
+    )
 
     n_active: int
+    """Number of active alarms that are not hidden (shelved, suppressed or out of service)."""
+
     n_danger: int
+    """Number of these active alarms whose level is danger."""
+
     n_unacknowledged: int
+    """Number of alarms that are not hidden and whose newest occurrence is unacknowledged."""
+
     n_hidden: int
+    """Number of alarms that are shelved, suppressed or out of service."""
+
     n_unjudged: int
+    """Number of alarms that are neither active nor hidden and whose condition is unknown."""
 
 
 def count_of(alarms: Sequence[Alarm], is_judged: Callable[[Alarm], bool]) -> AlarmCount:
-    """Return the numbers of alarms by state; `is_judged` as in `AlarmList`."""
+    """Return the numbers of alarms by state; `is_judged` is whether a condition is known now."""
     shown = [alarm for alarm in alarms if alarm.state not in HIDDEN]
     return AlarmCount(
         n_active=sum(alarm.level is not None for alarm in shown),
@@ -47,41 +48,6 @@ def count_of(alarms: Sequence[Alarm], is_judged: Callable[[Alarm], bool]) -> Ala
         n_hidden=len(alarms) - len(shown),
         n_unjudged=sum(a.level is None and not is_judged(a) for a in shown),
     )
-
-
-class AlarmList(Protocol):
-    """List of all alarms: the `AlarmEngine` of this process, or reports of other processes."""
-
-    @property
-    def revision(self) -> int:
-        """Revision number of the list; changes whenever an alarm changes."""
-        ...
-
-    @property
-    def chatter_rule(self) -> ChatterRule:
-        """Number of occurrences, and the time within which they make an alarm chattering."""
-        ...
-
-    @property
-    def alarms(self) -> Sequence[Alarm]:
-        """All alarms in all states, including hidden ones."""
-        ...
-
-    def alarm(self, id_: str) -> Alarm:
-        """Return the alarm with an id; raise `LookupError` if it does not exist."""
-        ...
-
-    def is_judged(self, alarm: Alarm) -> bool:
-        """Return whether the condition of an alarm is known now."""
-        ...
-
-    def is_chattering(self, alarm: Alarm) -> bool:
-        """Return whether an alarm was recently raised too often, by `chatter_rule`."""
-        ...
-
-    def count(self) -> AlarmCount:
-        """Return the numbers of alarms by state."""
-        ...
 
 
 SHARED = "shared work"
@@ -96,3 +62,108 @@ def is_shared(alarm: Alarm) -> bool:
 def reporting_unit(identity: AlarmIdentity) -> str:
     """Return the unit whose process reports an alarm: for lost samples, the alarm's subject."""
     return identity.subject if identity.kind == SAMPLES_LOST else identity.unit
+
+
+ShownAlarm = tuple[Alarm, bool, bool]
+"""Alarm, whether its condition is known, and whether it is chattering."""
+
+
+class LiveAlarms:
+    """List of all alarms, from reports and from the database.
+
+    While no reports on a unit arrive, the conditions of its alarms are unknown.
+    """
+
+    def __init__(
+        self, units: Iterable[str], is_alive: Callable[[str], bool], chatter_rule: ChatterRule
+    ) -> None:
+        self._units = frozenset(units)
+        self._is_alive, self.chatter_rule = is_alive, chatter_rule
+        self._alarms: dict[str, dict[str, Alarm]] = {}
+        self._judged: dict[str, frozenset[str]] = {}
+        self._chattering: dict[str, frozenset[str]] = {}
+        self._alive: dict[str, bool] = {}
+        self._shown: dict[str, Sequence[ShownAlarm]] = {}
+        self._revision = 0
+
+    @property
+    def revision(self) -> int:
+        """Counter that increases with every change of `shown`."""
+        for unit, was_alive in self._alive.items():
+            if self._is_alive(unit) != was_alive:  # a unit falls silent without a report
+                self._show(unit)
+        return self._revision
+
+    @property
+    def shown(self) -> Sequence[Alarm]:
+        """Alarms that are not normal, and normal alarms whose condition is unknown."""
+        return [alarm for shown in self._shown.values() for alarm, *_ in shown]
+
+    def take(self, unit: str, state: UnitSnapshot) -> None:
+        """Apply the alarms of a reported unit state."""
+        self._judged[unit], self._chattering[unit] = state.judged, state.chattering
+        # a process may still have alarms of units for which another process is now responsible
+        self._keep(alarm for alarm in state.alarms if self._owner(alarm) == unit)
+        self._show(unit)
+
+    def take_stored(self, alarms: Iterable[Alarm]) -> None:
+        """Apply stored alarms that are at least as new as the alarms in memory."""
+        for unit in self._keep(alarms):
+            self._show(unit)
+
+    def _keep(self, alarms: Iterable[Alarm]) -> set[str]:
+        """Keep alarms that are at least as new as those in memory; return their units."""
+        units = set()
+        for alarm in alarms:
+            units.add(unit := self._owner(alarm))
+            of_unit = self._alarms.setdefault(unit, {})
+            held = of_unit.get(alarm.identity.id)
+            if held is None or alarm.n_events >= held.n_events:
+                of_unit[alarm.identity.id] = alarm
+        return units
+
+    def _show(self, unit: str) -> None:
+        self._alive[unit] = self._is_alive(unit)
+        known = ((a, self.is_judged(a), self.is_chattering(a)) for a in self._of(unit))
+        shown = [each for each in known if each[0].state is not AlarmState.NORMAL or not each[1]]
+        self._revision += shown != self._shown.get(unit, [])
+        self._shown[unit] = shown
+
+    def _of(self, unit: str) -> Sequence[Alarm]:
+        return list(self._alarms.get(unit, {}).values())
+
+    @property
+    def alarms(self) -> Sequence[Alarm]:
+        """All alarms, in any state."""
+        return [alarm for unit in list(self._alarms) for alarm in self._of(unit)]
+
+    def alarm(self, id_: str) -> Alarm:
+        """Return the alarm with an id; raise `LookupError` if it does not exist."""
+        found = (alarms[id_] for alarms in self._alarms.values() if id_ in alarms)
+        alarm = next(found, None)
+        if alarm is None:
+            raise LookupError(id_)
+        return alarm
+
+    def is_judged(self, alarm: Alarm) -> bool:
+        """Return whether the condition of an alarm is known now according to the latest report."""
+        unit = self._owner(alarm)
+        return self._is_alive(unit) and alarm.identity.id in self._judged.get(unit, ())
+
+    def is_chattering(self, alarm: Alarm) -> bool:
+        """Return whether an alarm is chattering according to the latest report."""
+        return alarm.identity.id in self._chattering.get(self._owner(alarm), ())
+
+    def owner(self, id_: str) -> str:
+        """Return the unit whose process updates an alarm; raise `LookupError` for an unknown id."""
+        return self._owner(self.alarm(id_))
+
+    def _owner(self, alarm: Alarm) -> str:
+        if is_shared(alarm):
+            return SHARED
+        unit = reporting_unit(alarm.identity)
+        return unit if unit in self._units else PLANT
+
+    def count(self) -> AlarmCount:
+        """Return the numbers of active, unacknowledged, hidden and unjudged alarms."""
+        return count_of(self.shown, self.is_judged)

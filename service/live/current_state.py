@@ -1,4 +1,4 @@
-"""Present state of units, films and alarms in the serving process, from received reports."""
+"""Present state of units and films in the serving process, from received reports."""
 
 import asyncio
 import json
@@ -7,8 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from acquisition.clock import Clock
-from core.alarms.alarm import PLANT, Alarm, AlarmState
-from core.alarms.statistics import ChatterRule
+from core.alarms.alarm import PLANT
 from core.baseline.baseline import BearingBaseline
 from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules
@@ -17,7 +16,7 @@ from core.quality import Reason
 from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import NO_SPECTRUM
 from core.units import NS_PER_S, ns_from_s
-from service.live.alarm_list import SHARED, AlarmCount, count_of, is_shared, reporting_unit
+from service.live.alarm_list import SHARED
 from service.live.commands import FilmPlace, NotAvailableError
 from service.live.exchange import MeasuringGoneError
 from service.live.snapshot import BearingSnapshot, UnitLink, UnitSnapshot
@@ -417,108 +416,3 @@ class LiveFilms:
             fetched = self._held(unit, state)
         others = {key: held for key, held in self._baselines.items() if key[0] != unit}
         self._baselines = others | {(unit, b): found for b, found in fetched.items()}
-
-
-ShownAlarm = tuple[Alarm, bool, bool]
-"""Alarm, whether its condition is known, and whether it is chattering."""
-
-
-class LiveAlarms:
-    """List of all alarms, from reports and from the database.
-
-    While no reports on a unit arrive, the conditions of its alarms are unknown.
-    """
-
-    def __init__(
-        self, units: Iterable[str], is_alive: Callable[[str], bool], chatter_rule: ChatterRule
-    ) -> None:
-        self._units = frozenset(units)
-        self._is_alive, self.chatter_rule = is_alive, chatter_rule
-        self._alarms: dict[str, dict[str, Alarm]] = {}
-        self._judged: dict[str, frozenset[str]] = {}
-        self._chattering: dict[str, frozenset[str]] = {}
-        self._alive: dict[str, bool] = {}
-        self._shown: dict[str, Sequence[ShownAlarm]] = {}
-        self._revision = 0
-
-    @property
-    def revision(self) -> int:
-        """Counter that increases with every change of `shown`."""
-        for unit, was_alive in self._alive.items():
-            if self._is_alive(unit) != was_alive:  # a unit falls silent without a report
-                self._show(unit)
-        return self._revision
-
-    @property
-    def shown(self) -> Sequence[Alarm]:
-        """Alarms that are not normal, and normal alarms whose condition is unknown."""
-        return [alarm for shown in self._shown.values() for alarm, *_ in shown]
-
-    def take(self, unit: str, state: UnitSnapshot) -> None:
-        """Apply the alarms of a reported unit state."""
-        self._judged[unit], self._chattering[unit] = state.judged, state.chattering
-        # a process may still have alarms of units for which another process is now responsible
-        self._keep(alarm for alarm in state.alarms if self._owner(alarm) == unit)
-        self._show(unit)
-
-    def take_stored(self, alarms: Iterable[Alarm]) -> None:
-        """Apply stored alarms that are at least as new as the alarms in memory."""
-        for unit in self._keep(alarms):
-            self._show(unit)
-
-    def _keep(self, alarms: Iterable[Alarm]) -> set[str]:
-        """Keep alarms that are at least as new as those in memory; return their units."""
-        units = set()
-        for alarm in alarms:
-            units.add(unit := self._owner(alarm))
-            of_unit = self._alarms.setdefault(unit, {})
-            held = of_unit.get(alarm.identity.id)
-            if held is None or alarm.n_events >= held.n_events:
-                of_unit[alarm.identity.id] = alarm
-        return units
-
-    def _show(self, unit: str) -> None:
-        self._alive[unit] = self._is_alive(unit)
-        known = ((a, self.is_judged(a), self.is_chattering(a)) for a in self._of(unit))
-        shown = [each for each in known if each[0].state is not AlarmState.NORMAL or not each[1]]
-        self._revision += shown != self._shown.get(unit, [])
-        self._shown[unit] = shown
-
-    def _of(self, unit: str) -> Sequence[Alarm]:
-        return list(self._alarms.get(unit, {}).values())
-
-    @property
-    def alarms(self) -> Sequence[Alarm]:
-        """All alarms, in any state."""
-        return [alarm for unit in list(self._alarms) for alarm in self._of(unit)]
-
-    def alarm(self, id_: str) -> Alarm:
-        """Return the alarm with an id; raise `LookupError` if it does not exist."""
-        found = (alarms[id_] for alarms in self._alarms.values() if id_ in alarms)
-        alarm = next(found, None)
-        if alarm is None:
-            raise LookupError(id_)
-        return alarm
-
-    def is_judged(self, alarm: Alarm) -> bool:
-        """Return whether the condition of an alarm is known now according to the latest report."""
-        unit = self._owner(alarm)
-        return self._is_alive(unit) and alarm.identity.id in self._judged.get(unit, ())
-
-    def is_chattering(self, alarm: Alarm) -> bool:
-        """Return whether an alarm is chattering according to the latest report."""
-        return alarm.identity.id in self._chattering.get(self._owner(alarm), ())
-
-    def owner(self, id_: str) -> str:
-        """Return the unit whose process updates an alarm; raise `LookupError` for an unknown id."""
-        return self._owner(self.alarm(id_))
-
-    def _owner(self, alarm: Alarm) -> str:
-        if is_shared(alarm):
-            return SHARED
-        unit = reporting_unit(alarm.identity)
-        return unit if unit in self._units else PLANT
-
-    def count(self) -> AlarmCount:
-        """Return the numbers of active, unacknowledged, hidden and unjudged alarms."""
-        return count_of(self.shown, self.is_judged)

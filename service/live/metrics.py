@@ -2,15 +2,15 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol
 
-from core.alarms.alarm import PLANT
+from core.alarms.alarm import PLANT, Alarm
 from core.change.decision import JUDGED, Verdict
 from core.change.film_judge import FilmNews
 from core.limits import AlarmLevel
 from core.quality import Level
-from service.live.alarm_list import HIDDEN, AlarmList
+from service.live.alarm_list import HIDDEN, AlarmCount
 from service.live.status import CurrentBearing, LinkState, UnitStatus
 from service.runtime.metrics import Families
 
@@ -138,19 +138,20 @@ ALARMS = {
 }
 
 
-def add_alarms(families: Families, alarms: AlarmList, units: Sequence[str]) -> None:
+def add_alarms(
+    families: Families, alarms: Iterable[Alarm], count: AlarmCount, units: Sequence[str]
+) -> None:
     """Add the numbers of alarms, as on the dashboard; alarms of unknown units count as `plant`."""
     families.declare(ALARMS)
     found = Counter(
         (alarm.identity.unit if alarm.identity.unit in units else PLANT, alarm.level)
-        for alarm in alarms.alarms
+        for alarm in alarms
         if alarm.level is not None and alarm.state not in HIDDEN
     )
     for unit in (*units, PLANT):
         for level in AlarmLevel:
             priority = level.name.lower()
             families.add("alarms_active", found[unit, level], unit=unit, priority=priority)
-    count = alarms.count()
     families.add("alarms_unacknowledged", count.n_unacknowledged)
     families.add("alarms_hidden", count.n_hidden)
     families.add("alarms_unjudged", count.n_unjudged)

@@ -5,6 +5,7 @@ from abc import ABC, abstractmethod
 
 from core.alarms.alarm import Alarm
 from core.alarms.operation import Action, ActionRefusedError
+from service.live.alarm_list import LiveAlarms
 from service.live.commands import (
     AlarmCommand,
     BaselineAction,
@@ -16,7 +17,6 @@ from service.live.commands import (
     ReferenceRefusedError,
     TakeReference,
 )
-from service.live.current_state import LiveAlarms
 from service.store.notes import Note
 from service.store.references import SetVectorReference
 from service.store.sharing import Answer, CommandState

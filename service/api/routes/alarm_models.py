@@ -21,7 +21,8 @@ from service.api.values import (
     cell_of,
     condition_model,
 )
-from service.live.current_state import LiveAlarms, LiveFilms
+from service.live.alarm_list import AlarmCount, LiveAlarms
+from service.live.current_state import LiveFilms
 from service.settings.alarm_kinds import LEVEL_NAMES, AlarmKindName, AlarmLevelName, value_unit
 from service.settings.storage import Origin
 from service.store.port import StoredEvent, ValueRange
@@ -160,32 +161,13 @@ class AlarmModel(ApiModel):
     """Current period out of service; null if the alarm is in service."""
 
 
-class AlarmCountModel(ApiModel):
-    """Counts of alarms by state."""
-
-    n_active: int
-    """Number of active alarms that are not hidden (shelved, suppressed or out of service)."""
-
-    n_danger: int
-    """Number of these active alarms whose level is danger."""
-
-    n_unacknowledged: int
-    """Number of alarms that are not hidden and whose newest occurrence is unacknowledged."""
-
-    n_hidden: int
-    """Number of alarms that are shelved, suppressed or out of service."""
-
-    n_unjudged: int
-    """Number of alarms that are neither active nor hidden and whose condition is unknown."""
-
-
 class AlarmListModel(ApiModel):
     """List of alarms that are not normal, and of normal alarms whose condition is unknown."""
 
     origin: OriginName
     """Origin of the data: live, or replay of a recording."""
 
-    count: AlarmCountModel
+    count: AlarmCount
     """Counts of alarms by state."""
 
     alarms: list[AlarmModel]

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from service.api.parameters import Moment
+from service.api.routes.learning import LearningModel
 from service.api.values import (
     ActorModel,
     ApiModel,
@@ -78,51 +79,6 @@ class BaselineStepModel(ApiModel):
 
     event_time: Time | None
     """For "renewed", time of the machine event; earlier readings are not used."""
-
-
-class ReadingCountsModel(ApiModel):
-    """Counts of recent film readings, which show why a film is not learned or judged."""
-
-    days: Annotated[float, Field(examples=[7.0])]
-    """Length of the period whose readings are counted, days."""
-
-    n_at_speed: Annotated[int, Field(examples=[180])]
-    """Number of readings at rated speed."""
-
-    n_settled: Annotated[int, Field(examples=[0])]
-    """Number of these readings in a settled operating state after the warm-up of the film."""
-
-    n_complete: int
-    """Number of settled readings with stiffness, eccentricity and oil temperature, in x or y,
-    whichever has fewer."""
-
-    n_judged: int
-    """Number of complete readings with a verdict on the film, in x or y, whichever has fewer."""
-
-
-class LearningModel(ApiModel):
-    """Progress of learning the baseline of a bearing."""
-
-    since: Time | None
-    """Start of the learning period: first reading or last machine event; null without readings."""
-
-    until: Time | None
-    """End of the learning period, after which learning stops; null without readings."""
-
-    is_over: bool
-    """Whether the learning period has ended."""
-
-    n_readings: int | None
-    """Number of usable readings so far; null once this period has a baseline."""
-
-    n_days: Annotated[int | None, Field(examples=[12])]
-    """Number of days with usable readings; null once this period has a baseline."""
-
-    n_days_wanted: Annotated[int, Field(examples=[20])]
-    """Number of days with usable readings that the first baseline requires."""
-
-    recent: ReadingCountsModel
-    """Counts of the readings of the last days, for diagnosis."""
 
 
 class BaselinesModel(BearingAnswer):

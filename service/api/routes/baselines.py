@@ -26,11 +26,10 @@ from service.api.routes.baseline_models import (
     BaselineStatusName,
     BaselineStepModel,
     BaselineVersionModel,
-    LearningModel,
-    ReadingCountsModel,
     RenewModel,
 )
 from service.api.routes.films import watched_place
+from service.api.routes.learning import learning_model
 from service.api.values import bounds, listed
 from service.live.commands import (
     Accept,
@@ -41,7 +40,6 @@ from service.live.commands import (
     Renew,
     Thaw,
 )
-from service.live.learning_progress import RECENT_DAYS, learning_progress
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
 from service.store.baselines import (
@@ -262,23 +260,14 @@ def _baselines(context: Context, unit: str, bearing: str) -> BaselinesModel:
     store, settings = context.store.films, context.films.settings
     entries, steps = list(store.baselines(unit, bearing)), list(store.steps(unit, bearing))
     versions, place = versions_after(steps), context.films.place(unit, bearing)
-    progress = (
-        learning_progress(store, place, versions, entries, settings, context.clock.now_ns())
-        if place
-        else None
-    )
-    learning = progress and LearningModel.of(
-        progress,
-        n_days_wanted=settings.baseline.min_learning_days,
-        recent=ReadingCountsModel.of(progress.recent, days=RECENT_DAYS),
-    )
+    now_ns = context.clock.now_ns()
     return BaselinesModel.of(
         versions,
         unit=unit,
         bearing=bearing,
         estimator=place and place.estimator,
         acceptance=settings.acceptance,
-        learning=learning,
+        learning=place and learning_model(store, place, versions, entries, settings, now_ns),
         versions=[version_model(entry, versions, steps) for entry in entries],
         steps=[BaselineStepModel.of(s, event_time=s.from_ns) for s in reversed(steps)],
     )

@@ -12,7 +12,6 @@ from core.stiffness.estimators import is_reversed
 from service.api.answers import Make
 from service.api.auth.declared import subject_router
 from service.api.context import Context
-from service.api.routes.alarm_models import AlarmCountModel
 from service.api.routes.bearings import ResultModel, result_model
 from service.api.routes.films import FilmBriefModel, film_brief
 from service.api.routes.plant import BasicUnitModel, LinkModel
@@ -23,6 +22,7 @@ from service.api.values import (
     ReadingModel,
     reading_model,
 )
+from service.live.alarm_list import AlarmCount
 from service.live.current_state import CHECK_S
 from service.settings.bearings import BearingSettings
 
@@ -145,7 +145,7 @@ class OverviewModel(ApiModel):
     store: StoreModel
     """State of the database."""
 
-    alarms: AlarmCountModel
+    alarms: AlarmCount
     """Counts of alarms by state."""
 
     captures: CapturesModel

@@ -15,7 +15,7 @@ from core.alarms.alarm import PLANT, Alarm, AlarmChange, AlarmIdentity, AlarmNew
 from core.alarms.statistics import ChatterRule
 from core.limits import AlarmLevel
 from service.cluster.ownership import HoldLostError, Holds, Leadership, Partition
-from service.live.current_state import LiveAlarms
+from service.live.alarm_list import LiveAlarms
 from service.measuring.alarm_engine import AlarmEngine, alarm_engine
 from service.measuring.service_alarms import ServiceHealth
 from service.notifications.channel import Delivered

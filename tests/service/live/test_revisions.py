@@ -7,7 +7,8 @@ import pytest
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState
 from core.alarms.statistics import ChatterRule
-from service.live.current_state import SILENT_AFTER_S, LiveAlarms, LiveUnits
+from service.live.alarm_list import LiveAlarms
+from service.live.current_state import SILENT_AFTER_S, LiveUnits
 from service.live.snapshot import UnitLink, UnitSnapshot, link_document, link_of_document
 from service.live.status import LinkState, StoredResults, UnitStatus
 from service.measuring.snapshots import bearing_snapshot
