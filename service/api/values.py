@@ -2,21 +2,10 @@
 
 import math
 from collections.abc import Iterable
-from enum import Enum
-from types import SimpleNamespace
-from typing import Annotated, Any, Literal, Self, cast
+from typing import Annotated, Literal, cast
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    AliasChoices,
-    AliasGenerator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    StringConstraints,
-)
+from pydantic import AfterValidator, ConfigDict, Field, StringConstraints
 
 from core.arrays import FloatArray
 from core.condition.cells import BearingCondition, Cell, CellGrid, FilmConditions, OperatingPoint
@@ -24,44 +13,13 @@ from core.condition.operating_state import OperatingState
 from core.monitor.assessment import AveragingWindow
 from core.quality import Level, Reading
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
-from service.runtime.times import rfc3339
+from service.runtime.models import ByName as ByName
+from service.runtime.models import Time as Time
+from service.runtime.models import ValueModel
 
 
-class ApiModel(BaseModel):
-    """Base class of API models, which reject NaN and infinity.
-
-    OpenAPI shows the docstrings of the fields as their descriptions.
-
-    A model can be built from the attributes of an object: a field is read from the attribute with
-    its name, or for times from the attribute with its name and the suffix ``_ns``.
-    """
-
-    model_config = ConfigDict(
-        extra="forbid",
-        allow_inf_nan=False,
-        use_attribute_docstrings=True,
-        from_attributes=True,
-        populate_by_name=True,
-        alias_generator=AliasGenerator(validation_alias=lambda n: AliasChoices(n, f"{n}_ns")),
-    )
-
-    @classmethod
-    def of(cls, *sources: object, **values: object) -> Self:
-        """Return a model of keyword values, else of attributes of the first source with them."""
-        return cls.model_validate(_Merged(SimpleNamespace(**values), *sources))
-
-
-class _Merged:
-    """Object with the attributes of several objects; the first object with an attribute decides."""
-
-    def __init__(self, *sources: object) -> None:
-        self._sources = sources
-
-    def __getattr__(self, name: str) -> Any:
-        for source in self._sources:
-            if (value := getattr(source, name, ...)) is not ...:
-                return value
-        raise AttributeError(name)
+class ApiModel(ValueModel):
+    """Base class of API models."""
 
 
 class RequestModel(ApiModel):
@@ -114,21 +72,6 @@ EstimatorName = Literal[
 SpeedSourceName = Literal["key_phase", "slow_channel", "line", "rated"]
 
 RunoutName = Literal["applied", "no_vector", "other_probe", "not_slow_roll", "no_phase_reference"]
-
-
-def _time(value: object) -> object:
-    return rfc3339(value) if isinstance(value, int) else value
-
-
-def _name(value: object) -> object:
-    return value.name.lower() if isinstance(value, Enum) else value
-
-
-Time = Annotated[str, BeforeValidator(_time), Field(examples=["2026-11-21T09:03:12.400Z"])]
-"""Type of a time in RFC 3339; nanoseconds since 1970 UTC are converted."""
-
-ByName = BeforeValidator(_name)
-"""Validator that converts a member of an enumeration to its name in lower case."""
 
 
 class BearingAnswer(ApiModel):

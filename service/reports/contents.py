@@ -8,7 +8,6 @@ import numpy as np
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import CellStatistics
 from core.baseline.history import QUANTITIES, StiffnessHistory, are_ratios
-from core.change.cause import Attribution
 from core.change.decision import Decision
 from core.change.film_judge import FilmFinding, FilmNews
 from core.change.settings import FilmRules, percent_of
@@ -16,17 +15,15 @@ from core.condition.cells import BearingCondition, Cell, CellGrid, FilmCondition
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import quantity_of
-from core.quality import Level, Reading
+from core.quality import Reading
 from core.stiffness.bracket_ratio import reported_name
 from core.stiffness.estimators import ESTIMATORS
-from core.uncertainty import Budget
+from core.uncertainty import Budget, BudgetLine
 from core.units import NS_PER_S
 from service.reports.parts import (
     AXES,
     BaselinePart,
     BearingPart,
-    BudgetLinePart,
-    CausePart,
     CellPart,
     ComparisonPart,
     ConditionPart,
@@ -36,57 +33,32 @@ from service.reports.parts import (
     FilmReadingPart,
     FindingPart,
     MembersPart,
-    QualityWord,
     ReadingPart,
     TimeScalePart,
-    WindowPart,
-    finite,
     rounded,
 )
-from service.runtime.times import rfc3339
-from service.settings.alarm_kinds import LEVEL_NAMES
 from service.store.film_readings import FilmQuery
 from service.store.films import FilmStore
 from service.store.port import ValueRange
-
-LEVEL_WORDS: dict[Level, QualityWord] = {
-    Level.GOOD: "good",
-    Level.UNCERTAIN: "uncertain",
-    Level.BAD: "bad",
-}
 
 
 def bearing_part(found: Assessment, film: FilmNews | None, rules: FilmRules | None) -> BearingPart:
     """Return the part about one bearing; `film` and `rules` are None if its film is not judged."""
     watched = None if rules is None else rules.estimators.get(found.bearing)
-    return BearingPart(
-        bearing=found.bearing,
-        time=rfc3339(found.time_ns),
-        window=WindowPart.model_validate(found.window, from_attributes=True),
-        evidence=found.evidence.value,
-        speed_source=found.speed_source.value,
-        condition=_condition(found.condition, rules),
+    return BearingPart.of(
+        found,
+        condition=found.condition and _condition(found.condition, rules),
         readings={name: reading_part(name, each) for name, each in found.readings.items()},
         estimators=list(_estimators(found, watched)),
-        budgets={name: _budget(budget) for name, budget in found.budgets.items()},
-        film=None if film is None else _film(film),
+        budgets={name: _lines(budget) for name, budget in found.budgets.items()},
+        film=film and _film(film),
     )
 
 
 def reading_part(name: str, reading: Reading) -> ReadingPart:
-    """Return the part about the reading of the quantity ``name`` of the catalogue.
-
-    Numbers that are not finite become None.
-    """
-    return ReadingPart(
-        value=finite(reading.value),
-        unit=quantity_of(name).unit,
-        level=LEVEL_WORDS[reading.quality.level],
-        reason=reading.quality.reason.value,
-        u_random=finite(reading.u_random),
-        u_systematic=finite(reading.u_systematic),
-        interval_95=_finite_pair(reading.interval_95),
-    )
+    """Return the part about the reading of the quantity ``name`` of the catalogue."""
+    interval = _finite_pair(reading.interval_95)
+    return ReadingPart.of(reading, reading.quality, quantity_of(name), interval_95=interval)
 
 
 def cell_bounds(cell: Cell | None, grid: CellGrid | None) -> list[tuple[float, float]] | None:
@@ -106,33 +78,24 @@ def _estimators(found: Assessment, watched: Estimator | None) -> Iterator[Estima
         for direction in AXES:
             name = reported_name(found.readings, entry.stiffness.format(axes=direction * 2))
             coherence = found.readings[entry.coherence.format(axis=direction)]
-            yield EstimatorPart(
-                estimator=estimator.value,
+            yield EstimatorPart.of(
+                estimator=estimator,
                 direction=direction,
                 stiffness=reading_part(name, found.readings[name]),
-                coherence=finite(coherence.value),
+                coherence=coherence.value,
                 is_preferred=found.estimators.get(direction * 2) is estimator,
                 is_watched=estimator is watched,
             )
 
 
-def _condition(found: BearingCondition | None, rules: FilmRules | None) -> ConditionPart | None:
-    if found is None:
-        return None
-    return ConditionPart(
-        state=found.state.name.lower(),
-        is_settled=found.is_settled,
-        cell=None if found.cell is None else list(found.cell),
-        bounds=cell_bounds(found.cell, rules.grid if rules else None),
-    )
+def _condition(found: BearingCondition, rules: FilmRules | None) -> ConditionPart:
+    return ConditionPart.of(found, bounds=cell_bounds(found.cell, rules.grid if rules else None))
 
 
-def _budget(budget: Budget) -> list[BudgetLinePart]:
-    lines = (
-        BudgetLinePart.model_validate(line, from_attributes=True)
-        for line in budget.lines
-        if math.isfinite(line.contribution) and math.isfinite(line.width)
-    )
+def _lines(budget: Budget) -> list[BudgetLine]:
+    """Return the lines of a budget with finite numbers, the largest contribution first."""
+    numbers = ((line.contribution, line.width, line) for line in budget.lines)
+    lines = (line for *found, line in numbers if all(map(math.isfinite, found)))
     return sorted(lines, key=lambda line: -line.contribution)
 
 
@@ -141,40 +104,19 @@ def _finite_pair(pair: tuple[float, float] | None) -> tuple[float, float] | None
 
 
 def _film(news: FilmNews) -> FilmReadingPart:
-    reading = news.reading
-    return FilmReadingPart(
-        time=rfc3339(reading.time_ns),
-        estimator=reading.estimator.value,
-        state=reading.condition.state.name.lower(),
-        is_settled=reading.condition.is_settled,
-        findings=[_finding(each) for each in news.findings],
-    )
+    findings = [_finding(each) for each in news.findings]
+    return FilmReadingPart.of(news.reading.condition, news.reading, findings=findings)
 
 
 def _finding(found: FilmFinding) -> FindingPart:
     quantity = QUANTITIES[found.quantity]
-    return FindingPart(
+    return FindingPart.of(
+        found,
         direction="x" if quantity.row == 0 else "y",
         is_damping=quantity.value != "ln_k",
-        verdict=found.verdict.name.lower(),
-        level=None if found.level is None else LEVEL_NAMES[found.level],
         change_percent=None if found.change is None else percent_of(found.change),
-        time_scale_h=found.time_scale_h,
         deviation_percent=None if found.deviation is None else percent_of(found.deviation),
         deviation_95_percent=_finite_pair(found.deviation_95_percent),
-        baseline_version=found.baseline_version,
-        attribution=None if found.attribution is None else _cause(found.attribution),
-    )
-
-
-def _cause(found: Attribution) -> CausePart:
-    return CausePart(
-        cause=found.cause.value,
-        reason=found.reason,
-        film_share=finite(found.film_share),
-        film_share_std=finite(found.film_share_std),
-        shaft_change=finite(found.shaft_change),
-        bearing_change=finite(found.bearing_change),
     )
 
 
@@ -267,19 +209,16 @@ def comparison(
     cells = learned.table.cells if learned else ()
     own = next((each for each in cells if each.cell == cell), None)
     found = _expected_at(learned, news.reading.conditions) if learned and own else None
-    return ComparisonPart(
-        bearing=reading.bearing,
+    return ComparisonPart.of(
+        reading,
         direction=direction,
-        estimator=reading.estimator.value,
-        time=rfc3339(reading.time_ns),
         stiffness=rounded(math.exp(value.ln_k)),
         stiffness_unit="k_b" if are_ratios(value.ln_k) else "N/m",
         u_random=rounded(value.u_random),
-        eccentricity_ratio=finite(reading.eccentricity_ratio),
-        oil_temperature_c=finite(reading.oil_temperature_c),
-        attitude_deg=finite(reading.attitude_deg),
         expected_stiffness=None if found is None else rounded(float(found[0])),
-        baseline=_baseline(baseline, learned) if baseline and learned else None,
+        baseline=BaselinePart.of(baseline.origin, baseline, learned)
+        if baseline and learned
+        else None,
         cell=None if own is None else _cell_part(own),
         bounds=cell_bounds(cell, rules.grid),
         time_scales=list(_time_scales(news.decisions[row], learned, rules)) if learned else [],
@@ -313,29 +252,8 @@ def _line(learned: QuantityBaseline, news: FilmNews) -> ExpectedPart | None:
     )
 
 
-def _baseline(found: BearingBaseline, learned: QuantityBaseline) -> BaselinePart:
-    origin = found.origin
-    return BaselinePart(
-        version=origin.version,
-        author=origin.author,
-        created=rfc3339(origin.created_ns),
-        event=origin.event,
-        learned_from=rfc3339(found.learned_from_ns),
-        learned_until=rfc3339(found.learned_until_ns),
-        scatter=learned.scatter,
-    )
-
-
 def _cell_part(found: CellStatistics) -> CellPart:
-    return CellPart(
-        cell=list(found.cell),
-        n_readings=found.n_readings,
-        n_days=found.n_days,
-        location=float(f"{math.exp(found.location):.7g}"),
-        scatter=found.scatter,
-        surface_std=found.surface_std,
-        support=found.support.value,
-    )
+    return CellPart.of(found, location=rounded(math.exp(found.location)))
 
 
 def _time_scales(
@@ -344,9 +262,5 @@ def _time_scales(
     if len(decision.evidence.scales) != len(learned.time_scatter):
         return  # the averages belong to a baseline with other time scales
     for found in decision.evidence.findings(learned):
-        yield TimeScalePart(
-            time_scale_h=found.time_scale_h,
-            change=found.change,
-            std=found.std,
-            sure_from=rules.change.significance_threshold(found.time_scale_h),
-        )
+        sure_from = rules.change.significance_threshold(found.time_scale_h)
+        yield TimeScalePart.of(found, sure_from=sure_from)

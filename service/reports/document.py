@@ -16,14 +16,13 @@ from service.reports.parts import (
     Direction,
     EvidencePart,
     LevelWord,
-    Moment,
     Sha256,
-    finite,
 )
 from service.reports.snapshot import Snapshot
 from service.runtime.files import CHUNK
+from service.runtime.models import ByName, Finite, Time
 from service.runtime.times import rfc3339
-from service.settings.alarm_kinds import LEVEL_NAMES, value_unit
+from service.settings.alarm_kinds import value_unit
 from service.settings.configuration import Configuration, canonical, without_secrets
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
@@ -56,22 +55,22 @@ class AlarmPart(EvidencePart):
     change: Annotated[str, Field(examples=["raised"])]
     """Change of the alarm: raised or escalated."""
 
-    level: LevelWord | None
+    level: Annotated[LevelWord, ByName] | None
     """Alarm level after the event; null without a level."""
 
     state: Annotated[str, Field(examples=["unacknowledged"])]
     """State of the alarm after the event."""
 
-    time: Moment
+    time: Time
     """Time of the event."""
 
     time_ns: int
     """Time of the event, in nanoseconds since 1970 UTC."""
 
-    value: float | None
+    value: Finite
     """Value compared with the limit, or null; for film alarms the mean change in percent."""
 
-    limit: float | None
+    limit: Finite
     """Limit of the alarm; null for an alarm without a limit."""
 
     value_unit: str | None
@@ -96,7 +95,7 @@ class UnitPart(EvidencePart):
     link_reason: str | None
     """Reason why samples do not arrive; null if they arrive."""
 
-    last_sample: Moment | None
+    last_sample: Time | None
     """Time of the newest sample by the device's clock; null without a sample."""
 
 
@@ -128,7 +127,7 @@ class Evidence(EvidencePart):
     plant: Annotated[str, Field(examples=["Itaipu"])]
     """Name of the plant."""
 
-    taken: Moment
+    taken: Time
     """Host time at which the state was recorded."""
 
     configuration: Sha256
@@ -234,20 +233,10 @@ def composed(snapshot: Snapshot, maker: Maker) -> dict[str, Any]:
 
 def _alarm(snapshot: Snapshot) -> AlarmPart:
     event, identity = snapshot.event, snapshot.event.identity
-    return AlarmPart(
-        id=identity.id,
-        unit=identity.unit,
-        subject=identity.subject,
-        kind=identity.kind,
-        directions=event.directions,
-        occurrence=event.occurrence,
-        change=event.change.value,
-        level=None if event.level is None else LEVEL_NAMES[event.level],
-        state=event.state_after.value,
-        time=rfc3339(event.time_ns),
-        time_ns=event.time_ns,
-        value=finite(event.value),
-        limit=finite(event.limit),
+    return AlarmPart.of(
+        event,
+        identity,
+        state=event.state_after,
         value_unit=value_unit(identity.kind),
         reason=str(event.reason),
     )
@@ -257,13 +246,12 @@ def _unit(snapshot: Snapshot, plant: PlantFile) -> UnitPart | None:
     status, id_ = snapshot.status, snapshot.event.identity.unit
     if status is None:
         return None
-    last_ns = status.last_sample_ns
-    return UnitPart(
+    return UnitPart.of(
+        status,
         id=id_,
         name=next((unit.name for unit in plant.unit if unit.id == id_), ""),
-        link=status.state.value,
+        link=status.state,
         link_reason=status.reason,
-        last_sample=None if last_ns is None else rfc3339(last_ns),
     )
 
 

@@ -3,34 +3,25 @@
 import math
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
+
+from service.runtime.models import ByName, Finite, Time, ValueModel
 
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", examples=["9f86d081884c7d65" * 4])]
-
-Moment = Annotated[str, Field(examples=["2026-11-21T09:03:12.400Z"])]
-"""Time in UTC, as in RFC 3339."""
 
 Numbers = list[float | None]
 """Column of numbers; null for missing numbers."""
 
 
-class EvidencePart(BaseModel):
-    """Base of all models of the document: frozen, without unknown keys, NaN or infinity."""
+class EvidencePart(ValueModel):
+    """Base class of all models of the document."""
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
-    )
-
-
-def finite(number: float | None) -> float | None:
-    """Return a number if it is finite, else None, as JSON has no NaN or infinity."""
-    return None if number is None or not math.isfinite(number) else float(number)
+    model_config = ConfigDict(frozen=True)
 
 
 def rounded(number: float | None) -> float | None:
     """Return a number rounded to seven significant digits, or None if it is not finite."""
-    found = finite(number)
-    return None if found is None else float(f"{found:.7g}")
+    return None if number is None or not math.isfinite(number) else float(f"{number:.7g}")
 
 
 Direction = Literal["x", "y"]
@@ -46,22 +37,22 @@ AXES: tuple[Direction, Direction] = ("x", "y")
 class ReadingPart(EvidencePart):
     """Reading of a quantity of the catalogue, with quality and uncertainty."""
 
-    value: float | None
+    value: Finite
     """Value of the quantity; null if unknown."""
 
     unit: Annotated[str, Field(examples=["N/m"])]
     """Unit of measurement, with the detector if there is one."""
 
-    level: QualityWord
+    level: Annotated[QualityWord, ByName]
     """Quality of the reading."""
 
     reason: Annotated[str, Field(examples=["ok"])]
     """Reason for the quality."""
 
-    u_random: float | None
+    u_random: Finite
     """Random standard uncertainty, in the unit of the value; null if unknown."""
 
-    u_systematic: float | None
+    u_systematic: Finite
     """Systematic standard uncertainty, in the unit of the value; null if unknown."""
 
     interval_95: tuple[float, float] | None
@@ -80,7 +71,7 @@ class EstimatorPart(EvidencePart):
     stiffness: ReadingPart
     """Estimated stiffness."""
 
-    coherence: float | None
+    coherence: Finite
     """Magnitude-squared coherence that the estimate is based on; null without waveforms."""
 
     is_preferred: bool
@@ -140,7 +131,7 @@ class WindowPart(EvidencePart):
 class ConditionPart(EvidencePart):
     """Operating condition of the bearing."""
 
-    state: Annotated[str, Field(examples=["full_load"])]
+    state: Annotated[str, ByName, Field(examples=["full_load"])]
     """Operating state of the unit."""
 
     is_settled: bool
@@ -162,16 +153,16 @@ class CausePart(EvidencePart):
     reason: Annotated[str, Field(examples=["shaft motion agrees with no single cause"])]
     """Reason for the attribution."""
 
-    film_share: float | None
+    film_share: Finite
     """Fraction of the change due to the film if the rest is a transducer's; null if unknown."""
 
-    film_share_std: float | None
+    film_share_std: Finite
     """Standard uncertainty of `film_share`; null if that is null."""
 
-    shaft_change: float | None
+    shaft_change: Finite
     """Change of the shaft motion against the expected motion, ln of the ratio; null if unknown."""
 
-    bearing_change: float | None
+    bearing_change: Finite
     """Change of the bearing's motion against the expected motion, ln of the ratio, or null."""
 
 
@@ -184,19 +175,19 @@ class FindingPart(EvidencePart):
     is_damping: bool = False
     """Whether the finding is on damping over stiffness, c/k, instead of on stiffness."""
 
-    verdict: Annotated[str, Field(examples=["alert"])]
+    verdict: Annotated[str, ByName, Field(examples=["alert"])]
     """Verdict: normal, alert, danger, or the reason why the film was not judged."""
 
-    level: LevelWord | None
+    level: Annotated[LevelWord, ByName] | None
     """Alarm level of the film; null without an alarm."""
 
-    change_percent: float | None
+    change_percent: Finite
     """Most significant mean deviation, % of the expected value; null if there is none yet."""
 
-    time_scale_h: float | None
+    time_scale_h: Finite
     """Running hours over which `change_percent` was averaged; null if that is null."""
 
-    deviation_percent: float | None
+    deviation_percent: Finite
     """Deviation of the newest reading, % of the expected value; null unless it was compared."""
 
     deviation_95_percent: tuple[float, float] | None
@@ -212,13 +203,13 @@ class FindingPart(EvidencePart):
 class FilmReadingPart(EvidencePart):
     """Newest judged reading of the films of a bearing."""
 
-    time: Moment
+    time: Time
     """Time of the reading."""
 
     estimator: Annotated[str, Field(examples=["dynamic"])]
     """Estimator of the stiffness."""
 
-    state: Annotated[str, Field(examples=["full_load"])]
+    state: Annotated[str, ByName, Field(examples=["full_load"])]
     """Operating state of the unit."""
 
     is_settled: bool
@@ -234,7 +225,7 @@ class BearingPart(EvidencePart):
     bearing: Annotated[str, Field(examples=["UJB"])]
     """Identifier of the bearing."""
 
-    time: Moment
+    time: Time
     """Time of the last sample of the window."""
 
     window: WindowPart
@@ -271,16 +262,16 @@ class BaselinePart(EvidencePart):
     author: Annotated[str, Field(examples=["padwatch"])]
     """Person or program that created the baseline."""
 
-    created: Moment
+    created: Time
     """Time of creation of the baseline."""
 
     event: str
     """Event on the machine that required a new baseline; may be empty."""
 
-    learned_from: Moment
+    learned_from: Time
     """Time of the first learned reading."""
 
-    learned_until: Moment
+    learned_until: Time
     """Time of the last learned reading."""
 
     scatter: float
@@ -372,28 +363,28 @@ class ComparisonPart(EvidencePart):
     estimator: Annotated[str, Field(examples=["dynamic"])]
     """Estimator of the stiffness."""
 
-    time: Moment
+    time: Time
     """Time of the reading."""
 
-    stiffness: float | None
+    stiffness: Finite
     """Measured stiffness; null if missing."""
 
     stiffness_unit: Literal["N/m", "k_b"]
     """Unit of all stiffnesses: N/m or, if it is unknown, the stiffness of the bracket."""
 
-    u_random: float | None
+    u_random: Finite
     """Random standard uncertainty of ln stiffness; null if unknown."""
 
-    eccentricity_ratio: float | None
+    eccentricity_ratio: Finite
     """Eccentricity ratio of the reading; null if unknown."""
 
-    oil_temperature_c: float | None
+    oil_temperature_c: Finite
     """Oil temperature of the reading, in °C; null if unknown."""
 
-    attitude_deg: float | None
+    attitude_deg: Finite
     """Attitude angle of the reading, in degrees; null if unknown."""
 
-    expected_stiffness: float | None
+    expected_stiffness: Finite
     """Expected stiffness by the baseline; null if unknown for this condition."""
 
     baseline: BaselinePart | None

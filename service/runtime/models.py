@@ -1,0 +1,76 @@
+"""Base of the models of answers and documents, which are built from the attributes of values."""
+
+import math
+from enum import Enum
+from types import SimpleNamespace
+from typing import Annotated, Any, Self
+
+from pydantic import (
+    AliasChoices,
+    AliasGenerator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+)
+
+from service.runtime.times import rfc3339
+
+
+class ValueModel(BaseModel):
+    """Base class of models that reject unknown members, NaN and infinity.
+
+    JSON schemas show the docstrings of the fields as their descriptions.
+
+    A model can be built from the attributes of an object: a field is read from the attribute with
+    its name, or for times from the attribute with its name and the suffix ``_ns``.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid",
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
+        from_attributes=True,
+        populate_by_name=True,
+        alias_generator=AliasGenerator(validation_alias=lambda n: AliasChoices(n, f"{n}_ns")),
+    )
+
+    @classmethod
+    def of(cls, *sources: object, **values: object) -> Self:
+        """Return a model of keyword values, else of attributes of the first source with them."""
+        return cls.model_validate(_Merged(SimpleNamespace(**values), *sources))
+
+
+class _Merged:
+    """Object with the attributes of several objects; the first object with an attribute decides."""
+
+    def __init__(self, *sources: object) -> None:
+        self._sources = sources
+
+    def __getattr__(self, name: str) -> Any:
+        for source in self._sources:
+            if (value := getattr(source, name, ...)) is not ...:
+                return value
+        raise AttributeError(name)
+
+
+def _time(value: object) -> object:
+    return rfc3339(value) if isinstance(value, int) else value
+
+
+def _name(value: object) -> object:
+    return value.name.lower() if isinstance(value, Enum) else value
+
+
+def _finite(value: object) -> object:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+Time = Annotated[str, BeforeValidator(_time), Field(examples=["2026-11-21T09:03:12.400Z"])]
+"""Type of a time in RFC 3339; nanoseconds since 1970 UTC are converted."""
+
+ByName = BeforeValidator(_name)
+"""Validator that converts a member of an enumeration to its name in lower case."""
+
+Finite = Annotated[float | None, BeforeValidator(_finite)]
+"""Type of a number; NaN and infinity are converted to None."""
