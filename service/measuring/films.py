@@ -67,7 +67,6 @@ class FilmMonitor:
         self.revision = 0
         """Revision number, increased with every new reading and every change of a baseline."""
         self._acting = asyncio.Lock()  # each action depends on the previous one
-        self.unwatched = {unit: why for unit, why in rules.items() if isinstance(why, str)}
         self._films = {
             unit: _watched(units[unit], found)
             for unit, found in rules.items()
@@ -99,13 +98,6 @@ class FilmMonitor:
     def rules(self, unit: str) -> FilmRules | None:
         """Return the rules of a unit's films; None if they are not monitored."""
         return self._films[unit].rules if unit in self._films else None
-
-    def place(self, unit: str, bearing: str) -> FilmPlace | None:
-        """Return a bearing with its stiffness estimator; None if its films are not monitored."""
-        rules = self.rules(unit)
-        if rules is None or bearing not in rules.estimators:
-            return None
-        return FilmPlace(unit, bearing, rules.estimators[bearing])
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
         """Return the newest film reading and findings of a bearing; None before the first one."""

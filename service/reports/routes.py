@@ -18,7 +18,7 @@ from service.api.context import Context
 from service.api.downloads import Downloads, TooManyDownloadsError, attachment, file_content
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.alarms import AlarmId
-from service.api.values import ApiModel, Time
+from service.api.values import ApiModel, ByName, Time
 from service.live.snapshot import EvidenceStatus
 from service.reports.archive import (
     DamagedEvidenceError,
@@ -34,8 +34,7 @@ from service.reports.document import Evidence
 from service.reports.page import POLICY, report_page
 from service.reports.tables import TableError
 from service.runtime.files import zipped
-from service.runtime.times import rfc3339
-from service.settings.alarm_kinds import ALARM_KINDS, LEVEL_NAMES
+from service.settings.alarm_kinds import ALARM_KINDS
 from service.store.access.identities import Permission
 
 
@@ -48,7 +47,7 @@ class OccurrenceModel(ApiModel):
     change: Annotated[str, Field(examples=["raised"])]
     """Change of the alarm: raised or escalated."""
 
-    level: Literal["alert", "danger"] | None
+    level: Annotated[Literal["alert", "danger"], ByName] | None
     """Alarm level after the event; null without a level."""
 
     time: Time
@@ -300,13 +299,10 @@ async def _complete(
 def _occurrence_model(occurrence: Occurrence, samples: SamplesState) -> OccurrenceModel:
     event = occurrence.event
     path = f"/api/v1/alarms/{quote(event.identity.id, safe=':')}/evidence/{event.occurrence}"
-    return OccurrenceModel(
-        occurrence=event.occurrence,
-        change=event.change.value,
-        level=None if event.level is None else LEVEL_NAMES[event.level],
-        time=rfc3339(event.time_ns),
-        state=occurrence.state.value,
-        samples=samples.value,
+    return OccurrenceModel.of(
+        event,
+        state=occurrence.state,
+        samples=samples,
         evidence=path if occurrence.state is EvidenceState.COMPLETE else None,
     )
 

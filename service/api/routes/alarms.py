@@ -75,21 +75,18 @@ class CommentModel(ActorModel):
     """Comment, 1 to 500 printable characters."""
 
 
-class ShelveModel(ActorModel):
-    """Request to shelve an alarm for a limited time."""
-
-    reason: ReasonText
-    """Reason, 1 to 500 printable characters."""
-
-    duration_s: Annotated[float, Field(ge=1.0, le=31_536_000.0, examples=[3600.0])]
-    """Duration of the shelving, s; the plant file sets the maximum."""
-
-
 class OutageModel(ActorModel):
     """Request to take an alarm out of service."""
 
     reason: ReasonText
     """Reason, 1 to 500 printable characters."""
+
+
+class ShelveModel(OutageModel):
+    """Request to shelve an alarm for a limited time."""
+
+    duration_s: Annotated[float, Field(ge=1.0, le=31_536_000.0, examples=[3600.0])]
+    """Duration of the shelving, s; the plant file sets the maximum."""
 
 
 RAISED_AT = {
