@@ -1,7 +1,7 @@
 """Route for the stiffness readings of an oil film over time, with their operating conditions."""
 
 from collections.abc import Hashable, Iterable, Iterator
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -10,23 +10,19 @@ from fastapi import APIRouter, Query, Request, Response
 from core.baseline.history import DIRECTIONS, ReadingOutcome, absolute_and_ratio
 from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
+from core.limits import AlarmLevel
 from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange
 from service.api.problems import problem_responses
-from service.api.routes.films import (
-    LevelHeldName,
-    VerdictName,
-    level_name,
-    verdict_name,
-    watched_place,
-)
+from service.api.routes.film_models import LevelHeldName, VerdictName
+from service.api.routes.films import watched_place
 from service.api.tables import Column, Format, kind_of, table_content, table_response
 from service.api.values import (
-    STATE_NAMES,
     ApiModel,
     BearingHistory,
+    ByName,
     EstimatorName,
     OperatingStateName,
     Time,
@@ -62,13 +58,13 @@ class FilmSeriesModel(ApiModel):
     bearing_um_pk: list[float | None]
     """1× amplitude of the bearing, µm zero-to-peak."""
 
-    evidence: list[EvidenceName]
+    evidence: list[Annotated[EvidenceName, ByName]]
     """State of the reading: "measured", or the reason why its stiffness is unknown."""
 
-    verdict: list[VerdictName]
+    verdict: list[Annotated[VerdictName, ByName]]
     """Verdict on the film when the reading was made."""
 
-    level: list[LevelHeldName | None]
+    level: list[Annotated[LevelHeldName, ByName] | None]
     """Alarm level in force when the reading was made; null without a level."""
 
     change_percent: list[float | None]
@@ -83,10 +79,10 @@ class FilmSeriesModel(ApiModel):
     u_random_ck_s: list[float | None]
     """Random standard uncertainty of damping over stiffness, s."""
 
-    ck_verdict: list[VerdictName]
+    ck_verdict: list[Annotated[VerdictName, ByName]]
     """Verdict on damping over stiffness when the reading was made."""
 
-    ck_level: list[LevelHeldName | None]
+    ck_level: list[Annotated[LevelHeldName, ByName] | None]
     """Alarm level of damping over stiffness; null without a level."""
 
     ck_change_percent: list[float | None]
@@ -114,7 +110,7 @@ class FilmReadingsModel(BearingHistory):
     provenance: list[ProvenanceName]
     """Origin of the readings: "measured" on the machine, or "simulated"."""
 
-    operating_state: list[OperatingStateName]
+    operating_state: list[Annotated[OperatingStateName, ByName]]
     """Operating state of the unit."""
 
     is_settled: list[bool]
@@ -146,8 +142,6 @@ class FilmReadingsModel(BearingHistory):
 
 
 Rows = npt.NDArray[np.int64]
-
-EVIDENCE_NAMES = {code: cast("EvidenceName", code.name.lower()) for code in ReadingOutcome}
 
 
 def rows_shown(n_found: int, max_points: int, is_thinned: bool) -> Rows:
@@ -181,7 +175,7 @@ def film_readings_model(query: FilmQuery, found: FilmHistory, rows: Rows) -> Fil
         next_end=int(history.time_ns[first]) if first else None,
         time=history.time_ns[rows].tolist(),
         provenance=["simulated" if one else "measured" for one in found.is_simulated[rows]],
-        operating_state=[STATE_NAMES[OperatingState(code)] for code in found.state[rows]],
+        operating_state=[OperatingState(code) for code in found.state[rows]],
         is_settled=found.is_settled[rows].tolist(),
         speed_rpm=listed(history.speed_rpm[rows]),
         power_mw=listed(history.power_mw[rows]),
@@ -203,8 +197,8 @@ def _series(found: FilmHistory, direction: int, rows: Rows) -> FilmSeriesModel:
     def decided(row: int, prefix: str = "") -> dict[str, Any]:
         verdicts, levels = found.verdict[row, rows], found.level[row, rows]
         return {
-            f"{prefix}verdict": [verdict_name(Verdict(code)) for code in verdicts],
-            f"{prefix}level": [level_name(int(code) or None) for code in levels],
+            f"{prefix}verdict": [Verdict(code) for code in verdicts],
+            f"{prefix}level": [AlarmLevel(code) if code else None for code in levels],
             f"{prefix}change_percent": listed(100.0 * np.expm1(found.change[row, rows])),
             f"{prefix}deviation_percent": listed(100.0 * np.expm1(found.deviation[row, rows])),
         }
@@ -213,14 +207,14 @@ def _series(found: FilmHistory, direction: int, rows: Rows) -> FilmSeriesModel:
     ln_k = column(history.ln_k)
     k, of_kb = absolute_and_ratio(np.exp(ln_k), ln_k)
     u_k, u_of_kb = absolute_and_ratio(np.exp(ln_k) * column(history.u_random), ln_k)
-    return FilmSeriesModel(
+    return FilmSeriesModel.of(
         stiffness_n_per_m=listed(k),
         stiffness_of_kb=listed(of_kb),
         u_random_n_per_m=listed(u_k),
         u_random_of_kb=listed(u_of_kb),
         shaft_um_pk=listed(column(history.shaft_um_pk)),
         bearing_um_pk=listed(column(history.bearing_um_pk)),
-        evidence=[EVIDENCE_NAMES[ReadingOutcome(code)] for code in column(history.outcome)],
+        evidence=[ReadingOutcome(code) for code in column(history.outcome)],
         **decided(direction),
         ck_s=listed(ck_s),
         u_random_ck_s=listed(ck_s * column(history.u_ck)),

@@ -4,10 +4,9 @@ import math
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
-from typing import Annotated, Any, Literal, cast
+from typing import Any
 
 from fastapi import APIRouter, Request, Response
-from pydantic import Field
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.history import DIRECTIONS, QUANTITIES, are_ratios
@@ -15,248 +14,23 @@ from core.change.decision import Decision, Verdict
 from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading
 from core.change.settings import ChangeLimits, FilmRules, percent_of
+from core.limits import AlarmLevel
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import ProblemError, problem_responses
-from service.api.values import (
-    ApiModel,
-    BearingAnswer,
-    ByName,
-    EstimatorName,
-    FilmConditionModel,
-    Time,
-    condition_model,
+from service.api.routes.film_models import (
+    FilmBriefModel,
+    FilmChangeModel,
+    FilmDampingModel,
+    FilmDeviationModel,
+    FilmDirectionModel,
+    FilmLimitsModel,
+    FilmModel,
+    FilmWordModel,
 )
+from service.api.values import FilmConditionModel, condition_model
 from service.live.commands import FilmPlace
 from service.live.status import CurrentBearing
-
-VerdictName = Literal[
-    "normal",
-    "alert",
-    "danger",
-    "gathering_evidence",
-    "no_baseline",
-    "insufficient_excitation",
-    "bad_quality",
-    "transient",
-    "no_reading",
-]
-
-CauseName = Literal["film", "oil", "bracket_or_transducer", "unknown"]
-
-
-LevelHeldName = Literal["alert", "danger"]
-
-
-class FilmChangeModel(ApiModel):
-    """Mean deviation from the baseline, at its most significant averaging time."""
-
-    percent: Annotated[float, Field(examples=[-19.2])]
-    """Mean change, % of the expected value; negative if softer. The alarm limits apply to it.
-    After a sudden change, it follows the deviation of the newest reading with delay."""
-
-    time_scale_h: Annotated[float, Field(examples=[4.0])]
-    """Averaging time of this change, running hours."""
-
-    significance: Annotated[float, Field(examples=[12.4])]
-    """Absolute value of the change, divided by its standard uncertainty."""
-
-    significance_wanted: Annotated[float, Field(examples=[6.5])]
-    """Smallest significance at which a change with this averaging time can raise an alarm."""
-
-    as_of: Time | None
-    """Time of the newest reading in the average; null if this reading was made before the service
-    started or before the baseline in force."""
-
-
-class FilmDeviationModel(ApiModel):
-    """Deviation of one reading from the baseline."""
-
-    percent: float
-    """Deviation, % of the expected stiffness."""
-
-    low_95: float
-    """Lower end of the 95 % interval of the deviation, %."""
-
-    high_95: float
-    """Upper end of the 95 % interval of the deviation, %."""
-
-
-class FilmCauseModel(ApiModel):
-    """Cause of a change of stiffness, inferred from the motion of shaft and bearing."""
-
-    cause: CauseName
-    """Cause: film of this bearing, oil of all bearings, bracket or transducer, or unknown."""
-
-    reason: str
-    """Reason why this cause was inferred."""
-
-    film_share: float | None
-    """Fraction of the change that is due to the film if a transducer error causes the rest, 0 to 1
-    within its uncertainty; null if unknown, or if no such combination explains the motion."""
-
-    film_share_std: float | None
-    """Standard uncertainty of `film_share`; null if `film_share` is null."""
-
-
-class FilmQuantityModel(ApiModel):
-    """Decision on a quantity of an oil film in one direction, x or y."""
-
-    verdict: Annotated[VerdictName, ByName]
-    """Verdict on the newest reading. Only "normal", "alert" and "danger" judge the film. The other
-    verdicts state why it is not judged: too little evidence yet ("gathering_evidence"), no baseline
-    for this condition ("no_baseline"), too little motion ("insufficient_excitation"), a doubtful
-    value ("bad_quality"), a unit that has not settled ("transient"), or no current reading
-    ("no_reading")."""
-
-    reason: Annotated[str, Field(examples=["condition_not_learned"])]
-    """Reason why the film is not judged; "ok" if it is judged."""
-
-    level: LevelHeldName | None
-    """Alarm level in force, also while the newest reading cannot be judged; null if none."""
-
-    change: FilmChangeModel | None
-    """Change against the baseline; null without a baseline, until the shortest averaging time has
-    passed, and without a current reading."""
-
-    deviation: FilmDeviationModel | None
-    """Deviation of the newest reading alone; null if this reading was not compared."""
-
-    cause: FilmCauseModel | None
-    """Cause of the change while a level is in force; otherwise null."""
-
-
-class FilmDampingModel(FilmQuantityModel):
-    """Decision on damping over stiffness, c/k."""
-
-    ck_s: float | None
-    """Damping over stiffness of the newest reading, s; null if it could not be determined."""
-
-    expected_s: float | None
-    """Damping over stiffness that the baseline expects, s; null if it was not compared."""
-
-
-class FilmDirectionModel(FilmQuantityModel):
-    """State of an oil film in one direction, x or y: stiffness, and damping over stiffness."""
-
-    stiffness_n_per_m: float | None
-    """Stiffness of the newest reading, N/m; null if it could not be determined."""
-
-    expected_n_per_m: float | None
-    """Stiffness that the baseline expects under the condition of the newest reading, N/m; null if
-    this reading was not compared."""
-
-    stiffness_of_kb: float | None
-    """Stiffness as a ratio to the bracket stiffness; null if the latter is known."""
-
-    expected_of_kb: float | None
-    """Expected stiffness as such a ratio; null if the bracket stiffness is known."""
-
-    damping: FilmDampingModel
-    """Damping over stiffness, of the estimator "dynamic"."""
-
-
-class FilmLimitsModel(ApiModel):
-    """Alarm limits for a mean change, as increase and as decrease."""
-
-    alert_percent: Annotated[float, Field(examples=[3.5])]
-    """Limit for an alert, % of the expected value."""
-
-    danger_percent: Annotated[float, Field(examples=[15.0])]
-    """Limit for danger, % of the expected value."""
-
-
-class FilmModel(BearingAnswer):
-    """Current state of the oil film of a bearing."""
-
-    is_watched: bool
-    """Whether the film is watched: its stiffness is compared with a baseline."""
-
-    why_not: str | None
-    """Reason why the film is not watched; null if it is watched."""
-
-    estimator: EstimatorName | None
-    """Fixed estimator of the stiffness, so that readings are comparable; null if not watched."""
-
-    time: Time | None
-    """Time of the newest reading; null without a reading since the service started."""
-
-    is_current: bool
-    """Whether the newest reading is recent and the baseline in force has not changed since then."""
-
-    next_reading: Time | None
-    """Time at which the next reading is due; null without current data."""
-
-    condition: FilmConditionModel | None
-    """Operating condition of the bearing at the newest result; null without current data."""
-
-    baseline_version: int | None
-    """Version of the baseline in force; null if no baseline is in force."""
-
-    limits: FilmLimitsModel | None
-    """Alarm limits of the stiffness; null if the film is not watched."""
-
-    damping_limits: FilmLimitsModel | None
-    """Alarm limits of damping over stiffness; null if the film is not watched."""
-
-    x: FilmDirectionModel | None
-    """State in x; null if the film is not watched."""
-
-    y: FilmDirectionModel | None
-    """State in y; null if the film is not watched."""
-
-
-class FilmWordModel(ApiModel):
-    """Verdict, alarm level, stiffness and change of a film in one direction."""
-
-    verdict: VerdictName
-    """Verdict on the newest reading; "no_reading" if this reading is not current."""
-
-    level: LevelHeldName | None
-    """Alarm level in force; null without a level."""
-
-    change_percent: float | None
-    """Most significant mean change of stiffness, % of the expected stiffness; null if `change` of
-    the film is null."""
-
-    deviation_percent: float | None
-    """Deviation of the newest reading alone, % of the expected stiffness; null if this reading was
-    not compared."""
-
-    ck_level: LevelHeldName | None
-    """Alarm level of damping over stiffness in force; null without a level."""
-
-    ck_change_percent: float | None
-    """Most significant mean change of damping over stiffness, %; null if unknown."""
-
-    stiffness_n_per_m: float | None
-    """Stiffness of the newest reading, N/m; null if it could not be determined."""
-
-    expected_n_per_m: float | None
-    """Stiffness that the baseline expects, N/m; null if this reading was not compared."""
-
-    stiffness_of_kb: float | None
-    """Stiffness as a ratio to the bracket stiffness; null if the latter is known."""
-
-    expected_of_kb: float | None
-    """Expected stiffness as such a ratio; null if the bracket stiffness is known."""
-
-
-class FilmBriefModel(ApiModel):
-    """Summary of the oil film of a bearing."""
-
-    why_not: str | None
-    """Reason why the film is not watched; null if it is watched."""
-
-    limits: FilmLimitsModel | None
-    """Alarm limits; null if the film is not watched."""
-
-    x: FilmWordModel | None
-    """State in x; null if the film is not watched."""
-
-    y: FilmWordModel | None
-    """State in y; null if the film is not watched."""
-
 
 CURRENT_PERIODS = 2.5
 """Maximum time from a current reading to the newest result, in reading periods."""
@@ -266,8 +40,6 @@ STIFFNESS_NAMES = (
     ("stiffness_of_kb", "expected_of_kb"),
 )
 """Fields of stiffness and expected stiffness, for known and for unknown bracket stiffness."""
-
-NOT_LEARNED, ATTITUDE_NOT_LEARNED = "condition_not_learned", "attitude_not_learned"
 
 
 @dataclass(frozen=True)
@@ -394,14 +166,14 @@ def _directions(seen: WatchedFilm) -> tuple[FilmDirectionModel, FilmDirectionMod
     if seen.news is None or seen.why_not_current is not None:
         levels = [f.level for f in seen.news.findings] if seen.news else [None] * len(QUANTITIES)
         reason = seen.why_not_current or ""
-        x, y = (_unread(reason, *map(level_name, levels[row::2])) for row in range(2))
+        x, y = (_unread(reason, *levels[row::2]) for row in range(2))
         return x, y
     x, y = (_direction(seen, seen.news, row) for row in range(len(DIRECTIONS)))
     return x, y
 
 
 def _unread(
-    reason: str, level: LevelHeldName | None, ck_level: LevelHeldName | None
+    reason: str, level: AlarmLevel | None, ck_level: AlarmLevel | None
 ) -> FilmDirectionModel:
     """Return the state in a direction without a current reading: a reason and the alarm levels."""
     why = {"verdict": "no_reading", "reason": reason}
@@ -430,7 +202,7 @@ def _decided(seen: WatchedFilm, news: FilmNews, row: int) -> dict[str, Any]:
     return {
         "verdict": finding.verdict,
         "reason": _reason(seen, news.reading, finding),
-        "level": level_name(finding.level),
+        "level": finding.level,
         "change": _change(finding, news.decisions[row], rules),
         "deviation": _deviation(finding),
         "cause": finding.attribution,
@@ -460,7 +232,7 @@ def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding) -> st
 def _unseen(learned: QuantityBaseline, reading: FilmReading) -> str:
     """Return why the baseline does not cover a reading: cell or attitude angle not learned."""
     is_seen = learned.table.find(learned.grid.cells(reading.conditions))[0] >= 0
-    return ATTITUDE_NOT_LEARNED if is_seen else NOT_LEARNED
+    return "attitude_not_learned" if is_seen else "condition_not_learned"
 
 
 def _change(finding: FilmFinding, decision: Decision, rules: FilmRules) -> FilmChangeModel | None:
@@ -483,16 +255,6 @@ def _deviation(finding: FilmFinding) -> FilmDeviationModel | None:
         return None
     low, high = interval
     return FilmDeviationModel(percent=percent_of(finding.deviation), low_95=low, high_95=high)
-
-
-def verdict_name(verdict: Verdict) -> VerdictName:
-    """Return the name of a verdict in the API."""
-    return cast("VerdictName", verdict.name.lower())
-
-
-def level_name(level: int | None) -> LevelHeldName | None:
-    """Return the name of an alarm level in the API; None for None."""
-    return None if level is None else cast("LevelHeldName", Verdict(int(level)).name.lower())
 
 
 def watched_place(context: Context, unit: str, bearing: str) -> FilmPlace:
