@@ -55,8 +55,8 @@ class _Compiler:
         ):
             if getattr(settings, key) and None in readers:
                 raise ConfigError(
-                    f"{key}: no signal of message {self._waves[readers.index(None)].message} is"
-                    " named; name one signal of each message with waveforms, or none"
+                    f"{key}: message {self._waves[readers.index(None)].message} has no signal in"
+                    f" the list; list one signal of each message with waveforms, or leave out {key}"
                 )
         if not settings.counters and rate_hz / n_per_frame > MAX_INSTANTS_PER_S:
             raise ConfigError(

@@ -220,7 +220,10 @@ class ChannelAssembly:
             return
         apart = signed_distance(int(piece.counters[0]), self._newest, WRAP)
         if abs(apart) > _MAX_APART:
-            raise LinkError(f"FIFO: channel {channel} is {apart} samples ahead of channel 0")
+            raise LinkError(
+                f"FIFO: channels 0 and {channel} are {abs(apart)} samples apart, at most"
+                f" {_MAX_APART} are accepted"
+            )
         start = self._newest + apart
         self._add(channel, range(start, start + piece.n_samples), piece.counts[0])
 

@@ -63,8 +63,8 @@ Stretch = tuple[int, int]
 def plan_reads(registers: RegisterMap) -> ReadPlan:
     """Return the plan of the requests that read a register map in every poll.
 
-    Raises MapError if a cell crosses the edge of a block that must be read in one request, or a
-    value and its scale register are in different requests.
+    Raises MapError if a number lies partly outside a block of registers that must be read in one
+    request, or if a value and its scale register are in different requests.
     """
     plan = _plan(registers, list(registers.cells()), registers.together)
     for n, value in enumerate(registers.values):

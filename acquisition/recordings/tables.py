@@ -48,7 +48,10 @@ def blocks_schema(unit: RecordedUnit) -> Any:
 
 
 def samples_table(counts: RawArray, unit: RecordedUnit) -> Any:
-    """Return the table of (n_channels, n_samples) counts or engineering units."""
+    """Return the pyarrow table of samples (n_channels, n_samples), one column per channel.
+
+    Samples are converter counts, or engineering units from devices that deliver those.
+    """
     return pa.table(list(counts), schema=samples_schema(unit))
 
 

@@ -209,8 +209,9 @@ class Watch:
         return self.identity.id
 
     def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
-        """Return the judgement of a reading by the limits; `held` is as in `LimitRule.judge`.
+        """Return the judgement of a reading by the limits that are valid at an operating point.
 
+        `held` is the level of the previous judgement, for the deadband; None without a level.
         Raises `TypeError` if the alarm has no limits.
         """
         if self.limits is None:

@@ -44,7 +44,10 @@ class Reporter:
         self._trouble = TroubleLog("unit states are not reported", "unit states are reported again")
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Write reports periodically, until cancelled."""
+        """Write reports on all units to the store periodically, until cancelled.
+
+        `pulse` receives a heartbeat after each report.
+        """
         await periodic(self.report, LINK_EVERY_S, self._clock, pulse)
 
     async def report(self) -> None:

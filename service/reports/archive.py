@@ -129,7 +129,7 @@ class EvidenceArchive:
         return None
 
     def events(self, alarm: str) -> Iterator[AlarmEvent]:
-        """Yield all events of an alarm, newest first; each page read may raise `StoreError`."""
+        """Yield all events of an alarm, newest first; any step may raise `StoreError`."""
         before = AlarmQuery().before
         while page := self._store.alarm_events(AlarmQuery(before, PAGE, alarm=alarm)):
             yield from (stored.event for stored in page)

@@ -151,7 +151,7 @@ class EvidenceCollector:
                     self._take(event)
 
     def captured(self, outcome: Outcome) -> None:
-        """Queue the outcome of a capture, complete or lost, to write it into the bundles."""
+        """Queue the outcome of a capture, complete or lost, for the evidence of its alarms."""
         self._outcomes.append(outcome)
         self._news.set()
 

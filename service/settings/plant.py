@@ -125,7 +125,10 @@ class ServiceSettings(Settings):
 
 
 class DynamicModel(Settings):
-    """Settings of the estimator of eight film coefficients, from lines between harmonics of 1×."""
+    """Settings of the estimator `dynamic`, which fits four stiffnesses and four dampings of a film.
+
+    They are fitted to the spectral lines between the harmonics of the running speed.
+    """
 
     band_hz: tuple[float, float] = (0.6, 12.0)
     """Frequency band [low, high] of the spectral lines in the fit, Hz."""

@@ -68,8 +68,8 @@ class FilmHistory:
     verdict, level : (4, n)
         By rows of `QUANTITIES`: numbers of `Verdict`; numbers of `AlarmLevel`, 0 for no alarm.
     change, change_std : (4, n)
-        Most significant mean deviation from the baseline, in ln, and its standard uncertainty; NaN
-        if unknown.
+        Mean deviation from the baseline, in ln, over the averaging time for which it is most
+        significant, and its standard uncertainty; NaN if unknown.
     deviation, deviation_std : (4, n)
         Deviation of the reading from the baseline, in ln, and its standard uncertainty; NaN if
         unknown.

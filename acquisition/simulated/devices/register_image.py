@@ -168,7 +168,10 @@ def no_value(value: MapValue) -> float:
 
 
 def encode_header(header: RingHeader) -> bytes:
-    """Return the header of a block ring as big-endian words with checksum, without slow values."""
+    """Return the header of a block ring as big-endian bytes that end with its checksum.
+
+    The values of the slow channels, which follow the header in the device, are not included.
+    """
     ring = header.layout
     data = HEADER.pack(
         *(MAGIC, VERSION, ring.n_channels, ring.samples_per_slot, ring.n_slots),

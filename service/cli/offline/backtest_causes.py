@@ -46,9 +46,10 @@ class UnitCauses:
         self.responses = [self._learned(period) for period in self._periods]
 
     def of(self, bearing: str, direction: str, time_ns: int) -> Attribution:
-        """Return the cause of an alarm of a film by the readings up to a time, ns since 1970 UTC.
+        """Return the cause of a film alarm, found from the readings up to `time_ns`.
 
-        The cause is unknown without shaft amplitudes, or in a learning period.
+        `time_ns` is in ns since 1970 UTC. The cause is unknown if the readings have no shaft
+        amplitudes, or if the time is in the period from which the baseline is learned.
         """
         if not self._has_amplitudes:
             return NO_AMPLITUDES

@@ -111,7 +111,8 @@ def import_job(mapping: ImportMapping, unit: UnitSettings) -> ImportJob:
         missing = [id_ for id_ in known if id_ not in channels]
         if missing:
             raise ConfigError(
-                f"the mapping lacks channel {', '.join(missing)} of unit {unit.id}; add [[channel]]"
+                f"the mapping does not contain these channels of unit {unit.id}:"
+                f" {', '.join(missing)}; add a [[channel]] table for each"
             )
     csv = CsvLayout(**mapping.csv.model_dump()) if mapping.csv else CsvLayout()
     return ImportJob(
