@@ -230,7 +230,7 @@ def test_channels_that_count_differently_are_not_put_side_by_side():
     pieces = [
         FifoPiece(first + np.arange(4), np.zeros((1, 4), dtype=np.int16)) for first in (5000, 0)
     ]
-    with pytest.raises(LinkError, match="is -5004 samples ahead"):
+    with pytest.raises(LinkError, match="channels 0 and 1 are 5004 samples apart"):
         assembly.place(pieces, 0.0)
 
 
