@@ -14,10 +14,10 @@ from service.settings.limits import (
     SpanLimitSettings,
     TemperatureLimitSettings,
     VectorChangeLimitSettings,
-    VectorReferenceSettings,
     VelocityLimitSettings,
     ZonesSettings,
 )
+from service.settings.vector_references import VectorReferenceSettings
 
 
 class BearingAlarmSettings(Settings):

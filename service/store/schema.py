@@ -9,7 +9,7 @@ file has the tables of accounts, sessions and keys, the other file has the table
 file has its own audit trail.
 """
 
-from service.store.access.tables import ACCESS_TABLES
+from service.store.access.schema import ACCESS_TABLES
 from service.store.audit import AUDIT_TABLES
 from service.store.films import FILM_TABLES
 from service.store.outbox import OUTBOX_TABLES
