@@ -28,19 +28,17 @@ from service.recordings.segment import SegmentSettings
 from service.reports.collector import EvidenceCollector, SnapshotTaker
 from service.reports.document import Maker
 from service.reports.folders import captures_in_use
-from service.reports.retention import EvidenceLimits, EvidenceRetention
+from service.reports.retention import EvidenceRetention
 from service.reports.writer import EvidenceWriter
-from service.runtime.disk import SpaceLimits, SpaceWatch, measure_disk
+from service.runtime.disk import SpaceWatch, measure_disk
 from service.settings.adapter_values import recorded_unit
 from service.settings.core_values import analysis_of, film_rules_of
 from service.settings.plant import PlantFile
 from service.settings.sources.devices import ModbusVectorSettings
-from service.settings.storage import Origin, SpaceSettings
+from service.settings.storage import BYTES_PER_GB, Origin
 from service.settings.units import UnitSettings
 from service.store.store import Store
 from service.store.waveforms import WaveformKind
-
-BYTES_PER_GB = 1e9
 
 
 def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
@@ -100,7 +98,7 @@ def evidence_of(
     clock: Clock,
 ) -> EvidenceCollector:
     """Return the collector of alarm evidence; `watch` connects it to the alarms."""
-    limits, folders = limits_of(plant), evidence_folders(plant)
+    limits, folders = plant.evidence, evidence_folders(plant)
     configuration = built_configuration(plant)
     maker = Maker(plant, configuration, f"padwatch {version('padwatch')}", origin)
     writer = EvidenceWriter(folders.evidence, maker, store.films, limits)
@@ -118,33 +116,13 @@ def watch(
         captures.set_listener(keeper.captured)
 
 
-def limits_of(plant: PlantFile) -> EvidenceLimits:
-    """Return the limits of stored evidence."""
-    found = plant.evidence
-    return EvidenceLimits(
-        max_bytes=round(found.max_gb * BYTES_PER_GB),
-        hard_max_bytes=round(found.hard_max_gb * BYTES_PER_GB),
-        **found.values_for(EvidenceLimits),
-    )
-
-
 def space_watch(plant: PlantFile, clock: Clock) -> SpaceWatch:
     """Return the free-space monitor of all data folders; they may be on different disks."""
     data = Path(plant.service.data_folder)
     folders = {"data": data, CAPTURES: data / CAPTURES, EVIDENCE: data / EVIDENCE}
     if plant.recording.samples == "kept":
         folders[RECORDINGS] = recordings_folder(plant)
-    return SpaceWatch(folders, space_limits(plant.space), clock)
-
-
-def space_limits(settings: SpaceSettings) -> SpaceLimits:
-    """Return the limits of free disk space from the settings."""
-    return SpaceLimits(
-        settings.alert_free_share,
-        settings.danger_free_share,
-        round(settings.alert_free_gb * BYTES_PER_GB),
-        round(settings.danger_free_gb * BYTES_PER_GB),
-    )
+    return SpaceWatch(folders, plant.space, clock)
 
 
 def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> RecordingIndexer:
@@ -172,6 +150,6 @@ def retention_rules(plant: PlantFile) -> RetentionRules:
     return RetentionRules(
         roots=roots,
         room=room,
-        gauge=SpaceGauge(roots, space_limits(plant.space), measure_disk),
+        gauge=SpaceGauge(roots, plant.space, measure_disk),
         in_use=partial(captures_in_use, data / EVIDENCE),
     )

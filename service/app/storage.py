@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 from service.reports.folders import EvidenceFolders
 from service.settings.configuration import Configuration, built_from, configuration_of
-from service.settings.plant import PlantFile, SpectraSettings
+from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.access.audit_verification import head_path
 from service.store.access.tables import AccessStore
 from service.store.audit import Trail
 from service.store.outbox import Address, no_recipients
-from service.store.spectra import SpectraLimits, TierLimits
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.store import SqliteReader, file_trail, open_access_file
 from service.store.store import Store
@@ -78,13 +77,12 @@ def open_store(
     StoreError
         If the database cannot be used, or contains results of the other origin.
     """
-    spectra = spectra_limits(plant.spectra)
     if plant.store.postgresql is None:
-        return SqliteStore(database_path(plant), origin, address, spectra)
+        return SqliteStore(database_path(plant), origin, address, plant.spectra)
     from service.store.postgres import PostgresStore  # slow import
 
     where = _postgres_address(plant, plant.store.postgresql)
-    return PostgresStore(where, head_file(plant), origin, address, spectra)
+    return PostgresStore(where, head_file(plant), origin, address, plant.spectra)
 
 
 def open_store_to_serve(plant: PlantFile, origin: Origin = Origin.LIVE) -> Store:
@@ -132,15 +130,6 @@ def _postgres_address(plant: PlantFile, conninfo: str) -> "PostgresAddress":
     from service.store.postgres.connection import PostgresAddress
 
     return PostgresAddress(conninfo, plant.store.password_path)
-
-
-def spectra_limits(settings: SpectraSettings) -> SpectraLimits:
-    """Return the limits of stored spectra from the settings."""
-    return SpectraLimits(
-        TierLimits(settings.dense_every_s, settings.n_dense),
-        TierLimits(settings.sparse_every_s, settings.n_sparse),
-        settings.n_lines,
-    )
 
 
 CAPTURES, RECORDINGS = "captures", "recordings"

@@ -22,7 +22,8 @@ from service.recordings.folders import (
     set_aside,
 )
 from service.recordings.index import Index, RetryList, inspected, reinspected
-from service.runtime.disk import S_PER_DAY, Measure, SpaceLimits
+from service.runtime.disk import S_PER_DAY, Measure
+from service.settings.storage import SpaceSettings
 from service.store.port import StoreError
 from service.store.waveforms import WaveformFile, WaveformKind, WaveformState
 
@@ -190,7 +191,7 @@ class SpaceGauge:
     """
 
     def __init__(
-        self, roots: Mapping[WaveformKind, Path], space: SpaceLimits, measure: Measure
+        self, roots: Mapping[WaveformKind, Path], space: SpaceSettings, measure: Measure
     ) -> None:
         self._roots, self._space, self._measure = roots, space, measure
         self.is_full = False
@@ -208,7 +209,7 @@ class SpaceGauge:
         for kind, root in self._roots.items():
             with errors.deferred():
                 space = self._measure(root)
-                limits = self._space.of(space.total_bytes)
+                limits = self._space.limits(space.total_bytes)
                 wanted = limits.danger_below or 0.0
                 if kind is WaveformKind.CONTINUOUS:
                     self.is_full = space.free_share < wanted

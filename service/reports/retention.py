@@ -10,6 +10,7 @@ from core.units import DAY_NS
 from service.reports.folders import INCOMPLETE, REMOVED, Place, places, removed
 from service.runtime.files import sync_folder, write_whole
 from service.runtime.times import compact
+from service.settings.storage import BYTES_PER_GB, EvidenceSettings
 
 MAX_REMOVED = 10_000
 """Maximum number of names of removed bundles per unit that are kept."""
@@ -17,32 +18,6 @@ MAX_REMOVED = 10_000
 
 SURVEY_S = 3600.0
 """Interval in seconds between surveys of all folders; folders may be removed by hand."""
-
-
-@dataclass(frozen=True)
-class EvidenceLimits:
-    """Limits of the evidence bundles.
-
-    Parameters
-    ----------
-    max_bytes
-        Total size above which bundles older than `keep_days` are removed, oldest first.
-    hard_max_bytes
-        Total size above which bundles of any age are removed, oldest first.
-    keep_days
-        Age up to which only `hard_max_bytes` and `max_per_alarm` apply.
-    max_per_alarm
-        Maximum number of bundles per alarm, so that a chattering alarm does not displace the
-        bundles of other alarms.
-    trend_days
-        Time before an alarm for which readings of its film are included, in days.
-    """
-
-    max_bytes: int = 2_000_000_000
-    hard_max_bytes: int = 4_000_000_000
-    keep_days: float = 30.0
-    max_per_alarm: int = 200
-    trend_days: float = 14.0
 
 
 @dataclass(frozen=True, order=True)
@@ -59,7 +34,7 @@ class EvidenceRetention:
     The sizes of all bundles are cached, so that an alarm flood does not read all folders.
     """
 
-    def __init__(self, root: Path, limits: EvidenceLimits, clock: Clock) -> None:
+    def __init__(self, root: Path, limits: EvidenceSettings, clock: Clock) -> None:
         self._root, self._limits, self._clock = root, limits, clock
         self._sizes: dict[str, dict[_Held, int]] = {}
         """Sizes of bundles in bytes, by alarm."""
@@ -118,7 +93,9 @@ class EvidenceRetention:
     def _beyond_the_limits(self, going: dict[_Held, str]) -> dict[_Held, str]:
         """Return further bundles to remove because of their total size, with their alarms."""
         n_bytes = self._n_bytes - sum(self._sizes[alarm][held] for held, alarm in going.items())
-        if n_bytes <= min(self._limits.max_bytes, self._limits.hard_max_bytes):
+        limits = self._limits
+        soft, hard = (round(gb * BYTES_PER_GB) for gb in (limits.max_gb, limits.hard_max_gb))
+        if n_bytes <= soft:
             return {}
         all_held = sorted(
             (held, alarm, size) for alarm, own in self._sizes.items() for held, size in own.items()
@@ -127,8 +104,7 @@ class EvidenceRetention:
         found: dict[_Held, str] = {}
         for held, alarm, size in all_held[:-1]:
             is_young = held.name.partition("-")[0] >= young
-            limit = self._limits.hard_max_bytes if is_young else self._limits.max_bytes
-            if held not in going and n_bytes > limit:
+            if held not in going and n_bytes > (hard if is_young else soft):
                 found[held] = alarm
                 n_bytes -= size
         return found

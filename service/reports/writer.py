@@ -9,10 +9,10 @@ from service.reports.contents import cell_of, comparison, members_of
 from service.reports.document import Maker, composed, file_part, not_known, sealed
 from service.reports.folders import DOCUMENT, INCOMPLETE, Place, place_of
 from service.reports.parts import AXES, ComparisonPart
-from service.reports.retention import EvidenceLimits
 from service.reports.snapshot import Snapshot
 from service.reports.tables import ORBITS, SPECTRA, TREND, orbits_table, spectra_table, trend_table
 from service.runtime.files import sync_folder, write_synced
+from service.settings.storage import EvidenceSettings
 from service.store.film_readings import FilmQuery
 from service.store.films import FilmStore
 
@@ -20,7 +20,9 @@ from service.store.films import FilmStore
 class EvidenceWriter:
     """Writer of evidence bundles; a bundle exists under its name only if it is complete."""
 
-    def __init__(self, root: Path, maker: Maker, store: FilmStore, limits: EvidenceLimits) -> None:
+    def __init__(
+        self, root: Path, maker: Maker, store: FilmStore, limits: EvidenceSettings
+    ) -> None:
         self._root, self._maker, self._store, self._limits = root, maker, store, limits
 
     def write(self, snapshot: Snapshot, *, with_history: bool = True) -> Place:

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition.clock import Clock
-from core.limits import WITHIN, AlarmLevel, Judgement, Limits, judge, unknown
+from core.limits import WITHIN, AlarmLevel, Judgement, judge, unknown
 from core.quality import Reading
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import periodic
+from service.settings.storage import BYTES_PER_GB, SpaceSettings
 
 
 @dataclass(frozen=True)
@@ -96,36 +97,7 @@ class Growth:
         return space.free_bytes / taken * lasted_s / S_PER_DAY
 
 
-MAX_ALERT, MAX_DANGER = 0.25, 0.125
-"""Shares of the capacity to which the byte limits of `SpaceLimits` are reduced on small disks."""
-
-DEADBAND_SHARE = 0.2
-"""Deadband (hysteresis) of the limits as a share of the danger limit."""
-
-
-@dataclass(frozen=True)
-class SpaceLimits:
-    """Alert and danger limits of free space, as shares of the capacity and in bytes.
-
-    The higher limit of share and bytes applies; on small disks the bytes are limited to `MAX_ALERT`
-    and `MAX_DANGER` of the capacity.
-    """
-
-    alert_share: float = 0.1
-    danger_share: float = 0.05
-    alert_bytes: int = 2_000_000_000
-    danger_bytes: int = 1_000_000_000
-
-    def of(self, total_bytes: int) -> Limits:
-        """Return the limits of the free share of a disk with the capacity `total_bytes`."""
-        whole = max(total_bytes, 1)
-        alert = max(self.alert_share, min(self.alert_bytes / whole, MAX_ALERT))
-        danger = max(self.danger_share, min(self.danger_bytes / whole, MAX_DANGER))
-        return Limits(alert_below=alert, danger_below=danger, deadband=DEADBAND_SHARE * danger)
-
-
 PERIOD_S = 10.0
-GB = 1e9
 
 
 @dataclass(frozen=True)
@@ -147,7 +119,8 @@ class DiskView:
 
     def __str__(self) -> str:
         space, days = self.space, self.days_until_full
-        found = f"{space.free_bytes / GB:.3g} of {space.total_bytes / GB:.3g} GB free"
+        free_gb, total_gb = (n / BYTES_PER_GB for n in (space.free_bytes, space.total_bytes))
+        found = f"{free_gb:.3g} of {total_gb:.3g} GB free"
         return found if days is None else f"{found}, full in {days:.2g} days"
 
 
@@ -160,7 +133,7 @@ class SpaceWatch:
     def __init__(
         self,
         folders: Mapping[str, Path],
-        limits: SpaceLimits,
+        limits: SpaceSettings,
         clock: Clock,
         measure: Measure = measure_disk,
     ) -> None:
@@ -210,7 +183,7 @@ class SpaceWatch:
         return DiskView(name, space, growth.days_until_full(space, now_s))
 
     def _judged(self, disk: DiskView, held: AlarmLevel | None) -> Judgement:
-        limits = self._limits.of(disk.space.total_bytes)
+        limits = self._limits.limits(disk.space.total_bytes)
         found = judge(Reading(disk.space.free_share), limits, held)
         if found.level is None:
             return found

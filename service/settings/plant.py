@@ -25,44 +25,11 @@ from service.settings.storage import (
     RecordingSettings,
     RetentionSettings,
     SpaceSettings,
+    SpectraSettings,
     StoreSettings,
 )
 from service.settings.toml_file import load_toml, schema_of
 from service.settings.units import UnitSettings, require_lines_apart
-
-EveryS = Annotated[float, Field(ge=1.0, le=86_400.0)]
-Count = Annotated[int, Field(ge=1, le=1_000_000)]
-
-
-class SpectraSettings(Settings):
-    """Settings of stored spectra: recent ones at short intervals, older ones at long intervals.
-
-    A spectrum up to 25 Hz at the default settings takes 4 kB of disk space.
-    """
-
-    dense_every_s: EveryS = 60.0
-    """Interval between recent (dense) spectra, s."""
-
-    n_dense: Count = 1440
-    """Number of dense spectra stored for each bearing; 1440 at 60 s are one day."""
-
-    sparse_every_s: EveryS = 600.0
-    """Interval between older (sparse) spectra, s; at least dense_every_s."""
-
-    n_sparse: Count = 52_560
-    """Number of sparse spectra stored for each bearing; 52560 at 600 s are one year and take 0.2
-    GB."""
-
-    n_lines: Annotated[int, Field(ge=8, le=20_000)] = 1000
-    """Maximum number of stored lines of a spectrum, counted from the lowest frequency."""
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.sparse_every_s < self.dense_every_s:
-            limit = f"must not be below dense_every_s = {self.dense_every_s:g}"
-            raise MisfitError(limit, "sparse_every_s")
-        return self
-
 
 MIN_SEGMENT_TURNS = 8
 """Minimum number of turns in a segment. The Hann taper spreads a line over two bins to each side;

@@ -1,4 +1,4 @@
-"""Settings of stored data: database, retention, recordings, evidence and disk space."""
+"""Settings of stored data: database, retention, recordings, evidence, spectra, disk space."""
 
 from enum import StrEnum
 from itertools import pairwise
@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
+from core.limits import Limits
 from service.settings.base import Identifier, MisfitError, SecretMisfitError, Settings, Share
 from service.settings.processes import FilePath
 
@@ -164,6 +165,40 @@ class EvidenceSettings(Settings):
         return self
 
 
+EveryS = Annotated[float, Field(ge=1.0, le=86_400.0)]
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+class SpectraSettings(Settings):
+    """Settings of stored spectra: recent ones at short intervals, older ones at long intervals.
+
+    A spectrum up to 25 Hz at the default settings takes 4 kB of disk space.
+    """
+
+    dense_every_s: EveryS = 60.0
+    """Interval between recent (dense) spectra, s."""
+
+    n_dense: Count = 1440
+    """Number of dense spectra stored for each bearing; 1440 at 60 s are one day."""
+
+    sparse_every_s: EveryS = 600.0
+    """Interval between older (sparse) spectra, s; at least dense_every_s."""
+
+    n_sparse: Count = 52_560
+    """Number of sparse spectra stored for each bearing; 52560 at 600 s are one year and take 0.2
+    GB."""
+
+    n_lines: Annotated[int, Field(ge=8, le=20_000)] = 1000
+    """Maximum number of stored lines of a spectrum, counted from the lowest frequency."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.sparse_every_s < self.dense_every_s:
+            limit = f"must not be below dense_every_s = {self.dense_every_s:g}"
+            raise MisfitError(limit, "sparse_every_s")
+        return self
+
+
 Gigabytes = Annotated[float, Field(gt=0.0, le=1_000_000.0)]
 
 
@@ -195,6 +230,22 @@ class SpaceSettings(Settings):
                 limit = f"must be below alert_free_{unit} = {alert:g}"
                 raise MisfitError(limit, f"danger_free_{unit}")
         return self
+
+    def limits(self, total_bytes: int) -> Limits:
+        """Return the limits of the free share of a disk with the capacity `total_bytes`."""
+        total_gb = max(total_bytes, 1) / BYTES_PER_GB
+        alert = max(self.alert_free_share, min(self.alert_free_gb / total_gb, MAX_ALERT))
+        danger = max(self.danger_free_share, min(self.danger_free_gb / total_gb, MAX_DANGER))
+        return Limits(alert_below=alert, danger_below=danger, deadband=DEADBAND_SHARE * danger)
+
+
+MAX_ALERT, MAX_DANGER = 0.25, 0.125
+"""Shares of the capacity to which the limits in GB are reduced on small disks."""
+
+DEADBAND_SHARE = 0.2
+"""Deadband (hysteresis) of the limits as a share of the danger limit."""
+
+BYTES_PER_GB = 1e9
 
 
 class Origin(StrEnum):

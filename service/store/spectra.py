@@ -15,6 +15,7 @@ from core.monitor.assessment import Assessment
 from core.quality import Level, Quality, Reason, worst
 from core.stiffness.order_line import marked_hz
 from core.units import ns_from_s
+from service.settings.storage import SpectraSettings
 from service.store.database import Connection, Tables, insert
 from service.store.series import find_series, series_of
 from service.store.trends import storable
@@ -28,38 +29,6 @@ class Tier(IntEnum):
 
     DENSE = 0
     SPARSE = 1
-
-
-@dataclass(frozen=True)
-class TierLimits:
-    """Limits of a storage tier: interval between spectra in s, and maximum number per bearing."""
-
-    every_s: float
-    n_most: int
-
-    def slot(self, time_ns: int) -> int:
-        """Return the number of the interval that contains a time."""
-        return time_ns // ns_from_s(self.every_s)
-
-
-@dataclass(frozen=True)
-class SpectraLimits:
-    """Limits of stored spectra.
-
-    Parameters
-    ----------
-    n_most_lines
-        Maximum number of spectral lines per channel, counted from the lowest frequency.
-    """
-
-    dense: TierLimits = TierLimits(60.0, 1440)
-    sparse: TierLimits = TierLimits(600.0, 52_560)
-    n_most_lines: int = 1000
-
-    @property
-    def tiers(self) -> tuple[tuple[Tier, TierLimits], ...]:
-        """Dense and sparse tier with their limits."""
-        return (Tier.DENSE, self.dense), (Tier.SPARSE, self.sparse)
 
 
 @dataclass(frozen=True)
@@ -223,24 +192,28 @@ JUDGED = tuple(
 
 
 def insert_spectra(
-    writer: Connection, assessments: Iterable[Assessment], limits: SpectraLimits
+    writer: Connection, assessments: Iterable[Assessment], limits: SpectraSettings
 ) -> None:
     """Insert the first spectrum of each interval of each tier; delete spectra beyond the limit.
 
     Assessments without a spectrum are skipped.
     """
+    tiers = (
+        (Tier.DENSE, limits.dense_every_s, limits.n_dense),
+        (Tier.SPARSE, limits.sparse_every_s, limits.n_sparse),
+    )
     for assessment in assessments:
         spectrum = assessment.spectrum
         if spectrum.frequency_hz.size and spectrum.n_segments.diagonal().any():
             series = series_of(writer, assessment.unit, assessment.bearing)
-            for tier, its in limits.tiers:
-                key = (series, int(tier), its.slot(assessment.time_ns))
+            for tier, every_s, n_kept in tiers:
+                key = (series, int(tier), assessment.time_ns // ns_from_s(every_s))
                 if not writer.execute(IS_TAKEN, key).fetchone():
                     facts = _facts(assessment, series)
-                    amplitudes = encode(_amplitudes(assessment)[:, : limits.n_most_lines])
+                    amplitudes = encode(_amplitudes(assessment)[:, : limits.n_lines])
                     row = (*key[1:], *facts, amplitudes, checksum(facts, amplitudes))
                     writer.execute(INSERT, row)
-                    kept = {"series": series, "tier": int(tier), "n_kept": its.n_most}
+                    kept = {"series": series, "tier": int(tier), "n_kept": n_kept}
                     writer.execute(TRIM, kept)
 
 

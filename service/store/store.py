@@ -8,6 +8,7 @@ from core.alarms.alarm import Alarm, AlarmNews
 from core.change.film_judge import FilmNews
 from core.monitor.assessment import Assessment
 from core.samples.gaps import Gap, Reach
+from service.settings.storage import SpectraSettings
 from service.store.alarms import insert_alarms, select_alarms, select_events
 from service.store.audit import AuditChain, AuditStore
 from service.store.database import Connection, Database, Hold
@@ -43,7 +44,7 @@ from service.store.sharing import (
     select_position,
     write_positions,
 )
-from service.store.spectra import SpectraLimits, SpectraStore, insert_spectra
+from service.store.spectra import SpectraStore, insert_spectra
 from service.store.trends import storable
 from service.store.waveforms import WaveformStore
 
@@ -93,7 +94,7 @@ class Store:
     address
         Function that returns the outbox messages about an alarm event.
     spectra
-        Limits of stored spectra; None for the defaults of `SpectraLimits`.
+        Limits of stored spectra; None for the defaults of `SpectraSettings`.
     is_read_only
         Whether another process writes the database; all methods that write then raise `StoreError`.
     """
@@ -103,12 +104,12 @@ class Store:
         database: Database,
         head: Path,
         address: Address = no_recipients,
-        spectra: SpectraLimits | None = None,
+        spectra: SpectraSettings | None = None,
         *,
         is_read_only: bool = False,
     ) -> None:
         self.database, self._address = database, address
-        self._spectra_limits = spectra or SpectraLimits()
+        self._spectra_limits = spectra or SpectraSettings()
         self._chain = AuditChain(head, database)
         self._writing, self._reader = self._chain.writing, database.reading
         audited = (self._chain, self._reader)

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from service.settings.storage import Origin
+from service.settings.storage import Origin, SpectraSettings
 from service.store.access.audit_entries import AuditAction, acting
 from service.store.access.audit_verification import AuditHead, write_head
 from service.store.access.tables import AccessStore
@@ -14,7 +14,6 @@ from service.store.audit import AuditChain, Trail, closed_after_error, newest_of
 from service.store.outbox import Address, no_recipients
 from service.store.postgres.connection import PostgresAddress, PostgresConnection
 from service.store.postgres.database import PostgresDatabase, Readers
-from service.store.spectra import SpectraLimits
 from service.store.store import Store
 
 HEAD_BEGUN = "audit.head_begun"
@@ -34,7 +33,7 @@ class PostgresStore(Store):
     to
         Function that returns the outbox messages about an alarm event.
     spectra
-        Limits of stored spectra; None for the defaults of `SpectraLimits`.
+        Limits of stored spectra; None for the defaults of `SpectraSettings`.
 
     Raises
     ------
@@ -49,7 +48,7 @@ class PostgresStore(Store):
         head: Path,
         origin: Origin = Origin.LIVE,
         to: Address = no_recipients,
-        spectra: SpectraLimits | None = None,
+        spectra: SpectraSettings | None = None,
     ) -> None:
         database = PostgresDatabase(address, origin)
         with closed_after_error(database, head):

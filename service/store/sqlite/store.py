@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from threading import Lock
 
-from service.settings.storage import Origin
+from service.settings.storage import Origin, SpectraSettings
 from service.store.access.audit_verification import head_path
 from service.store.access.tables import AccessStore
 from service.store.audit import AuditChain, Trail, begin_head, closed_after_error
@@ -15,7 +15,6 @@ from service.store.integrity import Integrity
 from service.store.outbox import Address, no_recipients
 from service.store.port import StoreError
 from service.store.retention import RetentionStore
-from service.store.spectra import SpectraLimits
 from service.store.sqlite.checking import Scrubber
 from service.store.sqlite.connections import BUSY_TIMEOUT_S
 from service.store.sqlite.database import SqliteDatabase, SqliteReading
@@ -34,7 +33,7 @@ class SqliteStore(Store):
     address
         Function that returns the outbox messages about an alarm event.
     spectra
-        Limits of stored spectra; None for the defaults of `SpectraLimits`.
+        Limits of stored spectra; None for the defaults of `SpectraSettings`.
 
     Raises
     ------
@@ -48,7 +47,7 @@ class SqliteStore(Store):
         path: Path,
         origin: Origin = Origin.LIVE,
         address: Address = no_recipients,
-        spectra: SpectraLimits | None = None,
+        spectra: SpectraSettings | None = None,
     ) -> None:
         database = self._file = SqliteDatabase(path, origin)
         with _begun_head(database, path):

@@ -12,8 +12,7 @@ from structlog.testing import capture_logs
 
 from acquisition.clock import Clock
 from core.limits import AlarmLevel
-from service.app.kept_files import space_limits
-from service.runtime.disk import DiskSpace, Growth, SpaceLimits, SpaceWatch, measure_disk
+from service.runtime.disk import DiskSpace, Growth, SpaceWatch, measure_disk
 from service.settings.storage import SpaceSettings
 from service.store.holds import FileSystem, exclusive_use
 from service.store.port import StoreError
@@ -46,7 +45,7 @@ def disks() -> Disks:
 @pytest.fixture
 def watch(disks: Disks, stepped_clock: Clock) -> SpaceWatch:
     folders = {name: Path(name) for name in ("data", "captures", "evidence")}
-    return SpaceWatch(folders, SpaceLimits(), stepped_clock, disks.measure)
+    return SpaceWatch(folders, SpaceSettings(), stepped_clock, disks.measure)
 
 
 def test_what_a_real_file_system_says_is_taken(tmp_path):
@@ -102,7 +101,7 @@ async def test_a_disk_that_cannot_be_asked_is_not_taken_for_one_with_room(watch,
 
 @given(st.integers(1, 10**16))
 def test_limits_fit_every_disk(total_bytes):
-    limits = SpaceLimits().of(total_bytes)
+    limits = SpaceSettings().limits(total_bytes)
 
     assert limits.passed(1.0, None) is None
     assert limits.passed(0.5, AlarmLevel.DANGER) is None
@@ -110,7 +109,7 @@ def test_limits_fit_every_disk(total_bytes):
 
 
 def test_gigabytes_rule_where_a_share_of_the_disk_is_too_little():
-    limits = SpaceLimits().of(10 * GB)
+    limits = SpaceSettings().limits(10 * GB)
     assert limits.passed(0.15, None) is ALERT
     assert limits.passed(0.09, None) is DANGER
 
@@ -135,10 +134,6 @@ def test_a_danger_that_comes_before_its_alert_is_refused(unit):
     asked = {f"danger_free_{unit}": 0.5, f"alert_free_{unit}": 0.4}
     with pytest.raises(ValidationError, match=f"must be below alert_free_{unit} = 0.4"):
         SpaceSettings.model_validate(asked)
-
-
-def test_settings_and_limits_have_the_same_defaults():
-    assert space_limits(SpaceSettings()) == SpaceLimits()
 
 
 def test_a_data_folder_on_a_network_file_system_is_refused_with_what_to_do(tmp_path):

@@ -11,7 +11,8 @@ from unittest.mock import Mock
 import pytest
 
 from service.reports.folders import Place, clear_leftovers, places, removed
-from service.reports.retention import SURVEY_S, EvidenceLimits, EvidenceRetention
+from service.reports.retention import SURVEY_S, EvidenceRetention
+from service.settings.storage import EvidenceSettings
 
 RoomOf = Callable[..., EvidenceRetention]
 KB = b"x" * 1000
@@ -36,7 +37,8 @@ def room_of(root: Path, stepped_clock: Any) -> RoomOf:
     """Builds what makes room, at the beginning of 2026, by the limits it is given."""
 
     def build(soft: int, hard: int = 8000, most: int = 200) -> EvidenceRetention:
-        return EvidenceRetention(root, EvidenceLimits(soft, hard, 30.0, most), stepped_clock)
+        limits = EvidenceSettings(max_gb=soft / 1e9, hard_max_gb=hard / 1e9, max_per_alarm=most)
+        return EvidenceRetention(root, limits, stepped_clock)
 
     return build
 

@@ -17,14 +17,13 @@ from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from core.quality import Level, Reason, missing
 from core.spectra.cross_spectrum import CrossSpectrum
+from service.settings.storage import SpectraSettings
 from service.store.spectra import (
     HIGHEST_UM,
     LOWEST_UM,
     Spectra,
-    SpectraLimits,
     SpectraQuery,
     Tier,
-    TierLimits,
     decode,
     encode,
 )
@@ -32,7 +31,7 @@ from service.store.sqlite import SqliteStore
 
 S = 1_000_000_000
 T0 = 1_767_225_600 * S
-LIMITS = SpectraLimits(TierLimits(60.0, 5), TierLimits(600.0, 4), 12)
+LIMITS = SpectraSettings(n_dense=5, n_sparse=4, n_lines=12)
 
 
 def spectrum(n_lines: int = 8, scale_um: float = 1.0, lost: tuple[int, ...] = ()) -> CrossSpectrum:

@@ -23,11 +23,13 @@ from core.monitor.catalogue import CATALOGUE
 from core.quality import Reason, missing
 from core.samples.gaps import Gap
 from core.spectra.cross_spectrum import average
+from core.units import ns_from_s
+from service.settings.storage import SpectraSettings
 from service.store.audit import AuditQuery
 from service.store.film_readings import FilmQuery
 from service.store.outbox import OutboxMessage
 from service.store.port import AlarmQuery, TrendQuery, UnitGap
-from service.store.spectra import SpectraLimits, SpectraQuery
+from service.store.spectra import SpectraQuery
 from service.store.store import Store
 
 RECEIVER = "R"
@@ -196,11 +198,14 @@ def _parts_of(done: AuditAction, number: int) -> dict[str, object]:
     return due
 
 
+SPECTRA = SpectraSettings()
+
+
 def _has_spectrum(number: int) -> bool:
     """Whether it is the first of a stretch of time of which one is kept."""
     return number == 0 or any(
-        limits.slot(T0_NS + number * HOP_NS) != limits.slot(T0_NS + (number - 1) * HOP_NS)
-        for _, limits in SpectraLimits().tiers
+        (T0_NS + number * HOP_NS) // every_ns != (T0_NS + (number - 1) * HOP_NS) // every_ns
+        for every_ns in map(ns_from_s, (SPECTRA.dense_every_s, SPECTRA.sparse_every_s))
     )
 
 

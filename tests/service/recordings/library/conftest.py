@@ -16,9 +16,12 @@ from core.machine.channel import Measurand
 from service.recordings.index import Index
 from service.recordings.keeper import RecordingIndexer, RecordingLock
 from service.recordings.retention import RecordingRetention, RetentionRules, RoomLimits, SpaceGauge
-from service.runtime.disk import DiskSpace, SpaceLimits
+from service.runtime.disk import DiskSpace
+from service.settings.storage import SpaceSettings
 from service.store.sqlite import SqliteStore
 from service.store.waveforms import WaveformFile, WaveformKind
+
+SPACE = SpaceSettings(alert_free_gb=2e-9, danger_free_gb=1e-9)
 
 T0 = 1_767_225_600_000_000_000
 HOUR_NS = 3600 * 10**9
@@ -66,7 +69,7 @@ class Rig:
 
     def hire(self) -> RecordingRetention:
         """Begin anew, as after a restart."""
-        self.gauge = SpaceGauge(self.roots, SpaceLimits(0.1, 0.05, 0, 0), self.measured)
+        self.gauge = SpaceGauge(self.roots, SPACE, self.measured)
         custody = RetentionRules(self.roots, self.room, self.gauge, lambda: self.bound)
         self.caretaker = RecordingRetention(
             custody, Index(self.store.waveforms, "here"), self.clock
