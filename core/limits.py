@@ -103,7 +103,8 @@ class Limits:
     def passed(self, value: float, held: AlarmLevel | None) -> AlarmLevel | None:
         """Return the highest level whose limit a value exceeds, or None if it exceeds none.
 
-        The level `held` before, and those below it, end only inside the limit by the deadband.
+        `held` is the level of the previous judgement, or None. This level and those below it end
+        only if the value is inside the limit by at least the deadband.
         """
         levels = [
             level

@@ -163,7 +163,7 @@ MIN_EFFECTIVE = 2.0
 
 
 def effective_number(values: FloatArray) -> float:
-    """Return the effective number of independent values among values (n,); at least 2 if n is.
+    """Return the effective number of independent values among n values; at least 2 if n >= 2.
 
     Values of overlapping segments are correlated. The effective number for a first-order process is
     ``n (1 - r) / (1 + r)``, with the correlation r of successive values (Bayley and Hammersley

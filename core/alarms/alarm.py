@@ -103,7 +103,7 @@ class Alarm:
     is_acknowledged
         Whether the newest occurrence is acknowledged.
     raised_ns
-        Start time of the newest occurrence; None before the first.
+        Start of the newest occurrence, ns since 1970 UTC; None before the first.
     raised_at
         Operating point at the start of the newest occurrence; None if unknown.
     n_events
@@ -195,10 +195,10 @@ class AlarmEvent:
     number
         Sequence number among the events of this alarm, from 1 without gaps.
     level
-        Level after the event, or before it if the alarm is inactive after it; None if inactive in
-        both.
+        Level after the event; if the alarm is then inactive, the level before the event. None if
+        the alarm is inactive before and after the event.
     time_ns
-        Time of the samples that caused the event; host time for actions and link events.
+        Time of the samples that caused the event, or host time of an action or link event.
     occurrence, raised_at
         Number and operating point of the newest occurrence, as in `Alarm`.
     value, limit, directions
@@ -241,9 +241,9 @@ def changed(
     actor: str = "",
     reason: str = "",
 ) -> tuple[Alarm, AlarmEvent]:
-    """Return `after` with the event count of `before` plus one, and the event of the change.
+    """Return the changed alarm with its event count increased by one, and the event.
 
-    `actor` and `reason` are those of the event; both are empty if there are none.
+    `before` and `after` are the states of the alarm. `actor` is empty for automatic changes.
     """
     after = replace(after, n_events=before.n_events + 1)
     event = AlarmEvent(

@@ -23,7 +23,8 @@ class AlarmMemory:
     points
         Newest operating point of each bearing and its sample time in ns, by bearing id.
     stop
-        Epoch and sample index at the end of the newest judged block; None before the first block.
+        Epoch of the sample count, and index of the first sample after the newest judged block; None
+        before the first block.
     is_connected
         Whether the link to the device was up.
     link_reason
@@ -68,22 +69,22 @@ class AlarmBoard:
         return self._alarms[id_]
 
     def update(self, watch: Watch, condition: Judgement, now_ns: int) -> None:
-        """Update an alarm as `record` does, but skip an inactive alarm that would stay inactive."""
+        """Update an alarm from a judgement, unless the alarm is inactive and stays inactive."""
         is_within = condition.level is None and condition.is_known
         if not (is_within and self._alarms[watch.id].is_settled_inactive):
             self.record(watch.id, condition, now_ns)
 
     def record(self, id_: str, condition: Judgement, now_ns: int) -> None:
-        """Update the alarm with an id from a judgement; `drain_news` returns the resulting events.
+        """Update the alarm with an id from a judgement at the time `now_ns`.
 
-        An alarm that stays inactive gets the new value too. Raises `KeyError` for an unknown id.
+        The resulting events are returned by `drain_news`. Raises `KeyError` for an unknown id.
         """
         self._note(id_, *update(self._alarms[id_], condition, now_ns, self._rules[id_]))
 
     def pause(self, spared: str | None = None) -> None:
-        """Pause the delay timers of all alarms, except those of the alarm kind `spared`.
+        """Pause the delay timers of all alarms, except alarms of the kind `spared`.
 
-        The elapsed time is unknown if samples are missing or the clock was set.
+        Call this if the elapsed time is unknown: samples are missing, or the clock was set.
         """
         self._alarms = {
             id_: alarm if alarm.identity.kind == spared else interrupted(alarm)

@@ -38,7 +38,7 @@ def channel_judgement(
         Fault detected from segments, or None; used if the newest samples are good.
     clipped_percent
         Percentage of clipped samples in the newest segment, which is the value of an alert for
-        clipping; None if none or unknown.
+        clipping; None if no sample is clipped, or if the percentage is unknown.
     """
     fault = segment_fault if quality.level is Level.GOOD else quality.reason
     found = fault_judgement(fault)
@@ -71,11 +71,11 @@ def fault_after_segment(
 
 
 def film_judgement(found: Mapping[str, Judgement], held: Judgement) -> Judgement:
-    """Return the judgement of a film from those of its directions x and y.
+    """Return the judgement of a film, combined from the judgements `found` of directions x and y.
 
-    The direction with the highest level and the largest change gives value, limit and reason. The
-    film is within limits only if all directions are known, or at least all directions of the
-    alarm. `held` is the last judgement of the film.
+    Value, limit and reason are those of the direction with the highest level or, at equal levels,
+    the largest change. While a direction that exceeded its limit in `held`, the last judgement of
+    the film, is unknown, the level does not decrease.
     """
     known = {axis: each for axis, each in found.items() if each.is_known}
     unjudged = [each for axis, each in found.items() if axis not in known]
@@ -135,7 +135,7 @@ class OrderVector:
             raise ValueError(f"1× phase must be a number of degrees, got {self.phase_deg:g}")
 
     def change_um_pk(self, other: "OrderVector") -> float:
-        """Return the length of the vector difference.
+        """Return the length of the difference between this vector and another, in µm 0-pk.
 
         If a phase is None, return the absolute difference of the amplitudes instead.
         """

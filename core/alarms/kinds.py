@@ -211,7 +211,7 @@ class Watch:
     def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
         """Return the judgement of a reading by the limits that are valid at an operating point.
 
-        `held` is the level of the previous judgement, for the deadband; None without a level.
+        `held` is the level of the previous judgement, or None; the deadband depends on it.
         Raises `TypeError` if the alarm has no limits.
         """
         if self.limits is None:
@@ -224,7 +224,7 @@ def watch(
 ) -> Watch:
     """Return the definition of an alarm; a `LimitRule` gives it limits as well as an alarm rule.
 
-    `source` and `group` are those of `Watch`.
+    `source` is the name of the judged channel or reading, `group` the name of the rule.
     """
     if isinstance(rule, LimitRule):
         return Watch(identity, rule.rule, source, group, rule)

@@ -93,9 +93,10 @@ def restored(alarm: Alarm) -> Alarm:
 
 
 def next_level(held: AlarmLevel | None, timers: Iterable[Timers]) -> AlarmLevel | None:
-    """Return the level after the delays that are running, if the conditions last; else `held`.
+    """Return the level that an alarm will reach if its present conditions outlast all delays.
 
-    `timers` are those of the alarm, or of the directions of a film.
+    `held` is the present level, which is returned if no delay is running. `timers` are the pairs of
+    delay timers (alert, danger) of the alarm, or of each direction of a film.
     """
     pairs = [pair for each in timers for pair in zip(AlarmLevel, each, strict=True)]
     pending = [(level, timer.is_on) for level, timer in pairs if timer not in (INACTIVE, ON)]

@@ -132,7 +132,7 @@ def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[Ala
 
 
 def expire(alarm: Alarm, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
-    """Return the alarm, unshelved if its shelving has expired at host time, and the event if so.
+    """Unshelve an alarm if its shelving has expired at a host time; return it and the events.
 
     Shelving also ends if the host clock is more than `CLOCK_MARGIN_NS` earlier than the time of
     shelving: the clock was set back, so the expiry time is too late by the same amount. An alarm is

@@ -33,7 +33,7 @@ class Region:
     attitude_deg: Range | None = None
 
     def holds(self, point: OperatingPoint) -> bool | None:
-        """Whether the region contains an operating point; None if an unknown value decides."""
+        """Whether the region contains an operating point; None if a value needed is unknown."""
         is_inside = point.state in self.states
         is_known = is_inside or point.state is not OperatingState.UNKNOWN
         inside: list[bool | None] = [is_inside if is_known else None]
@@ -99,10 +99,10 @@ class LimitRule:
         return (*possible, self.limits) if counts and self.limits is not None else possible
 
     def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
-        """Return the worst judgement by all limits that may be valid; on a tie, the lowest limit's.
+        """Return the worst judgement of a reading by the limits that may be valid at a point.
 
-        `held` is the level of the previous judgement, for the deadband. Without valid limits the
-        condition is unknown, so a suppressed alarm does not return.
+        At equal levels, the judgement by the lowest limit is returned. `held` is the level of the
+        previous judgement, for the deadband. Without valid limits the condition is unknown.
         """
         found = [judge(reading, limits, held) for limits in self.at(point)]
         if not found:
@@ -139,7 +139,7 @@ class UnitRules:
     channel
         Rule for faults of waveform channels.
     slow_channel
-        Rule for faults of slow channels with limits; they may come late from another device.
+        Rule for faults of slow channels with limits. Its delays allow for late slow values.
     bearings
         Limit rules by bearing id.
     slow_limits

@@ -91,7 +91,7 @@ class AlarmFigures:
     chattering
         Number of chattering activations by alarm id.
     n_fleeting
-        Number of times that an alarm returned within the window of `ChatterRule`.
+        Number of times that an alarm was active for less than the window of `ChatterRule`.
     """
 
     n_alarms: int
@@ -150,7 +150,7 @@ def figures_of(
 
 
 def stale_alarms(alarms: Iterable[Alarm], now_ns: int) -> list[Alarm]:
-    """Return the active, not `HIDDEN` alarms raised over a day before `now_ns`, oldest first."""
+    """Return the active, visible alarms raised more than a day before `now_ns`, oldest first."""
     standing = [
         (alarm.raised_ns, alarm)
         for alarm in alarms

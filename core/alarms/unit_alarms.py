@@ -141,7 +141,7 @@ class UnitAlarms(AlarmBoard):
         Raises
         ------
         KeyError
-            If the unit has no film-stiffness alarm with such an id.
+            If the unit has no film-stiffness alarm with one of the ids.
         """
         films = {watch.id: watch for watch in self._of_rule["films"]}
         for id_, found in conditions.items():
@@ -151,7 +151,7 @@ class UnitAlarms(AlarmBoard):
         return self.drain_news()
 
     def link(self, is_connected: bool, reason: str | None, host_ns: int) -> list[AlarmNews]:
-        """Update the link alarm; return the changed alarms. `reason` is None if up or unknown."""
+        """Update the link alarm; return the changed alarms. `reason` states why it is down."""
         self._link = (is_connected, reason)
         self._take_link(host_ns)
         return self.drain_news()
@@ -164,9 +164,10 @@ class UnitAlarms(AlarmBoard):
     def restore(
         self, stored: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
     ) -> list[AlarmNews]:
-        """Restore alarms after a restart, as `AlarmBoard.restore` does with the same arguments.
+        """Restore the alarms after a restart; return the alarms that this changes.
 
-        A link event since the last block overrides the memory: a lost link stays lost until samples
+        `stored` are the alarms as stored; `memory` is None if samples were lost since the last
+        block. A link event since then overrides the memory: a lost link stays lost until samples
         arrive.
         """
         news = super().restore(stored, host_ns, memory)

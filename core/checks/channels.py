@@ -35,7 +35,7 @@ NOT_FINITE = VERDICT_OF[bad(Reason.NOT_FINITE)]
 
 @dataclass(frozen=True)
 class ChannelLimits:
-    """Voltage ranges and gains of channels, each (n_channels, 1); see `ChannelCalibration`."""
+    """Full-scale and OK voltages of channels, and engineering units per volt: (n_channels, 1)."""
 
     full_scale_v: FloatArray
     unit_per_v: FloatArray

@@ -118,7 +118,7 @@ def level_quality(
 def clipped_share(samples: FloatArray, unit_per_count: float) -> float:
     """Return the fraction of samples (n_samples,), in the channel's unit, that are clipped.
 
-    `unit_per_count` must not be 0.
+    `unit_per_count`, the engineering units per count of the converter, must not be 0.
     """
     counts = samples / unit_per_count
     at_end = (counts > COUNTS_FULL_SCALE - 1.5) | (counts < 0.5 - COUNTS_FULL_SCALE)
@@ -128,9 +128,9 @@ def clipped_share(samples: FloatArray, unit_per_count: float) -> float:
 def backward_share(power_x: float, power_y: float, cross_xy: complex) -> float:
     """Return the fraction, 0 to 1, of an orbit's power that turns from y to x (negative sense).
 
-    The orbit z = x + iy is split into forward and backward circles F and B. |F|² and |B|² are
-    (S_xx + S_yy ± 2 Im S_xy) / 4, with the means of |X|², |Y|² and X · conj(Y) at a spectral line.
-    The share needs no phase reference, and averages like the spectra. It is 0.5 without power.
+    `power_x`, `power_y` and `cross_xy` are the means of |X|², |Y|² and X · conj(Y) at a spectral
+    line. The orbit x + iy is the sum of a forward and a backward circle with the squared radii
+    (power_x + power_y ± 2 Im cross_xy) / 4. The fraction is 0.5 without power.
     """
     total = power_x + power_y
     if total <= 0.0:

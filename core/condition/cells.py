@@ -29,7 +29,7 @@ class FilmConditions:
         return int(self.eccentricity_ratio.size)
 
     def rows(self, wanted: npt.NDArray[np.bool_ | np.int64]) -> "FilmConditions":
-        """Return the conditions of the readings selected by a mask (n,) or by row numbers."""
+        """Return the conditions of the readings selected by a mask (n,) or by indices."""
         return FilmConditions(*(column[wanted] for column in vars(self).values()))
 
     def is_known(self, needs_attitude: bool) -> npt.NDArray[np.bool_]:

@@ -89,9 +89,9 @@ class Operation:
     since_ns
         Time of the first reading in this state; None before the first reading.
     last_ns
-        Time of the newest reading.
+        Time of the newest reading, ns since 1970 UTC; None before the first reading.
     speed_passed, power_passed
-        Whether the lower and the upper limit are reached or exceeded; None if unknown.
+        Whether the (lower, upper) limit is reached or exceeded; None before the first reading.
     was_at_speed
         While the speed is between both limits: whether the unit was last at rated speed (true) or
         at standstill (false).
@@ -240,7 +240,10 @@ class OilSettling:
     has_settled: bool = False
 
     def step(self, operation: Operation, oil_c: float, limits: OperatingLimits) -> "OilSettling":
-        """Return the settling after one oil temperature (NaN if missing) and operation update."""
+        """Return the settling updated with an oil temperature in °C; NaN if there is no reading.
+
+        `operation` is the operation of the unit at the time of the temperature.
+        """
         now_ns = operation.last_ns
         if now_ns is None or operation.at_speed_from_ns is None:
             return NOT_AT_SPEED

@@ -28,7 +28,7 @@ def pad_pattern(pads: Sequence[tuple[Reading, float | None]]) -> dict[str, Readi
     Parameters
     ----------
     pads
-        Temperature in °C, and angle in degrees from x towards y or None, of each pad.
+        Temperature of each pad in °C, and its angle in degrees from x towards y, None if unknown.
     """
     read = [(reading.value, angle) for reading, angle in pads if reading.value is not None]
     if len(read) < 2:

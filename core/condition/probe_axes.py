@@ -48,7 +48,7 @@ class ProbeAxis:
 
     @property
     def quality(self) -> Quality:
-        """Worst quality of the gaps; if one of two is missing, the other's, at best uncertain."""
+        """Worst quality of the known gaps; at best uncertain if one of two gaps is unknown."""
         if self.far is None:
             return self.near.quality
         if self.near.value is None and self.far.value is None:
@@ -61,7 +61,7 @@ class ProbeAxis:
 
 @dataclass(frozen=True)
 class Growth:
-    """Last measured thermal growth of a bearing's gaps, and half-width of its 95 % interval."""
+    """Last measured thermal growth of a bearing's gaps in µm, with half its 95 % interval."""
 
     value_um: float
     half_width_um: float
@@ -77,7 +77,8 @@ class ProbeAxes:
     values_um
         Gap changes, last measured growth and growth asymmetry (6,), in the order of `NAMES`.
     weights
-        Weights of the values in the displacement along x and y (2, 6); 0 if it is unknown.
+        Weights of `values_um` in the displacement along x and y (2, 6); 0 along an axis whose
+        displacement is unknown.
     """
 
     def __init__(

@@ -100,7 +100,10 @@ def pad_results(unit: Unit, bearing: Bearing, readings: Mapping[str, Reading]) -
 def probe_axis(
     bearing: Bearing, near: Sequence[Reading], far: Sequence[Reading], axis: int
 ) -> ProbeAxis:
-    """Return probe axis 0 (x) or 1 (y) of a bearing, from the mean gaps of (x, y) in µm."""
+    """Return the probe axis x (`axis` 0) or y (1) of a bearing, from mean gaps in µm.
+
+    `near` and `far` are the gaps (x, y) of the probes and of the opposite probes.
+    """
     has_far = (bearing.opposite_x, bearing.opposite_y)[axis] is not None
     if not has_far or bearing.opposite_reference_um is None:
         return ProbeAxis(near[axis], bearing.gap_reference_um[axis])

@@ -112,7 +112,7 @@ def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexAr
 
 
 def line_floor_um_pk(channel: Channel, frequency_hz: float) -> float:
-    """Return `Channel.line_floor` at a frequency as displacement, µm zero-to-peak.
+    """Return the noise amplitude of a channel's transducer at a frequency, µm zero-to-peak.
 
     The displacement grows towards low frequencies if the signal must be integrated or the
     transducer's response falls off.

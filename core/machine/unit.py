@@ -196,7 +196,7 @@ class Bearing:
     def bracket(self) -> BracketDynamics:
         """Stiffness, mass and damping of the bracket, from which the film force is derived.
 
-        An unknown stiffness is 1 N/m.
+        An unknown stiffness is replaced by 1 N/m; film coefficients are then ratios to it.
         """
         stiffness = self.bracket_stiffness_n_per_m
         if stiffness is None:

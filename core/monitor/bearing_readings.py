@@ -49,7 +49,10 @@ from core.uncertainty import Budget, Budgeted, Found, with_budgets
 
 @dataclass(frozen=True)
 class BearingReadings:
-    """Readings of one bearing, averaged over segments or polls; fields are as in `Assessment`."""
+    """Readings of one bearing, averaged over segments or polls.
+
+    Readings and budgets are by quantity; `estimators` are those of `stiffness`, by axes "xx", "yy".
+    """
 
     readings: Mapping[str, Reading]
     budgets: Mapping[str, Budget]
@@ -93,7 +96,7 @@ class UnitEvaluation:
     def of(self, bearing: Bearing, position: Found) -> BearingReadings:
         """Return the readings of one bearing.
 
-        `position` is the result of `core.condition.shaft_readings.position_results`.
+        `position` is the shaft position in the bearing, from `position_results`.
         """
         found = self._bearings[bearing.id]
         readings, budgets, film = found.readings(position, self._films.get(bearing.id))

@@ -130,7 +130,7 @@ def quantity_named(name: str) -> Quantity | None:
 
 
 def quantity_of(name: str) -> Quantity:
-    """Return the quantity of a reading as `quantity_named` does; raise `KeyError` if unknown."""
+    """Return the quantity with a name; raise `KeyError` if there is none."""
     if (found := quantity_named(name)) is None:
         raise KeyError(name)
     return found

@@ -45,11 +45,11 @@ class MonitorState:
 
 
 class UnitMonitor:
-    """Monitor of one unit: it computes assessments from sample blocks, and holds their state.
+    """Monitor of one unit, which computes assessments of its bearings from sample blocks.
 
     Results depend only on the samples and their indices, not on the boundaries of blocks or their
-    arrival times. The value of a slow channel applies to all samples of its cell. `transform`
-    converts sample windows to segments; by default, it is a `SegmentTransform` for waveforms.
+    arrival times. `transform` converts sample windows to segments; by default, it is a
+    `SegmentTransform` for waveforms.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class UnitMonitor:
         self._rewound_to = state.start
 
     def settle(self, state: MonitorState) -> None:
-        """Restore a state after a replay from `state.start` on; discard the gaps found in it."""
+        """Restore a state after the replay from `state.start` on; discard gaps in the replay."""
         self._growth = dict(state.growth)
         self._ring.account = state.account
         self._gaps.clear()
@@ -137,11 +137,11 @@ class UnitMonitor:
         return gaps
 
     def ingest(self, block: SampleBlock) -> list[Assessment]:
-        """Process a block as `refreshes` does; return the assessments of all bearings."""
+        """Process the next block; return the assessments of all bearings that it completes."""
         return list(self.steps(block))
 
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
-        """Process a block as `refreshes` does; yield the assessments, one bearing at a time."""
+        """Process the next block; yield the assessments that it completes, bearing by bearing."""
         for refresh in self.refreshes(block):
             yield refresh.assessment()
 

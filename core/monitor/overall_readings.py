@@ -88,7 +88,10 @@ def recent_readings(
 
 
 def polled_readings(polls: Sequence[Segment], rows: Sequence[int]) -> tuple[RecentReadings, ...]:
-    """Return the 1× shaft vibration of each poll; `rows` are the rows of the bearing's channels."""
+    """Return the 1× shaft vibration of a bearing in each poll, in the order of the polls.
+
+    `rows` are the rows of the bearing's channels.
+    """
     return tuple(
         RecentReadings(
             poll.stop_ns,

@@ -45,7 +45,7 @@ class Refresh:
     newest
         Samples of the newest segment or poll.
     n_voided
-        As in `AveragingWindow`.
+        Number of segments interrupted by gaps or restarts since the service started.
     last_growth
         Last measured thermal growth of the gaps; None if it was never measured.
     """

@@ -116,7 +116,7 @@ class SampleAxis:
         self.index, self.at_ns = index, at_ns
 
     def forward(self, counter: int, modulus: int) -> int:
-        """Return the number of samples, below `modulus`, from the index to a counter value."""
+        """Return the number of samples, below `modulus`, from the current index to a counter."""
         return (counter - (self.index or 0)) % modulus
 
     def jump(self, counter: int, modulus: int, at_ns: int) -> int:
@@ -132,5 +132,5 @@ class SampleAxis:
         return max(0, at_ns - self.at_ns) / NS_PER_S * self._rate_hz
 
     def allowance(self, at_ns: int, tolerance: ClockTolerance) -> float:
-        """Return the allowed difference, in samples, between a jump and `elapsed`."""
+        """Return the allowed difference, in samples, of a counted jump from the elapsed time."""
         return tolerance.over(self.elapsed(at_ns), self._rate_hz)

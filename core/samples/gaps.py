@@ -145,7 +145,7 @@ def restart(reach: Reach, block: SampleBlock) -> Gap | None:
 def begins_anew(reach: Reach, block: SampleBlock) -> bool:
     """Whether the device restarted its sample count within the same epoch.
 
-    This is so if samples with the block's index have arrived, but with earlier times.
+    It did if samples with the block's index were received before, but with earlier times.
     """
     if block.epoch != reach.epoch or block.first_index >= reach.stop_index:
         return False

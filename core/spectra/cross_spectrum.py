@@ -15,7 +15,7 @@ SHAFT_X, SHAFT_Y, BEARING_X, BEARING_Y = range(4)
 
 @dataclass(frozen=True)
 class CrossSpectrum:
-    """Cross-spectrum averaged over segments; all spectral results are pure functions of it.
+    """Cross-spectrum of the channels of a bearing, averaged over segments.
 
     Each pair of channels is averaged over the segments in which both are usable. A failed channel
     does not affect the others, and compared amplitudes come from the same segments.
@@ -170,12 +170,14 @@ SMEAR_BINS_SQUARED = 1.0 / 3.0
 def correlated_sum(
     terms: FloatArray, lines: npt.NDArray[np.int64], products: FloatArray
 ) -> FloatArray:
-    """Return the covariance of sums over lines; terms up to 2 bins apart are correlated.
+    """Return the covariance matrices of sums over lines whose terms are correlated.
+
+    Terms are correlated if their lines are at most 2 bins apart. n is the number of sets of lines.
 
     Parameters
     ----------
     terms : (n, ..., n_sums, n_parts, n_lines)
-        Standard deviations of the independent real parts of each sum's terms.
+        Standard deviation of each term of each sum, for each of its independent real parts.
     lines : (n, n_lines)
         Bin index of each line, ascending.
     products : (3, n_parts)

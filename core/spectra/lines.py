@@ -112,7 +112,7 @@ def turning_factors(n_samples: int, rate_hz: float, frequency_hz: FloatArray) ->
 def line_phasors(tapered_samples: FloatArray, factors: ComplexArray) -> ComplexArray:
     """Return the phasors (n_channels, n_lines) at the frequencies given to `turning_factors`.
 
-    `tapered_samples` are as in `bin_phasors`.
+    `tapered_samples` (n_channels, n_samples) are multiplied by `taper_weights`.
     """
     parts: FloatArray = tapered_samples @ factors.view(np.float64)
     return parts.view(np.complex128)
@@ -147,8 +147,8 @@ def peak_frequency_hz(
 
     Returns
     -------
-    Frequency in Hz; None without bins in the band, or if its strongest is the flank of a line
-    outside the band.
+    Frequency in Hz; None if the band contains no bins, or if its strongest bin is the flank of a
+    line outside the band.
     """
     inside = np.flatnonzero((frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1]))
     inside = inside[(inside > 0) & (inside < power.size - 1)]

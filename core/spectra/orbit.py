@@ -40,7 +40,7 @@ class Ellipse:
 
 
 def order_phasors(trace_um: FloatArray, rate_hz: float, frequency_hz: float) -> ComplexArray:
-    """Return the phasor at one frequency around each sample, over `FILTER_TURNS` tapered turns.
+    """Return the phasor at one frequency at each sample, from `FILTER_TURNS` turns around it.
 
     Parameters
     ----------

@@ -145,9 +145,8 @@ def parts_of(
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Return the first sample of each part of a segment and the first sample after it, (n_parts,).
 
-    The parts cover the last hop of the segment. A part has at least `PART_TURNS` turns and may
-    therefore begin earlier. `n_samples` is the number of samples of the segment, `hop_samples` that
-    from one segment start to the next, and `turn_samples` that of a turn.
+    The parts cover the last `hop_samples` samples of the segment of `n_samples` samples. A part has
+    at least `PART_TURNS` turns of `turn_samples` samples, and may therefore begin earlier.
     """
     n_parts = int(np.clip(hop_samples / (PART_TURNS * turn_samples), 1, MAX_PARTS))
     stop = n_samples - hop_samples + hop_samples * np.arange(1, n_parts + 1) // n_parts

@@ -92,7 +92,7 @@ class PollTransform(KeptSegments):
     settings
         Settings of speed and vortex; lengths of segments are not used.
     averaging
-        Numbers of averaged polls; by default those of `PollSettings`.
+        Settings for averaging the polls; None for the default `PollSettings`.
 
     Raises
     ------

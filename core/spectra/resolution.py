@@ -17,7 +17,7 @@ USUAL_DEG = (0.0, 90.0)
 
 
 def angles_of(first_deg: float | None, second_deg: float | None) -> tuple[float, float]:
-    """Return the angles of two transducers; one that is None is along its axis."""
+    """Return the angles of two transducers in degrees; None stands for 0° (first), 90° (second)."""
     x_deg, y_deg = USUAL_DEG
     return (
         x_deg if first_deg is None else first_deg,
@@ -28,7 +28,7 @@ def angles_of(first_deg: float | None, second_deg: float | None) -> tuple[float,
 def resolving_matrix(unit: Unit, first: str, second: str) -> FloatArray | None:
     """Return the matrix (2, 2) from the readings of two channels to x and y.
 
-    None if the channels are at 0° and 90°. The channels are not parallel.
+    None if the channels are at 0° and 90°, along x and y. Parallel channels are not accepted.
     """
     found = {channel.id: channel.angle_deg for channel in unit.channels}
     angles_deg = angles_of(found[first], found[second])
@@ -39,7 +39,7 @@ def resolving_matrix(unit: Unit, first: str, second: str) -> FloatArray | None:
 
 
 def shaft_matrix(unit: Unit, bearing: Bearing) -> FloatArray | None:
-    """Return the `resolving_matrix` of the shaft probes of a bearing."""
+    """Return the matrix (2, 2) from a bearing's shaft probes to x and y; None if along x and y."""
     return resolving_matrix(unit, bearing.shaft_x, bearing.shaft_y)
 
 
@@ -52,7 +52,7 @@ def error_factor(between_deg: float) -> float:
 
 
 class Resolution:
-    """Resolution of all channels of a unit; channels at 0° and 90° are unchanged."""
+    """Resolution of all channels of a unit into x and y; channels along x or y are unchanged."""
 
     def __init__(self, unit: Unit) -> None:
         row_of = {channel.id: row for row, channel in enumerate(unit.channels)}

@@ -130,7 +130,7 @@ class Segment:
         return bool(few) and self.channel_quality[row] == CLIPPED
 
     def line_quality(self, row: int, line: int) -> Quality:
-        """Return a channel's quality at `ORDER1` or `VORTEX`: uncertain, not bad, if grazed."""
+        """Return a channel's quality at `ORDER1` or `VORTEX`: uncertain if `is_grazed`."""
         return uncertain(Reason.CLIPPED) if self.is_grazed(row) else self.order_quality[line][row]
 
     @cached_property
@@ -142,7 +142,7 @@ class Segment:
     def velocities_mm_s_rms(self) -> tuple[Reading, ...]:
         """Broad-band rms velocity of each channel, in mm/s, in channel order.
 
-        The reading of a bad channel has no value, and none has in a segment of polls.
+        A reading has no value if its channel is bad, or if the segment is a poll.
         """
         return self._of_channels(None if self.overall is None else self.overall.velocity_mm_s_rms)
 
@@ -212,7 +212,7 @@ class KeptSegments:
         return found
 
     def keep(self, segment: Segment) -> Segment:
-        """Append a segment, drop those outside the averaging window, and return it."""
+        """Append and return a segment; drop the segments outside the averaging window."""
         self.segments.append(segment)
         self.drop_before(segment.first_index - self.n_segments * self.hop_samples + 1)
         return segment
