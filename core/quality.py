@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
+from operator import attrgetter
 
 
 class Level(IntEnum):
@@ -68,9 +69,12 @@ def bad(reason: Reason) -> Quality:
     return Quality(Level.BAD, reason)
 
 
+_level = attrgetter("level")
+
+
 def worst(qualities: Iterable[Quality]) -> Quality:
     """Return the worst quality, the first of equally bad ones; good if `qualities` is empty."""
-    return max(qualities, key=lambda quality: quality.level, default=GOOD)
+    return max(qualities, key=_level, default=GOOD)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -94,17 +95,25 @@ class Budget:
     @property
     def interval(self) -> tuple[float, float]:
         """95 % coverage interval of the result: lower and upper end."""
-        half = _half_width([(line.contribution, line.freedoms) for line in self.lines])
+        half = coverage_factor(self.lines) * self.combined
         return self.bounded_interval or (self.value - half, self.value + half)
 
     def reading(self, quality: Quality) -> Reading:
         """Return the result as a reading with its standard uncertainties and interval."""
-        parts = [(line.kind, line.contribution, line.freedoms) for line in self.lines]
-        random = math.sqrt(sum(part**2 for kind, part, _ in parts if kind is Kind.RANDOM))
-        systematic = math.sqrt(sum(part**2 for kind, part, _ in parts if kind is Kind.SYSTEMATIC))
-        half = _half_width([(part, freedoms) for _, part, freedoms in parts])
+        random = systematic = fourth = 0.0
+        for _, kind, distribution, width, sensitivity, freedoms in self.lines:
+            square = (width * sensitivity) ** 2
+            if distribution is Distribution.UNIFORM:
+                square /= 3.0
+            if kind is Kind.RANDOM:
+                random += square
+            else:
+                systematic += square
+            fourth += square * square / freedoms
+        combined = random + systematic
+        half = _coverage_factor(combined, fourth, CONFIDENCE) * math.sqrt(combined)
         interval = self.bounded_interval or (self.value - half, self.value + half)
-        return Reading(self.value, quality, random, systematic, interval)
+        return Reading(self.value, quality, math.sqrt(random), math.sqrt(systematic), interval)
 
 
 def random_line(name: str, standard: float, freedoms: float = math.inf) -> BudgetLine:
@@ -126,23 +135,23 @@ def coverage_factor(lines: Sequence[BudgetLine], confidence: float = CONFIDENCE)
     It is the quantile of Student's distribution with the effective degrees of freedom of Welch and
     Satterthwaite (GUM, G.4.1); 1.96 for 95 % if all widths are stated.
     """
-    parts = [(line.contribution, line.freedoms) for line in lines]
-    return _coverage_factor(parts, confidence, math.sqrt(sum(part**2 for part, _ in parts)))
+    squares = [line.contribution**2 for line in lines]
+    fourth = sum(s**2 / line.freedoms for s, line in zip(squares, lines, strict=True))
+    return _coverage_factor(sum(squares), fourth, confidence)
 
 
-def _coverage_factor(parts: Sequence[tuple[float, float]], confidence: float, root: float) -> float:
-    """Return the coverage factor for contributions with their degrees of freedom and root sum."""
+def _coverage_factor(combined: float, fourth: float, confidence: float) -> float:
+    """Return the coverage factor for a variance and the sum of its parts' squares by freedoms."""
+    freedoms = combined**2 / fourth if fourth > 0.0 else math.inf
+    return _quantile(freedoms, 0.5 + confidence / 2.0)
+
+
+@lru_cache(maxsize=256)
+def _quantile(freedoms: float, probability: float) -> float:
+    """Return a quantile of Student's distribution, or of the normal one for infinite `freedoms`."""
     from scipy.special import ndtri, stdtrit  # slow import, not needed at start
 
-    fourth = sum(part**4 / freedoms for part, freedoms in parts)
-    freedoms = root**4 / fourth if fourth > 0.0 else math.inf
-    quantile = 0.5 + confidence / 2.0
-    return float(ndtri(quantile) if math.isinf(freedoms) else stdtrit(freedoms, quantile))
-
-
-def _half_width(parts: Sequence[tuple[float, float]]) -> float:
-    root = math.sqrt(sum(part**2 for part, _ in parts))
-    return _coverage_factor(parts, CONFIDENCE, root) * root
+    return float(ndtri(probability) if math.isinf(freedoms) else stdtrit(freedoms, probability))
 
 
 def proportional(value: float, budget: Budget) -> Budget:
@@ -171,10 +180,14 @@ def effective_number(values: FloatArray) -> float:
     """
     if values.size <= MIN_EFFECTIVE:
         return float(values.size)
-    rest = values - values.mean()
+    return _effective_number(values - values.mean())
+
+
+def _effective_number(rest: FloatArray) -> float:
+    """Return the effective number of values (n,) from their deviations from the mean."""
     power = float(rest @ rest)
     r = max(float(rest[1:] @ rest[:-1]) / power, 0.0) if power > 0.0 else 0.0
-    return max(MIN_EFFECTIVE, values.size * (1.0 - r) / (1.0 + r))
+    return max(MIN_EFFECTIVE, rest.size * (1.0 - r) / (1.0 + r))
 
 
 def mean_budget(
@@ -202,10 +215,12 @@ def mean_budget(
     transmitter contains no information about its uncertainty.
     """
     known = np.asarray(values, dtype=np.float64)
-    if known.size < MIN_EFFECTIVE or not np.ptp(known) > 0.0:
+    if known.size < MIN_EFFECTIVE or not known.max() > known.min():
         return None
-    n_effective = effective_number(known)
-    standard = abs(sensitivity) * float(np.std(known, ddof=1)) / math.sqrt(n_effective)
+    rest = known - known.sum() / known.size
+    n_effective = _effective_number(rest) if known.size > MIN_EFFECTIVE else MIN_EFFECTIVE
+    std = math.sqrt(float(rest @ rest) / (known.size - 1))
+    standard = abs(sensitivity) * std / math.sqrt(n_effective)
     return Budget(value, (random_line(SCATTER, standard, n_effective - 1.0), *systematic))
 
 

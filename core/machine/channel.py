@@ -111,11 +111,10 @@ def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexAr
     return np.asarray(channel.direction * factor, dtype=np.complex128)
 
 
-def line_floor_um_pk(channel: Channel, frequency_hz: float) -> float:
-    """Return the noise amplitude of a channel's transducer at a frequency, µm zero-to-peak.
+def line_floors_um_pk(channel: Channel, frequency_hz: FloatArray) -> FloatArray:
+    """Return the noise amplitudes of a transducer at frequencies, µm zero-to-peak, (n_lines,).
 
     The displacement grows towards low frequencies if the signal must be integrated or the
     transducer's response falls off.
     """
-    factor = displacement_factor(channel, np.array([frequency_hz]))[0]
-    return float(abs(factor)) * channel.line_floor
+    return np.abs(displacement_factor(channel, frequency_hz)) * channel.line_floor

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from core.arrays import ComplexArray, FloatArray
 from core.checks.sensor_checks import stationarity
 from core.condition.shaft_readings import pad_results, slow_channels, slow_results
-from core.machine.channel import line_floor_um_pk
+from core.machine.channel import line_floors_um_pk
 from core.machine.unit import Bearing, Estimator, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.overall_readings import overall_readings
@@ -81,8 +81,14 @@ class UnitEvaluation:
 
     @cached_property
     def _bearings(self) -> "dict[str, _Bearing]":
-        given = self.settings, self.kept, self.n_expected
+        order_hz = np.mean([each.order_frequency_hz for each in self.kept.segments], axis=0)
+        given = self.settings, self.kept, self.n_expected, order_hz, self._floors_um_pk(order_hz)
         return {bearing.id: _Bearing(self.unit, bearing, *given) for bearing in self.unit.bearings}
+
+    def _floors_um_pk(self, order_hz: FloatArray) -> FloatArray:
+        """Return the amplitudes that noise of the channels gives 1× and vortex, (n_channels, 2)."""
+        floors = [line_floors_um_pk(channel, order_hz) for channel in self.unit.channels]
+        return Resolution(self.unit).floors(np.array(floors))
 
     @cached_property
     def _films(self) -> dict[str, DynamicStiffness | Reason]:
@@ -127,18 +133,24 @@ class _Bearing:
         settings: AnalysisSettings,
         kept: KeptSegments,
         n_expected: int,
+        order_hz: FloatArray,
+        floors_um_pk: FloatArray,
     ) -> None:
+        self._order_hz = order_hz
         self._unit, self._bearing, self._settings = unit, bearing, settings
         self._segments = segments = list(kept.segments)
         self._min_segments = kept.min_segments
         ids = [channel.id for channel in unit.channels]
         rows = self._rows = [ids.index(id_) for id_ in bearing.channels]
-        self._usable = np.array([s.order_usable[:, rows] for s in segments])  # (n, 2, 4)
+        self._floors_um_pk = floors_um_pk[rows]
+        self._usable = np.array([s.order_usable for s in segments])[:, :, rows]  # (n, 2, 4)
         self._whole: npt.NDArray[np.bool_] = np.all(self._usable[:, ORDER1], axis=1)
-        self._phasors: ComplexArray = np.array([s.order_phasors_um_pk[rows] for s in segments])
-        self._order_hz = np.mean([segment.order_frequency_hz for segment in segments], axis=0)
+        self._phasors: ComplexArray = np.array([s.order_phasors_um_pk for s in segments])[:, rows]
+        # copying a slice is faster than copying rows in any order
+        adjacent = slice(rows[0], rows[0] + len(rows))
+        own = adjacent if rows == [*range(adjacent.start, adjacent.stop)] else rows
         self._bins: ComplexArray = np.array(
-            [s.bin_phasors_um_pk[rows] for s in segments if s.bin_phasors_um_pk is not None]
+            [s.bin_phasors_um_pk[own] for s in segments if s.bin_phasors_um_pk is not None]
         )
         self.spectrum: CrossSpectrum | None = None
         if kept.frequency_hz is not None:
@@ -224,7 +236,7 @@ class _Bearing:
         nothing = np.zeros(len(self._unit.channels), dtype=np.complex128)
         at_mark = np.array([nothing if m is None else m for m in marked])[:, self._rows]
         has_mark = np.array([m is not None for m in marked])[:, np.newaxis]
-        has_phase = np.array([segment.has_phase[:, self._rows] for segment in self._segments])
+        has_phase = np.array([segment.has_phase for segment in self._segments])[:, :, self._rows]
         orders = average(self._order_hz, self._phasors, self._usable[:, ORDER1])
         lines = []
         for line in (ORDER1, VORTEX):
@@ -232,9 +244,6 @@ class _Bearing:
             if self.spectrum is None:
                 parts = self._phasors[:, :, line : line + 1], self._usable[:, line]
                 of_line, at = average(self._order_hz[line : line + 1], *parts), 0
-            line_hz = float(self._order_hz[line])
-            floors_um_pk = np.array([line_floor_um_pk(c, line_hz) for c in self._unit.channels])
-            floors_um_pk = Resolution(self._unit).floors(floors_um_pk)[self._rows]
             lines.append(
                 OrderLine(
                     bearing=self._bearing,
@@ -249,7 +258,7 @@ class _Bearing:
                     has_phase=has_phase[:, line],
                     at_mark_um_pk=at_mark,
                     has_mark=has_mark & has_phase[:, ORDER1],
-                    floors_um_pk=tuple(floors_um_pk.tolist()),
+                    floors_um_pk=tuple(self._floors_um_pk[:, line].tolist()),
                     round_shafts=frozenset(p for p in (SHAFT_X, SHAFT_Y) if self._is_round(p)),
                 )
             )

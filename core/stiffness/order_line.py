@@ -339,12 +339,16 @@ class OrderLine:
 
     def _stands_out(self, place: int) -> bool:
         """Return whether a channel's line exceeds the noise floor around it; False for polls."""
+        return self._outstanding[place]
+
+    @cached_property
+    def _outstanding(self) -> list[bool]:
         if self.bins is None:
-            return False
-        lines_hz = self.orders.frequency_hz
-        floor = floor_power(self.bins, place, self.frequency_hz, lines_hz)
-        peak = self.orders.power[self.at, place, place]
-        return bool(peak > self.settings.min_line_to_floor * floor)
+            return [False] * len(AMPLITUDES)
+        floors = floor_power(self.bins, self.frequency_hz, self.orders.frequency_hz)
+        peaks = np.diagonal(self.orders.power[self.at])
+        found: list[bool] = (peaks > self.settings.min_line_to_floor * floors).tolist()
+        return found
 
 
 NOT_MEASURED: Budgeted = (missing(Reason.NOT_MEASURED), None)
@@ -356,23 +360,25 @@ def marked_hz(readings: Mapping[str, Reading], line: str) -> float | None:
     return None if reading.quality.reason is Reason.OUTSIDE_BAND else reading.value
 
 
-def floor_power(bins: CrossSpectrum, place: int, line_hz: float, lines_hz: FloatArray) -> float:
-    """Return the median power of a channel's bins around the frequency `line_hz`, µm².
+def floor_power(bins: CrossSpectrum, line_hz: float, lines_hz: FloatArray) -> FloatArray:
+    """Return the median power of bins around the frequency `line_hz`, µm², (n_channels,).
 
     Parameters
     ----------
-    bins, place
-        Cross-spectrum at evenly spaced frequencies, and index of the channel in it.
+    bins
+        Cross-spectrum at evenly spaced frequencies.
     lines_hz : (n,)
         Frequencies of lines whose main lobes are excluded.
     """
     bin_hz = bins.frequency_hz[1] - bins.frequency_hz[0]
-    number = np.arange(bins.frequency_hz.size)
-    near = np.abs(number - (round(line_hz / bin_hz) - 1)) <= FLOOR_REACH
+    at = round(line_hz / bin_hz) - 1
+    number = np.arange(max(at - FLOOR_REACH, 0), min(at + FLOOR_REACH + 1, bins.frequency_hz.size))
     positions = (lines_hz / bin_hz).round() - 1
     in_lobe = (np.abs(number[:, np.newaxis] - positions) <= MAIN_LOBE).any(axis=1)
-    ordered = np.sort(bins.power[near & ~in_lobe, place, place])
-    return float(ordered[(ordered.size - 1) // 2] + ordered[ordered.size // 2]) / 2.0
+    power = np.diagonal(bins.power[number[~in_lobe]], axis1=1, axis2=2)
+    ordered = np.sort(power, axis=0)
+    middle: FloatArray = ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2]
+    return middle / 2.0
 
 
 def other_line_hz(
@@ -390,9 +396,8 @@ def other_line_hz(
         if found_hz is None:
             continue
         peak = round(found_hz / bin_hz) - 1
-        lines_hz = np.array([found_hz, turn_hz])
-        for place in (SHAFT_X, SHAFT_Y):
-            floor = floor_power(bins, place, found_hz, lines_hz)
-            if bins.power[peak, place, place] > min_line_to_floor * floor:
-                return found_hz
+        floors = floor_power(bins, found_hz, np.array([found_hz, turn_hz]))
+        stands_out = np.diagonal(bins.power[peak]) > min_line_to_floor * floors
+        if stands_out[[SHAFT_X, SHAFT_Y]].any():
+            return found_hz
     return None

@@ -31,6 +31,7 @@ from service.measuring.sources import WatchedUnit, timed_sources
 from service.notifications.message import LiveContext
 from service.runtime.child import Child
 from service.runtime.heartbeats import Heartbeats, Loop
+from service.runtime.process import exempt_start
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.core_values import stale_after_s
 from service.settings.plant import PlantFile
@@ -132,6 +133,7 @@ async def run_service(
         if plant.store.postgresql is not None and origin is Origin.LIVE:  # may have replicas
             loops |= reporting_loops(analysis, lambda: held)
         ends = service_run.ends
+        exempt_start()
         try:
             await supervision.run_until_stopped(loops, run, lambda _: serving.stop(), ends=ends)
         finally:

@@ -1,7 +1,6 @@
 """Serving process: API, dashboard, login and metrics, from reports of the measuring process."""
 
 import asyncio
-import gc
 import json
 import socket
 import sys
@@ -38,7 +37,13 @@ from service.reports.archive import EvidenceArchive
 from service.reports.routes import EvidenceService
 from service.runtime.heartbeats import Heartbeats, Loop, Pulse
 from service.runtime.listening import url_of
-from service.runtime.process import leave, run_to_its_end, set_up_logging, stop_on_signals
+from service.runtime.process import (
+    exempt_start,
+    leave,
+    run_to_its_end,
+    set_up_logging,
+    stop_on_signals,
+)
 from service.settings.core_values import machine_of, refresh_s
 from service.settings.plant import PlantFile
 from service.store.access.tables import AccessStore
@@ -53,9 +58,7 @@ WRONG_VERSION = 78
 async def _rendered(app: GuardedApi) -> None:
     await asyncio.to_thread(app.openapi)
     await asyncio.to_thread(compress_all)
-    # the objects of the start are permanent; scanning them adds 70 ms to every second long trend
-    gc.collect()
-    gc.freeze()
+    exempt_start()
 
 
 async def serve_requests(

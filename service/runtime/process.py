@@ -2,6 +2,7 @@
 
 import asyncio
 import ctypes
+import gc
 import getpass
 import os
 import platform
@@ -34,6 +35,15 @@ def return_large_pieces() -> None:
     if mallopt is not None:
         mallopt(MMAP_THRESHOLD, LARGE_BYTES)
         mallopt(TRIM_THRESHOLD, KEPT_BYTES)
+
+
+def exempt_start() -> None:
+    """Exempt all present objects from garbage collection.
+
+    The objects of the start are permanent, and a collection that scans them takes 50 ms or more.
+    """
+    gc.collect()
+    gc.freeze()
 
 
 LEAVE_S = 0.5
