@@ -32,8 +32,8 @@ from service.store.access.tables import AccessStore
 def access_of(plant: PlantFile, creates: bool = False) -> Iterator[AccessStore]:
     """Open the plant's accounts and keys, yield their store, and close it.
 
-    Entries of the audit trail in the block have the command line as their source. `creates` and the
-    error are those of `plant_store`.
+    Audit entries made in the block have the command line as their source. With `creates`, a missing
+    database is created; otherwise it raises `CommandError`.
     """
     with acting_as(Acting(Source.COMMAND_LINE, made_by())), plant_access(plant, creates) as store:
         yield store
@@ -169,7 +169,7 @@ def set_role(
 
 @users_app.command("password")
 def set_password(plant_file: PlantPath, name: Name, password_fd: PasswordFd = None) -> None:
-    """Set a new password of an account and end all its sessions."""
+    """Set a new password for an account and end all its sessions."""
     plant, password = load_plant_file(plant_file), password_from(password_fd)
     with access_of(plant) as access:
         AccessService(access).set_password(account_name(name), password, SystemClock().now_ns())

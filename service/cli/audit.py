@@ -32,8 +32,8 @@ def verify(
 ) -> None:
     """Check that no entry of the audit trail is altered, missing or out of order.
 
-    Prints the first wrong entry of each chain, and compares its last entry with the head file
-    beside the database. The service may keep running. Exit code 1 if anything is wrong.
+    Prints the first wrong entry of each chain of entries, and compares the last entry with the head
+    file beside the database. The service may keep running. Exit code 1 if anything is wrong.
     """
     trails = open_trails(load_plant_file(plant_file))
     chains, lines = {}, []

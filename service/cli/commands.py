@@ -90,7 +90,7 @@ COMMANDS = {name: entry for group in GROUPS.values() for name, entry in group.it
 
 
 class Commands(Mapping[str, Any]):
-    """Mapping of the commands by name; a command is imported when it is looked up."""
+    """Mapping of the commands by name, which imports the module of a command at its first use."""
 
     def __getitem__(self, name: str) -> Any:
         """Import the module of a command and return it; raises `KeyError` for an unknown name."""
@@ -116,7 +116,7 @@ class Commands(Mapping[str, Any]):
 
 
 class LazyGroup(CommandGroup):
-    """Group of all commands; its own help imports none of them."""
+    """Group of all commands; its help text is printed without importing their modules."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)

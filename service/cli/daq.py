@@ -54,7 +54,7 @@ class FastClock:
         self._start_ns, self._start_s = clock.now_ns(), clock.monotonic_s()
 
     def now_ns(self) -> int:
-        """Return the time at creation plus the scaled elapsed time, UTC nanoseconds since 1970."""
+        """Return the time at creation plus the scaled elapsed time, ns since 1970 UTC."""
         return self._start_ns + ns_from_s(self.monotonic_s())
 
     def monotonic_s(self) -> float:
@@ -62,7 +62,7 @@ class FastClock:
         return (self._clock.monotonic_s() - self._start_s) * self._speed
 
     async def sleep(self, duration_s: float) -> None:
-        """Suspend the current task for a duration in seconds of this clock."""
+        """Suspend the current task for `duration_s` seconds of this clock."""
         await self._clock.sleep(duration_s / self._speed)
 
 
@@ -138,7 +138,7 @@ class RunningDaq:
     Parameters
     ----------
     endpoints
-        Address of each unit, as keys and values of its source's settings.
+        Address of each unit by unit id, as keys and values of the settings of its source.
     over
         Event of each unit, set at the end of its recording.
     gone

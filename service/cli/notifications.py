@@ -31,7 +31,7 @@ ReceiverId = Annotated[str, argument("Receiver of the plant file.")]
 
 @app.command("test")
 def send_test(plant_file: PlantPath, receiver: ReceiverId, json_output: JsonOutput = False) -> None:
-    """Send a test message now and print the outcome; exit code 1 unless it was accepted.
+    """Send a test message to a receiver now and print the outcome; exit code 1 after a refusal.
 
     The message bypasses the outbox, so that a running service is not disturbed.
     """

@@ -71,7 +71,7 @@ class CommandGroup(TyperGroup):
     """Group of commands; an expected error ends its command with a message and an exit code."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the chosen command; an expected error (`EXIT_CODES`) is printed and ends it."""
+        """Run the chosen command; print an expected error and exit with its code (`EXIT_CODES`)."""
         try:
             return super().invoke(ctx)
         except CommandError as error:
@@ -111,7 +111,7 @@ def fail(message: str, code: int = 1) -> NoReturn:
 def print_result(
     document: object, lines: Iterable[str], json_output: bool, indent: int | None = 1
 ) -> None:
-    """Print a result as JSON, in one line if `indent` is None, or as lines of text."""
+    """Print `document` as JSON, in one line if `indent` is None, or the text `lines`."""
     from pydantic_core import to_json
 
     shown = (
@@ -154,7 +154,7 @@ def plant_store(plant: "PlantFile", creates: bool = False) -> Iterator["Store"]:
 
 @contextmanager
 def plant_access(plant: "PlantFile", creates: bool = False) -> Iterator["AccessStore"]:
-    """Open the plant's accounts and keys, as `plant_store` opens the database."""
+    """Open the plant's database of accounts and keys, yield its store, and close it."""
     from service.app.storage import access_name, has_access, open_access
 
     _require(has_access(plant), access_name(plant), creates)
@@ -187,9 +187,9 @@ def one_unit(plant: "PlantFile", id_: str | None, path: Path) -> "UnitSettings":
 
 @contextmanager
 def terminal_to_itself() -> Iterator[None]:
-    """Take the terminal's foreground, so that Ctrl-C reaches this process alone.
+    """Put this process in the foreground of the terminal, so that Ctrl-C reaches only it.
 
-    Below ``make``, Ctrl-C would also reach make, which then reports an orderly end as an error.
+    Under ``make``, Ctrl-C would also reach make, which then reports a normal exit as an error.
     Without a terminal, or when the process already leads its group, nothing happens.
     """
     group = os.getpgrp()
@@ -217,7 +217,7 @@ PasswordFd = Annotated[
 def password_from(descriptor: int | None) -> str:
     """Read a new password from a file descriptor, or for None ask for it on the terminal.
 
-    One line end at the end is removed. Raises `CommandError` with exit code 2 if there is no
+    A final line end is removed. Raises `CommandError` with exit code 2 if there is no
     terminal, or if the descriptor is unreadable, not UTF-8 or has more than `MAX_BYTES` bytes.
     """
     if descriptor is None:
@@ -250,5 +250,5 @@ CHECKOUT = Path(__file__).parent.parent.parent / "deploy"
 
 
 def example_path(name: str) -> Path:
-    """Return the path of an example plant file, of the checkout or else of the package."""
+    """Return the path of the example plant file `name`, in the checkout or else in the package."""
     return next(path for path in (CHECKOUT / name, PACKAGED / name) if path.exists())

@@ -76,7 +76,7 @@ def modbus(
     parity: ParityOption = "even",
     json_output: JsonOutput = False,
 ) -> None:
-    """Print registers raw, and decoded in every type and byte order.
+    """Print registers as raw numbers, and decoded as every number type in every byte order.
 
     A float between 0.001 and 1,000,000 is marked, since its byte order is plausible.
     """
@@ -106,7 +106,7 @@ def map_(
     parity: ParityOption = "even",
     json_output: JsonOutput = False,
 ) -> None:
-    """Read a configured map once; print each value with its unit, raw registers and flags."""
+    """Read a register map once; print each value with its unit, raw registers and status flags."""
     if at is None:
         settings = one_unit(load_plant_file(file), unit, file)
         device = _mapped_device(settings, slow)
@@ -133,7 +133,7 @@ def ring(
     parity: ParityOption = "even",
     json_output: JsonOutput = False,
 ) -> None:
-    """Print a block ring's layout, and slow values and counts of its newest slot."""
+    """Print the layout of a block ring, and the slow values and counts of its newest slot."""
     place = _place(device, unit_id, timeout_s, baudrate, parity)
     look = ring_look(*asyncio.run(read_ring_once(place, base_address, function)))
     print_result(look, _ring_lines(look), json_output)
@@ -163,7 +163,7 @@ def in_flight(
     unit_id: UnitIdOption = 1,
     timeout_s: TimeoutOption = 1.0,
 ) -> None:
-    """Measure how many simultaneous requests a device answers (Modbus TCP)."""
+    """Measure how many simultaneous requests a Modbus TCP device answers."""
     place = _place(device, unit_id, timeout_s, 115_200, "even")
     if place.host is None:
         fail("a serial line allows only one request at a time; give HOST[:PORT]", code=2)
@@ -196,7 +196,7 @@ def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:
     device = getattr(unit, "slow_source", None) if slow else unit.source
     if not isinstance(device, MappedDeviceSettings):
         key = "slow_source" if slow else "source"
-        fail(f"{key} of unit {unit.id} has no register map", code=2)
+        fail(f"{key} of unit {unit.id} has no register map; use `padwatch probe modbus`", code=2)
     return device
 
 

@@ -48,7 +48,7 @@ def run_plant(
     is_demo
         Whether local clients have all permissions without a login.
     child
-        Serving process that has been started already; None to start one.
+        Serving process that was started before; with None one is started.
     """
     clock, manager = SystemClock(), ServiceManager(os.environ)
     service_run = ServiceRun(plant, live_units(plant, clock), is_demo=is_demo, child=child)
@@ -56,7 +56,7 @@ def run_plant(
 
 
 def announce(url: str) -> None:
-    """Print the URL of the dashboard on standard output."""
+    """Print the URL of the dashboard to standard output."""
     typer.echo(f"padwatch: {url}")
 
 

@@ -44,14 +44,14 @@ BLOCK_S = 10.0
 
 
 class WindowChoice(StrEnum):
-    """Printed results: the last full average of each bearing, or all results."""
+    """Choice of printed results: the last full average of each bearing, or all results."""
 
     LAST = "last"
     ALL = "all"
 
 
 class CalibrationChoice(StrEnum):
-    """Calibration that converts counts to engineering units: recorded, or of the plant file."""
+    """Choice of calibration from counts to engineering units: recorded, or of the plant file."""
 
     RECORDED = "recorded"
     PLANT = "plant"

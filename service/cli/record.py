@@ -82,7 +82,7 @@ class ReconnectPolicy:
     Parameters
     ----------
     seconds
-        Planned length of the recording, s, from now on.
+        Planned length of the recording from now on, s.
     """
 
     def __init__(self, seconds: float, clock: Clock) -> None:
@@ -90,7 +90,7 @@ class ReconnectPolicy:
         self._deadline_s = clock.monotonic_s() + seconds
 
     async def wait(self, error: LinkError) -> None:
-        """Wait for half of `RETRY_S` to all of it, or raise `error` after the planned end."""
+        """Sleep for 0.5 to 1 times `RETRY_S`, at random; raise `error` after the planned end."""
         if self._clock.monotonic_s() >= self._deadline_s:
             raise error
         # a random share, as in the service, so that many recorders do not connect at once
@@ -105,7 +105,7 @@ async def record_blocks(
 ) -> str | None:
     """Record until the length has passed, SIGINT or SIGTERM arrives, or the link is lost.
 
-    Handles both signals of the process from then on, and closes the writer.
+    Installs handlers of both signals, and closes the writer.
 
     Parameters
     ----------

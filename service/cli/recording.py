@@ -138,7 +138,7 @@ def json_of(recording: Recording, summary: RecordingSummary) -> dict[str, Any]:
 
 
 def lines_of(recording: Recording, summary: RecordingSummary) -> Iterator[str]:
-    """Yield the lines of the description of a recording, with the first `GAPS_PRINTED` gaps."""
+    """Yield a description of a recording in lines of text, with its first `GAPS_PRINTED` gaps."""
     manifest = recording.manifest
     yield f"{recording.folder}: unit {manifest.unit}, {manifest.sample_type}, {manifest.made_by}"
     yield f"  from         {rfc3339(summary.start_ns)}"

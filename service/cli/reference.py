@@ -39,18 +39,18 @@ from service.store.references import GapReference, ReferenceSource
 def bearing_references(
     unit: str, bearing: Bearing, history: Sequence[GapReference]
 ) -> dict[str, Any]:
-    """Return a bearing's reference in force, from the plant file or set since, and its history.
+    """Return the reference of the shaft centre that applies to a bearing, and its earlier ones.
 
     Parameters
     ----------
     history
-        Stored references of the bearing, newest first; empty if none was set.
+        Stored references of the bearing, newest first; if empty, that of the plant file applies.
 
     Returns
     -------
     dict
-        Gaps in force as [x, y] in µm, of the probes and of those across the shaft (None without
-        such probes); their source and the history as models of the API.
+        Gaps that apply, [x, y] in µm, of the probes and of the opposite probes (None without
+        opposite probes); their source and the history as models of the API.
     """
     newest = history[0] if history else None
     watched = bearing if newest is None else with_reference(bearing, newest)
@@ -65,7 +65,7 @@ def bearing_references(
 
 
 def text_lines(found: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a line for the reference in force of `bearing_references`, then the earlier ones."""
+    """Yield a line on the reference that applies in `found`, and one on each earlier reference."""
     gaps = _gaps(found["gap_reference_um"], found["opposite_reference_um"])
     yield f"{found['unit']} {found['bearing']}: {gaps}, {_source(found['reference'])}"
     for before in found["history"][1:]:
@@ -144,7 +144,7 @@ def set_reference(
 
 @app.command("list")
 def list_references(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
-    """List the reference in force of every bearing, and the earlier ones."""
+    """List the present and the earlier references of every bearing."""
     plant = load_plant_file(plant_file)
     with plant_store(plant) if has_store(plant) else nullcontext() as store:
         found = [

@@ -45,9 +45,9 @@ def backup(
     keep: Annotated[int, typer.Option(min=1, max=10_000, help="Number of copies to keep.")] = 14,
     json_output: JsonOutput = False,
 ) -> None:
-    """Copy both databases, also while padwatch runs; verify the copies, remove the oldest ones.
+    """Copy the databases of results and accounts, also while padwatch runs; verify the copies.
 
-    The copy of the results begins with `padwatch-`, that of the accounts with `access-`.
+    The names of the copies begin with `padwatch-` and `access-`; the oldest copies are removed.
     Samples, evidence and the plant file are plain files that any tool can copy.
     """
     plant, now_ns = load_plant_file(plant_file), SystemClock().now_ns()
@@ -77,11 +77,11 @@ def restore(
     copy: Annotated[Path, argument("A copy made by `padwatch backup`.")],
     json_output: JsonOutput = False,
 ) -> None:
-    """Replace the databases by copies, while padwatch is stopped; the old ones are kept beside.
+    """Replace the databases by copies while padwatch is stopped; the old databases are kept.
 
-    The accounts are restored from the copy that `padwatch backup` made together with the given one:
-    logins end, and keys that were revoked after the copy was made are revoked again. Accounts and
-    their passwords are those of the copy. Without such a copy, the accounts stay as they are.
+    Accounts and their passwords are restored from the `access-` copy that was made with the given
+    copy; all sessions end, and keys that were revoked after the copy was made are revoked again.
+    Without an `access-` copy, the accounts do not change.
     """
     plant = load_plant_file(plant_file)
     database, now_ns = _file(plant), SystemClock().now_ns()

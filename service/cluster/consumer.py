@@ -48,7 +48,7 @@ the stream's name with creation time, and the sequence number of the newest mess
 
 
 class Consumer:
-    """Consumer that fetches the messages of all units and passes them to their `UnitProgress`.
+    """Consumer of the stream: passes the messages of each unit to the `UnitProgress` of the unit.
 
     A lost connection does not interrupt the processing of messages that were already fetched.
     """
@@ -77,7 +77,7 @@ class Consumer:
 
     @property
     def trouble(self) -> str | None:
-        """Reason why blocks are not being read; None while they are read."""
+        """Reason why no blocks are read from the stream; None while they are read."""
         return self._state.trouble
 
     @property
@@ -86,7 +86,7 @@ class Consumer:
         return frozenset(unit for unit, queue in self._queues.items() if not queue.empty())
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Fetch and process messages until cancelled; renew lost connections."""
+        """Fetch and process messages, and reconnect, until cancelled; `pulse` gets heartbeats."""
         async with asyncio.TaskGroup() as tasks:
             while True:
                 pulse.rest()
@@ -220,7 +220,7 @@ CONSUMER = {
 
 
 def add_consumer(families: Families, consumer: Consumer) -> None:
-    """Add the backlog of each unit, and its counts of refused and redelivered messages."""
+    """Add the metrics of a consumer: backlog, delay, refused and redelivered messages by unit."""
     families.declare(CONSUMER)
     families.add("stream_connected", consumer.trouble is None)
     for unit, n_pending in consumer.n_pending.items():

@@ -36,10 +36,10 @@ class WireError(ValueError):
 
 
 def require_possible(block: SampleBlock) -> None:
-    """Check that a decoded block is possible; no adapter produces blocks that fail the check.
+    """Raise `WireError` if a decoded block has content that no adapter produces.
 
-    Raises `WireError` if a block has no samples, a calibration or slow value that is not finite, or
-    a negative number of rejected samples.
+    Such content is: no samples, a calibration or slow value that is not finite, or a negative
+    number of rejected samples.
     """
     if not block.n_samples:
         raise WireError("impossible", f"a block without samples; {SENDER}")
@@ -48,7 +48,7 @@ def require_possible(block: SampleBlock) -> None:
     if not all(math.isfinite(reading.value or 0.0) for reading in block.slow.values()):
         raise WireError("impossible", f"a block with a slow value that is not finite; {SENDER}")
     if any(rejection.n_samples < 0 for rejection in block.rejected):
-        raise WireError("impossible", f"a block with a negative number of rejections; {SENDER}")
+        raise WireError("impossible", f"a block with fewer than 0 rejected samples; {SENDER}")
 
 
 FINGERPRINT_BYTES = 16
@@ -56,7 +56,7 @@ FINGERPRINT_BYTES = 16
 
 @dataclass(frozen=True)
 class UnitIdentity:
-    """Identity of a unit, part of every message of the unit.
+    """Identity of a unit, which every stream message of the unit contains.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class UnitIdentity:
 
 
 def fingerprint(*words: object) -> bytes:
-    """Return the first 16 bytes of the SHA-256 hash of JSON-serializable values."""
+    """Return the first 16 bytes of the SHA-256 hash of the JSON text of the arguments."""
     text = json.dumps(words, ensure_ascii=True, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).digest()[:FINGERPRINT_BYTES]
 
@@ -108,7 +108,7 @@ class Frame:
 
 
 def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b"") -> bytes:
-    """Return a message with header and checksum; raise `ValueError` if a part is too large."""
+    """Return a stream message; raise `ValueError` if its JSON head or its samples are too large."""
     if len(head) > MAX_HEAD_BYTES or len(samples) > MAX_SAMPLE_BYTES:
         raise ValueError(
             f"a message has at most {MAX_HEAD_BYTES} bytes of head and {MAX_SAMPLE_BYTES} of"
@@ -122,7 +122,7 @@ def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b""
 
 
 def unframed(message: bytes, identity: UnitIdentity) -> Frame:
-    """Check the header and checksum of a message, and return its parts.
+    """Check the header and checksum of a stream message of the unit `identity`; return its parts.
 
     Raises `WireError` if the bytes are not a message, are damaged, or are of another version, plant
     or configuration. Invalid bytes raise no other exception.
@@ -179,7 +179,7 @@ STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="constants")
 
 
 class Cell(NamedTuple):
-    """Time stamp, slow values and bit mask ``ok`` of good channels, from sample ``start`` on."""
+    """Values from sample ``start`` on: time stamp (ns), bit mask ``ok`` of good channels, slow."""
 
     start: Index
     start_ns: Ns
@@ -227,8 +227,8 @@ class Taken:
     Parameters
     ----------
     taken_ns
-        Time of the last sample by the clock of the acquiring host, ns; the delay of the analysis is
-        measured from this time.
+        Time of the last sample by the clock of the acquiring host, ns since 1970 UTC; the delay of
+        the analysis is measured from it.
     """
 
     block: SampleBlock
@@ -236,7 +236,7 @@ class Taken:
 
 
 def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> bytes:
-    """Encode a block, acquired at ``taken_ns``, as a message.
+    """Encode a block as a stream message; ``taken_ns`` is the host time of its last sample, ns.
 
     Raises `ValueError` if the block is too large for a message.
     """
@@ -263,13 +263,13 @@ def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> 
 
 
 def encoded_link(news: LinkNews, identity: UnitIdentity) -> bytes:
-    """Encode a link state as a message, with at most 1000 characters of its reason."""
+    """Encode a link state as a stream message; its reason is cut to 1000 characters."""
     head = LinkHead(news.unit, news.state, None if news.reason is None else news.reason[:1000])
     return framed(Kind.LINK, identity, _LINK.dump_json(head))
 
 
 def decoded(message: bytes, identity: UnitIdentity) -> Taken | LinkNews:
-    """Decode a message of a unit to a block or a link state.
+    """Decode a stream message of the unit `identity` to a block or a link state.
 
     Raises
     ------
@@ -324,7 +324,7 @@ def _side_values(head: BlockHead) -> SideValues:
         or any(start >= stop for start, stop in itertools.pairwise(edges))
         or any(len(cell.slow) != n_slow or cell.ok >> n_channels for cell in head.cells)
     ):
-        raise WireError("not_understood", f"a block whose cells do not match its samples; {SENDER}")
+        raise WireError("not_understood", f"a block with invalid times or slow values; {SENDER}")
     slow = np.array([cell.slow for cell in head.cells], dtype=np.float64)
     return SideValues(
         starts=np.array(starts, dtype=np.int64),

@@ -20,13 +20,13 @@ from service.store.store import Store
 
 
 class Reporter:
-    """Writer of reports; it builds snapshots on the event loop and writes reports in a thread.
+    """Writer of reports on units to the database, from which the serving processes read them.
 
     Parameters
     ----------
     held
-        Function that returns the ids of the units that this process is responsible for; also
-        `PLANT` if it reports the alarms without a unit; `SHARED` if it runs the plant-wide tasks.
+        Function that returns the ids of the units that this process is responsible for, also
+        `PLANT` if it reports the alarms without a unit, `SHARED` if it runs the plant-wide tasks.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ INTERRUPTED = Answer(
 
 
 class CommandWorker:
-    """Worker that executes the commands on the units of this process, one at a time.
+    """Worker that executes the operators' commands on the units of this process, one at a time.
 
     An alarm command is marked as answered in the transaction that stores the alarm event. An open
     alarm command was therefore not executed, and another process can execute it.
@@ -118,7 +118,7 @@ class CommandWorker:
         self._trouble = TroubleLog("commands are not executed", "commands are executed again")
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Execute open commands periodically, until cancelled."""
+        """Execute open commands periodically, until cancelled; `pulse` gets heartbeats."""
 
         async def look() -> None:
             await self.look()
@@ -127,7 +127,7 @@ class CommandWorker:
         await periodic(look, COMMANDS_EVERY_S, self._clock, pulse)
 
     async def look(self) -> None:
-        """Execute the open commands on the units of this process once."""
+        """Execute all operators' commands on the units of this process that are open now."""
         try:
             for found in await asyncio.to_thread(self._store.commands.open, self._held()):
                 await self._take_up(found)

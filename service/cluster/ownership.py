@@ -26,7 +26,7 @@ class HoldLostError(StoreError):
 
 
 class Holds:
-    """Exclusive database locks for the analysis of units, one for each; all or none are held."""
+    """Exclusive database locks for the analysis of units, one per unit; all or none are held."""
 
     def __init__(self, store: Store, units: Iterable[str], clock: Clock) -> None:
         self._store, self._clock = store, clock
@@ -94,7 +94,7 @@ class Leadership:
         self.is_leading = False
 
     async def run(self, pulse: Pulse) -> None:
-        """Acquire the lock when it is free and run the tasks while it is held; until cancelled."""
+        """Wait for the lock and run the tasks while it is held, repeatedly, until cancelled."""
         while True:
             pulse.beat(TRY_EVERY_S)
             with ExitStack() as held:
@@ -135,7 +135,7 @@ class Partition:
 
     @classmethod
     def of(cls, text: str) -> "Partition":
-        """Parse a partition ``i/n``; raise `ValueError` if the text is malformed."""
+        """Parse a partition ``i/n``, such as ``1/2``; raise `ValueError` if it is malformed."""
         found = FORM.fullmatch(text)
         part = cls(int(found[1]), int(found[2])) if found else cls(0, 0)
         if not 1 <= part.number <= part.n_parts:
@@ -144,7 +144,7 @@ class Partition:
         return part
 
     def units(self, units: Sequence[str]) -> list[str]:
-        """Return the unit ids of this part: every ``n_parts``-th of the sorted ids."""
+        """Return the unit ids of this part: every ``n_parts``-th of the sorted ids `units`."""
         return sorted(units)[self.number - 1 :: self.n_parts]
 
     def part_of(self, plant: PlantFile) -> PlantFile:
@@ -161,7 +161,7 @@ class Partition:
         return plant.model_copy(update={"unit": tuple(u for u in plant.unit if u.id in mine)})
 
     def share_of(self, plant: PlantFile) -> PlantPart:
-        """Return the responsibilities of the process of this part; part 1 leads."""
+        """Return the units of this part and of the others; part 1 has the plant-wide alarms."""
         every = [unit.id for unit in plant.unit]
         own = frozenset(self.units(every))
         return PlantPart(own, frozenset(every) - own, leads=self.number == 1)

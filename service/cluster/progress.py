@@ -38,7 +38,7 @@ def read(document: bytes) -> UnitMemory | None:
 
 
 def memories_of(stored: Iterable[StreamPosition]) -> dict[str, UnitMemory]:
-    """Return the stored analysis states by unit; log and omit those that `read` cannot parse."""
+    """Return the stored analysis states by unit id; log and omit states that are not readable."""
     found = {position.unit: read(position.memory) for position in stored}
     for unit, memory in found.items():
         if memory is None:
@@ -72,13 +72,13 @@ class _Seen:
 
 
 class Window:
-    """Window of the newest messages of a unit that the monitor needs for a replay."""
+    """Window of the newest messages of a unit, which a replay after a restart begins with."""
 
     def __init__(self) -> None:
         self._seen: deque[_Seen] = deque()
 
     def note(self, sequence: int, block: SampleBlock, state: MonitorState) -> None:
-        """Add the message of an analysed block; remove messages that a replay no longer needs."""
+        """Add the message of a block; remove messages that no replay to `state` needs."""
         self._seen.append(_Seen(sequence, state.epoch, block.stop_index))
         while len(self._seen) > 1 and not self._is_needed(self._seen[0], state):
             self._seen.popleft()
@@ -151,7 +151,7 @@ class UnitProgress:
         return 1 if self._stored is None else self._stored.window_sequence
 
     def reaches_back(self, first_sequence: int) -> None:
-        """Log it if the stream, which begins at ``first_sequence``, lacks needed messages.
+        """Log a warning if needed messages before ``first_sequence`` are no longer on the stream.
 
         Missing messages are a gap in the samples, which the monitor detects by the sample index.
         """
@@ -168,7 +168,7 @@ class UnitProgress:
             log.warning("the stream begins within the window of the analysis", unit=self.unit)
 
     async def take(self, sequence: int, payload: bytes) -> bool:
-        """Process the message with a sequence number; return False if the message is refused.
+        """Process the message of a sequence number; return False if it cannot be used.
 
         A message that was processed before is only counted as repeated.
         """
@@ -216,7 +216,7 @@ class UnitProgress:
     def fall_silent(self, after_s: float, trouble: str | None = None) -> None:
         """Mark the unit as not connected if no usable message arrived for ``after_s`` seconds.
 
-        ``trouble`` is the known reason why no messages arrive, or None.
+        ``trouble`` is the reason why no messages arrive; None if it is unknown.
         """
         if self._clock.monotonic_s() - self._arrived_s <= after_s:
             return

@@ -38,7 +38,7 @@ from service.settings.processes import StreamSettings
 
 @dataclass(frozen=True)
 class Outgoing:
-    """Outgoing message, with one id for all attempts; `is_news` marks a link state."""
+    """Message to publish, with the same id in all attempts; `is_news` marks a link state."""
 
     id: str
     payload: bytes
@@ -178,7 +178,7 @@ class Publisher:
         self.waiting.add(news.unit, Outgoing(id_, encoded_link(news, identity), is_news=True))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Publish queued messages until cancelled; renew lost connections."""
+        """Publish queued messages, and reconnect, until cancelled; `pulse` gets heartbeats."""
         while True:
             pulse.rest()
             try:
@@ -266,7 +266,7 @@ PUBLISHER = {
 
 
 def add_publisher(families: Families, publisher: Publisher) -> None:
-    """Add the connection, the outgoing queues and the published messages."""
+    """Add the metrics of a publisher: connection, queues, published and repeated messages."""
     families.declare(PUBLISHER)
     waiting = publisher.waiting
     families.add("stream_connected", publisher.trouble is None)

@@ -26,7 +26,7 @@ async def replica_metrics(
     clock: Clock,
     store_kind: str,
 ) -> bytes:
-    """Return the metrics of the reports of other processes, in the Prometheus text format."""
+    """Return the metrics of a replica and of the units reported to it, as Prometheus text."""
     try:
         receivers = await deliveries.look()
     except StoreError:

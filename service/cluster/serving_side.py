@@ -44,7 +44,7 @@ Revision = tuple[str, int]
 
 
 class Feed:
-    """Reader of the reports in the database, for the serving process of a cluster."""
+    """Reader of the reports on units in the database, for the serving process of a cluster."""
 
     def __init__(self, store: Store, live: LiveClient, clock: Clock) -> None:
         self._store, self._live, self._clock = store, live, clock
@@ -53,7 +53,7 @@ class Feed:
         self._trouble = TroubleLog("unit states cannot be read", "unit states can be read again")
 
     async def start(self) -> None:
-        """Read the stored alarms and the reports, before the first request is served.
+        """Read the stored alarms and the reports; call it before the first request is served.
 
         Raises `StoreError` if the database cannot be read.
         """
@@ -61,7 +61,7 @@ class Feed:
         await self._take()
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Read the reports periodically, until cancelled."""
+        """Read the reports periodically, until cancelled; `pulse` gets heartbeats."""
         await periodic(self.look, READ_EVERY_S, self._clock, pulse)
 
     async def look(self) -> None:
@@ -117,7 +117,7 @@ POLL_EVERY_S = 0.1
 
 
 class DatabaseOperators(Operators):
-    """Sender of operators' commands, through the database, to the process of the unit."""
+    """Sender of operators' commands through the database to the process that analyses the unit."""
 
     def __init__(self, store: Store, alarms: LiveAlarms, clock: Clock) -> None:
         super().__init__(store, alarms)
@@ -126,7 +126,7 @@ class DatabaseOperators(Operators):
     async def send(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
         """Store a command and wait for its answer; withdraw it if no answer arrives in time.
 
-        Raises `StoreError` if the database cannot be used.
+        ``actor`` is the operator's user name. Raises `StoreError` if the database cannot be used.
         """
         stored = self._command(unit, command, actor)
         await asyncio.to_thread(self._store.commands.ask, stored)

@@ -80,7 +80,7 @@ def plant_mark(plant: PlantFile) -> bytes:
 
 
 def stream_name(plant: PlantFile) -> str:
-    """Return the stream name: as configured, or made of the plant's name and fingerprint."""
+    """Return the stream's name: as configured, else made of the plant's name and fingerprint."""
     if plant.stream is not None and plant.stream.name is not None:
         return plant.stream.name
     legible = re.sub(r"[^A-Za-z0-9]+", "-", plant.plant.name).strip("-")[:32]
@@ -127,7 +127,7 @@ PING_S = 5
 
 @asynccontextmanager
 async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStreamContext]:
-    """Connect to the NATS servers and yield the JetStream context; a lost link ends the body.
+    """Connect to NATS as client `name`; yield the JetStream context until the connection is lost.
 
     Raises
     ------
@@ -227,7 +227,7 @@ def _renamed(error: BaseException, settings: StreamSettings) -> StreamError:
             f"NATS at {_places(settings)} cannot be reached ({words}): check that it is running"
         )
     words = str(error) or type(error).__name__
-    return StreamError(f"NATS at {_places(settings)} cannot be used: {words}")
+    return StreamError(f"NATS at {_places(settings)} cannot be used: {words}; check its log")
 
 
 def _most_specific(

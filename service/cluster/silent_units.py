@@ -47,7 +47,7 @@ class SilentUnits:
         self._board: ReportedAlarms | None = None
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Check the reports periodically until cancelled; then remove the alarms."""
+        """Check the reports periodically until cancelled, then remove the alarms."""
         try:
             await periodic(self.look, EVERY_S, self._clock, pulse)
         finally:
@@ -77,7 +77,7 @@ class SilentUnits:
 
     @property
     def is_watching(self) -> bool:
-        """Whether this process is responsible for the alarms about silent units."""
+        """Whether this process has read the stored alarms about silent units and updates them."""
         return self._board is not None
 
     def _kept(self, stored: Iterable[Alarm]) -> ReportedAlarms:

@@ -63,7 +63,7 @@ LIBRARIES = {
 
 @cache
 def libraries() -> Mapping[str, tuple[str, Asset]]:
-    """Return the URL path and content of each library, by file name."""
+    """Return the URL path and content of each JavaScript or style library, by file name."""
     found = {}
     for name, (package, folder) in LIBRARIES.items():
         asset = _read(files(package) / folder / name)
@@ -126,9 +126,9 @@ IMPORT = re.compile(rb'(?:from|import) "(\.{1,2}/[^"]+)"')
 
 
 def imported(module: str, found: dict[str, None] | None = None) -> list[str]:
-    """Return the paths of a module and of all its imports, direct or not, importers first.
+    """Return the paths of a JavaScript module and of all modules that it imports, importers first.
 
-    `found` are paths that are known already, for the recursion; it is changed.
+    Indirect imports are included. `found` holds the paths found so far, for the recursion.
     """
     found = {} if found is None else found
     if module not in found:
@@ -166,7 +166,7 @@ PAGES = {"/": "index.html", "/docs": "docs.html"}
 
 @cache
 def served() -> Mapping[str, Asset]:
-    """Return all static files by URL path."""
+    """Return all pages and files of the dashboard by URL path."""
     return (
         {url: _page(name) for url, name in PAGES.items()}
         | {f"/static/{edition()}/{path}": asset for path, asset in pages().items()}
@@ -175,7 +175,7 @@ def served() -> Mapping[str, Asset]:
 
 
 def compress_all() -> None:
-    """Compress all static files in place, for 0.4 s; until then they are sent uncompressed."""
+    """Compress all static files, which takes about 0.4 s; until then they are sent uncompressed."""
     for asset in served().values():
         asset.compress()
 

@@ -7,7 +7,7 @@ from threading import Lock, Thread
 
 
 class Asker:
-    """Client of a request; threads that read for it ask whether it has disconnected."""
+    """Connection state of the client of a request, for the threads that work on the request."""
 
     def __init__(self) -> None:
         self.has_gone = False
@@ -15,7 +15,7 @@ class Asker:
         self._cancels: list[Callable[[], None]] = []
 
     def leave(self) -> None:
-        """Mark the client as disconnected; cancel its running statements in a new thread."""
+        """Mark the client as disconnected; cancel its running database statements in a thread."""
         with self._lock:
             self.has_gone = True
             cancels = tuple(self._cancels)
@@ -24,7 +24,7 @@ class Asker:
 
     @contextmanager
     def cancelling(self, cancel: Callable[[], None]) -> Iterator[None]:
-        """Return a context manager in which `cancel` is called if the client disconnects.
+        """Return a context manager during which a disconnection of the client calls `cancel`.
 
         `cancel` may still run after the end of the context if `has_gone` is then true.
         """

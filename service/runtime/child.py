@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Child:
-    """Running child process, and this end of the socket pair.
+    """Child process, and the parent's end of the socket pair that connects both.
 
-    The owner must call `close`; a child notices a closed connection, and ends.
+    The owner must call `close`; the child ends when the connection is closed.
     """
 
     process: subprocess.Popen[bytes]
@@ -28,10 +28,10 @@ PROGRAM = "service.app.serving_process"
 
 
 def start_child() -> Child:
-    """Start the child and return it; its argument is the descriptor of its end of a socket pair.
+    """Start the serving process as a child that is connected by a socket pair.
 
-    The child has a session of its own: Ctrl-C in a terminal stops this process, which stops it.
-    The child must end when this process closes its end.
+    The child has a session of its own: Ctrl-C in a terminal stops this process only, and the
+    child ends when this process closes its end of the socket pair.
     """
     ours, theirs = socket.socketpair()
     with theirs:

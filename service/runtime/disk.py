@@ -77,7 +77,7 @@ class Growth:
         self._seen: deque[tuple[float, int]] = deque()
 
     def note(self, space: DiskSpace, now_s: float) -> None:
-        """Add a measurement at the monotonic time ``now_s``, at most one per `EVERY_S`."""
+        """Add a measurement at the monotonic time ``now_s``, at most one per `EVERY_S` seconds."""
         if not self._seen or now_s - self._seen[-1][0] >= EVERY_S:
             self._seen.append((now_s, space.free_bytes))
         while len(self._seen) > 2 and now_s - self._seen[1][0] >= OVER_S:
@@ -144,11 +144,11 @@ class SpaceWatch:
         """Newest measurement of each disk; empty before the first measurement."""
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Measure all disks periodically until the task is cancelled."""
+        """Measure all disks periodically, until cancelled; `pulse` gets heartbeats."""
         await periodic(self.look, PERIOD_S, self._clock, pulse)
 
     async def look(self) -> None:
-        """Measure all disks once and update `disks`, unless the measurement fails."""
+        """Measure all disks once and update `disks`; `disks` is unchanged after a failure."""
         try:
             found = await asyncio.to_thread(self._measured)
         except OSError as error:

@@ -78,10 +78,9 @@ def sync_folder(folder: Path) -> None:
 
 
 def zipped(files: Mapping[str, Path | bytes]) -> Generator[bytes, None, None]:
-    """Yield a ZIP archive in non-empty pieces.
+    """Yield a ZIP archive in non-empty pieces; `files` are paths or contents by name in it.
 
     All files are opened first, so a file that is removed during the iteration is still complete.
-
     Raises `OSError` if a file cannot be read.
     """
     sink = Sink()
@@ -118,7 +117,7 @@ class Sink(RawIOBase):
         return len(content)
 
     def taken(self) -> Iterator[bytes]:
-        """Yield the bytes written since the last call as one piece; nothing if there are none."""
+        """Yield the bytes written since the last call as one piece; yield no empty piece."""
         content = b"".join(self._pieces)
         self._pieces.clear()
         if content:

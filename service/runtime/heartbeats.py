@@ -51,7 +51,7 @@ class LoopPulse(Pulse):
 
     @property
     def trouble(self) -> str | None:
-        """Text that the loop has ended or is stuck; None if it runs."""
+        """Message that the loop has ended or is stuck; None if it runs."""
         if self._has_ended:
             return "has ended"
         now_s = self._clock.monotonic_s()
@@ -68,7 +68,7 @@ class Heartbeats:
         self._pulses: dict[str, LoopPulse] = {}
 
     async def tend(self, name: str, run: Loop) -> None:
-        """Run a loop and record its heartbeats, and its end if it returns or raises."""
+        """Run a loop; record its heartbeats under `name`, and its end if it returns or raises."""
         pulse = self._pulses[name] = LoopPulse(self._clock)
         try:
             await run(pulse)
@@ -87,10 +87,10 @@ class Heartbeats:
             self._pulses.pop(name, None)
 
     def look(self) -> dict[str, str | None]:
-        """Return the `LoopPulse.trouble` of each loop, by loop name; None if the loop runs."""
+        """Return a message by loop name: that the loop has ended or is stuck, None if it runs."""
         return {name: pulse.trouble for name, pulse in self._pulses.items()}
 
     @property
     def troubles(self) -> dict[str, str]:
-        """Texts that loops have ended or are stuck, by loop name; empty if all loops run."""
+        """Messages that loops have ended or are stuck, by loop name; empty if all loops run."""
         return {name: trouble for name, trouble in self.look().items() if trouble}

@@ -31,18 +31,18 @@ class Families(Collector):
         self._families: dict[str, Metric] = {}
 
     def declare(self, meanings: Mapping[str, str]) -> None:
-        """Declare families by name without ``padwatch_``; a name that ends in ``_total`` counts."""
+        """Declare families: help text by name without ``padwatch_``; ``_total`` marks counters."""
         for name, meaning in meanings.items():
             family = CounterMetricFamily if name.endswith("_total") else GaugeMetricFamily
             self._families[name] = family(f"padwatch_{name}", meaning)
 
     def add(self, name: str, value: float | None, **labels: str) -> None:
-        """Add a sample to a declared family; None, an unknown value, is left out."""
+        """Add a sample to a declared family; a value of None (unknown) adds no sample."""
         if value is not None:
             self._families[name].add_sample(f"padwatch_{name}", labels, float(value))
 
     def include(self, metric: Collector, **labels: str) -> None:
-        """Add the samples of a metric that counts by itself, with further labels."""
+        """Add the samples of a metric of the library, with `labels` besides its own."""
         for found in metric.collect():
             family = self._families.setdefault(
                 found.name, Metric(found.name, found.documentation, found.type)
@@ -52,13 +52,13 @@ class Families(Collector):
             ]
 
     def add_program(self, store_kind: str) -> None:
-        """Add the versions of the program and the kind of its database."""
+        """Add the versions of padwatch and Python, and the kind of the database."""
         self.declare(PROGRAM)
         self.add("build_info", 1, version=version("padwatch"), python=python_version())
         self.add("store_info", 1, kind=store_kind)
 
     def collect(self) -> Iterable[Metric]:
-        """Return all declared families, those without samples too."""
+        """Return all declared families, including families without samples."""
         return self._families.values()
 
     @property

@@ -37,7 +37,7 @@ class ValueModel(BaseModel):
 
     @classmethod
     def of(cls, *sources: object, **values: object) -> Self:
-        """Return a model of keyword values, else of attributes of the first source with them."""
+        """Return a model; each field is from `values`, else from the first source that has it."""
         return cls.model_validate(_Merged(SimpleNamespace(**values), *sources))
 
 

@@ -67,7 +67,8 @@ async def paced(
     """Return a context manager that sleeps after its block, and sends heartbeats.
 
     The sleep takes `share` times as long as the block, at least `min_rest_s`, and at most
-    `MAX_REST_S`, so that one slow disk access does not stall the loop. An error ends it at once.
+    `MAX_REST_S`, so that one slow disk access does not stall the loop. After an error in the block
+    there is no sleep.
     """
     begun_s = clock.monotonic_s()
     yield

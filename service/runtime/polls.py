@@ -21,7 +21,7 @@ time-out."""
 
 @dataclass(frozen=True)
 class PollStatistics:
-    """Number of polls of a device since the start, and their newest and mean duration."""
+    """Number of polls of a device since the start, and their newest and mean duration, s."""
 
     n: int
     newest_s: float
@@ -29,7 +29,7 @@ class PollStatistics:
 
 
 class PollClock:
-    """Clock of a source that measures poll durations, separately for each task of the source.
+    """Clock that measures the poll durations of a source, separately for each task of the source.
 
     The task that reads the source calls the clock repeatedly; each call is also a heartbeat.
     """
@@ -48,7 +48,7 @@ class PollClock:
         )
 
     def now_ns(self) -> int:
-        """Return UTC nanoseconds since 1970."""
+        """Return the time in ns since 1970 UTC."""
         return self._clock.now_ns()
 
     def monotonic_s(self) -> float:
@@ -85,7 +85,7 @@ class PollClock:
             self._pulse.beat(after_s)
 
     def forget(self) -> None:
-        """Discard the last sleep of the calling task; time between connections is not a poll."""
+        """Discard the last sleep of the calling task, as time between connections is no poll."""
         task = asyncio.current_task()
         if task is not None:
             self._woken_s.pop(task, None)
@@ -106,12 +106,12 @@ class TimedSource:
         self._source = make(self._clock)
 
     def set_pulse(self, pulse: Pulse) -> None:
-        """Send the heartbeats of the calling task, which must read this source, to ``pulse``."""
+        """Send a heartbeat to ``pulse`` at each clock call of the calling task, the reader."""
         self._clock.set_pulse(pulse)
 
     @property
     def polls(self) -> Histogram:
-        """Histogram of the poll durations."""
+        """Prometheus histogram of the poll durations, s."""
         return self._clock.polls
 
     @property

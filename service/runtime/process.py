@@ -112,7 +112,7 @@ def made_by() -> str:
 
 
 def person() -> str:
-    """Return the names of user and host of the process as text, ``user on host``."""
+    """Return the user and the host of this process as the text ``user on host``."""
     try:
         name = getpass.getuser()
     except (KeyError, OSError):  # a user of a container may have no name

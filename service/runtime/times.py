@@ -8,19 +8,19 @@ EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 def rfc3339(time_ns: int) -> str:
-    """Return a time in UTC in RFC 3339 format, truncated to the millisecond."""
+    """Return a time, ns since 1970 UTC, in RFC 3339 format, truncated to the millisecond."""
     moment = EPOCH + timedelta(microseconds=time_ns // 1_000_000 * 1000)
     return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def compact(time_ns: int) -> str:
-    """Return a time in UTC to the millisecond for a file name; such names sort by time."""
+    """Return a time, ns since 1970 UTC, as text to the millisecond for names that sort by time."""
     seconds, ns = divmod(time_ns, NS_PER_S)
     return f"{datetime.fromtimestamp(seconds, UTC):%Y%m%dT%H%M%S}.{ns // 1_000_000:03d}Z"
 
 
 def day_and_time(time_ns: int) -> str:
-    """Return a time to the second in readable form, example: ``2026-01-31 12:00:00 UTC``."""
+    """Return a time, ns since 1970 UTC, as readable text such as ``2026-01-31 12:00:00 UTC``."""
     return f"{datetime.fromtimestamp(time_ns // NS_PER_S, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 

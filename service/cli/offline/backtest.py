@@ -45,8 +45,8 @@ MAX_PERIOD_RATIO = 2.0
 class BackTestResult:
     """Films, alarms, baselines, shaft responses and warnings that a back-test has found.
 
-    `responses` are triples of unit, number of the period (from 1) and response; `unit_years` is the
-    compared time of all units together.
+    `responses` are triples of unit id, number of the period (from 1) and shaft response;
+    `unit_years` is the time after learning in years, summed over the units.
     """
 
     films: list[FilmReport] = field(default_factory=list)
@@ -57,7 +57,7 @@ class BackTestResult:
     unit_years: float = 0.0
 
     def report(self, file: str, n_rows: int, duration_s: float) -> BackTestReport:
-        """Return the report of the back-test of `n_rows` rows of `file` that took `duration_s`."""
+        """Return the report; the back-test of `n_rows` rows of `file` took `duration_s` seconds."""
         n_alarms, n_danger = len(self.alarms), sum(a.level == "danger" for a in self.alarms)
         per_year = n_alarms / self.unit_years if self.unit_years else None
         return BackTestReport(
@@ -82,17 +82,17 @@ def run_back_test(
     rules: BackTestRules,
     advanced: Callable[[int], object] = lambda _: None,
 ) -> BackTestResult:
-    """Learn the baselines of all bearings, and compare the later readings with them.
+    """Learn the baselines of all bearings, and compare the later readings with the baselines.
 
     Parameters
     ----------
     advanced
-        Called with the number of further rows processed.
+        Called with the number of rows processed since the last call.
 
     Raises
     ------
     ReadingsError
-        If an event names a bearing without readings, or operating states are unknown.
+        If a machine event names a bearing without readings, or operating states are unknown.
     """
     result = BackTestResult(doubts=list(_doubts(histories, rules)))
     for event in rules.events:
@@ -211,7 +211,7 @@ VERDICTS = {
 
 
 def lines_of(report: BackTestReport) -> Iterator[str]:
-    """Yield the lines of a report: doubts, readings by verdict, baselines, alarms and rates."""
+    """Yield a report in lines of text: doubts, readings by verdict, baselines, alarms, rates."""
     yield f"{report.file}: {report.rows} rows"
     yield from (f"  doubtful: {doubt}" for doubt in report.doubts)
     yield "\nReadings by verdict"
@@ -312,7 +312,7 @@ def event_of(text: str) -> MachineEvent:
     Raises
     ------
     ValueError
-        If the text has another form, or as in `time_ns_of`.
+        If the text has another form, or its time has another form or no offset from UTC.
     """
     found = _EVENT.fullmatch(text.strip())
     names = [found["unit"], found["bearing"]] if found else []

@@ -57,7 +57,7 @@ class MachineEvent:
 
 @dataclass(frozen=True)
 class Learning:
-    """Length of learning periods.
+    """Length of the learning periods of the baselines.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Period:
     version
         Number of the baseline, from 1.
     begin, learned, end
-        Row numbers: the baseline is learned from the rows before `learned`, from `begin` on, and
+        Row indices: the baseline is learned from the rows before `learned`, from `begin` on, and
         compared with the rows from `learned` on, before `end`.
     event
         Machine event at the beginning of the period; empty for the first period.
@@ -102,7 +102,7 @@ class Period:
 def periods_of(
     time_ns: TimeArray, events: Sequence[MachineEvent], learning: Learning
 ) -> list[Period]:
-    """Return the periods between events that have readings; `time_ns` (n,) is ascending."""
+    """Return the periods between events that have readings; times (n,) and result are ascending."""
     ordered = sorted(events, key=lambda event: event.time_ns)
     cuts = [0, *(int(np.searchsorted(time_ns, event.time_ns)) for event in ordered), time_ns.size]
     texts = ["", *(event.text for event in ordered)]
@@ -148,7 +148,7 @@ class BackTestRules:
 
 @dataclass(frozen=True, eq=False)
 class PeriodRun:
-    """Period with its baseline and its decisions by direction.
+    """Period with its baseline and the decisions on its readings, by direction.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ class PeriodRun:
     far
         Text with the number of readings far from the baseline; empty if there are none.
     decided
-        Decisions from row `period.learned` on.
+        Decisions on the rows from `period.learned` on.
     """
 
     period: Period
@@ -187,7 +187,7 @@ class BearingRun:
 
 
 def run_bearing(place: Place, rows: BearingRows, rules: BackTestRules) -> BearingRun:
-    """Learn the baselines of one bearing, and compare its later readings with them.
+    """Learn the baselines of one bearing, and compare its later readings with the baselines.
 
     Raises
     ------
@@ -261,7 +261,8 @@ def rules_of(
 ) -> BackTestRules:
     """Return the rules of a back-test with the limits of `settings`.
 
-    Rated figures and bracket stiffness are those of `plant`; None for a back-test without them.
+    Rated figures and bracket stiffness are those of `plant`; with None they are unknown.
+    `created_ns` is the time stored with the baselines, ns since 1970 UTC.
     """
     units = plant.unit if plant else ()
     return BackTestRules(

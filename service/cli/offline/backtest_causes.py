@@ -21,7 +21,7 @@ class UnitCauses:
     Parameters
     ----------
     runs
-        Runs of all bearings of the unit. Only times with a reading of every bearing are used.
+        Back-tests of all bearings of the unit. Only times at which all have a reading are used.
 
     Attributes
     ----------

@@ -18,7 +18,7 @@ MAX_SHOWN = 40
 
 
 class RowProblems:
-    """Collector of the problems in the rows of a file; an error names the first `MAX_NAMED`.
+    """Collector of the problems in the rows of a file; its error names the first `MAX_NAMED`.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class RowProblems:
             self._found.append((int(lines[n]), words))
 
     def refuse(self) -> None:
-        """Raise `ReadingsError` with the first problems and their lines, if there are any."""
+        """Raise `ReadingsError` with the first problems and their lines, unless there are none."""
         if not self._found:
             return
         found = sorted(self._found)[:MAX_NAMED]
@@ -98,7 +98,7 @@ class ReadingsError(ValueError):
 
 
 def check_headings(headings: Sequence[str]) -> None:
-    """Raise `ReadingsError` if headings are missing, unknown, repeated or too many."""
+    """Raise `ReadingsError` if column headings are missing, unknown, repeated or too many."""
     if len(headings) > MAX_COLUMNS:
         raise ReadingsError(f"expected at most {MAX_COLUMNS} columns, got {len(headings)}")
     missing = [key for key in REQUIRED if key not in headings]

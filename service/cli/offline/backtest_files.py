@@ -49,9 +49,9 @@ def read_histories(
     Parameters
     ----------
     places
-        Existing units and bearings; None for any.
+        Pairs of unit and bearing that exist, others are an error; None allows all.
     advanced
-        Called with the number of further bytes read.
+        Called with the number of bytes read since the last call.
 
     Raises
     ------
@@ -146,8 +146,8 @@ def stored_histories(
 ) -> Iterator[FilmHistory]:
     """Yield the stored readings of a bearing in parts of 90 days, oldest first.
 
-    The readings are those from `start_ns` on, before `end_ns`, both ns since 1970 UTC. Raises
-    `StoreError` if the store cannot be read.
+    `place` is the pair of unit and bearing. The readings are those from `start_ns` on, before
+    `end_ns`, both ns since 1970 UTC. Raises `StoreError` if the store cannot be read.
     """
     first_ns = films.first_ns(*place, estimator)
     if first_ns is None:
@@ -163,7 +163,7 @@ def stored_histories(
 def table_of(place: Place, found: FilmHistory) -> Any:
     """Return film readings as an Arrow table with the rows of direction x, then of y.
 
-    The columns are those of a file of readings; NaN becomes null.
+    The columns are those of a file of readings; NaN becomes null. `place` is unit and bearing.
     """
     return pa.concat_tables(_side(place, found, side) for side in range(len(DIRECTIONS)))
 
@@ -193,10 +193,10 @@ def _side(place: Place, found: FilmHistory, side: int) -> Any:
 
 @contextmanager
 def readings_file(path: Path) -> Iterator[Callable[[Any], None]]:
-    """Create a file, CSV if its suffix is ".csv", else Parquet; yield a function that adds rows.
+    """Create a CSV file (suffix ".csv") or Parquet file; yield a function that appends rows.
 
-    The function takes a pyarrow.Table. The first table determines the columns; without any, the
-    file stays empty. An error in the block removes the file.
+    The function takes a `pyarrow.Table`. The first table determines the columns; without a table
+    the file stays empty. An error in the block removes the file.
 
     Raises
     ------

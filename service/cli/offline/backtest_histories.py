@@ -46,14 +46,14 @@ _UNSIGNED = (*AMPLITUDES, "eccentricity_ratio", "u_eccentricity")
 
 @dataclass(frozen=True, eq=False)
 class BearingRows:
-    """Readings of one bearing.
+    """Readings of one bearing from a file, with the operating state of each.
 
     Parameters
     ----------
     state : (n,)
-        Members of `OperatingState`; None without a column of states.
+        Values of `OperatingState`; None if the file has no column of states.
     n_rows
-        Numbers of rows of x and of y.
+        Number of rows of the file in direction x and in direction y.
     """
 
     history: StiffnessHistory
@@ -72,7 +72,7 @@ def histories_of(
         Columns of one length (n,), named as by `converted`: texts as `pyarrow.DictionaryArray`,
         numbers as numpy arrays with NaN for missing numbers.
     places
-        Existing units and bearings; None for any.
+        Pairs of unit and bearing that exist, others are an error; None allows all.
     word
         Word for the column `line` in messages: "line" or "row".
 

@@ -26,7 +26,7 @@ class _Part(BaseModel):
 
 
 class ChangeReport(_Part):
-    """Change of a stiffness, with its uncertainty."""
+    """Change of a film stiffness from its baseline, with its uncertainty."""
 
     percent: float
     """Change from the baseline under the same condition."""
@@ -39,7 +39,7 @@ class ChangeReport(_Part):
 
 
 class ConditionReport(_Part):
-    """Operating condition of a bearing: °C, degrees; null for unknown values."""
+    """Operating condition of a bearing; unknown values are null."""
 
     state: str
     eccentricity_ratio: float | None
@@ -72,7 +72,7 @@ class AlarmReport(_Part):
     bearing: str
     direction: str
     level: str
-    """Highest level."""
+    """Highest level during the alarm."""
 
     begin: str
     danger: str | None
@@ -95,9 +95,9 @@ class AlarmReport(_Part):
 
 
 class SupportReport(_Part):
-    """Baseline of one period: learning period, cells by support, scatter (null if not learned).
+    """Baseline of one period: its learning period, scatter, and number of cells by support.
 
-    Cells have readings of their own, borrow support from neighbours, or have none.
+    A cell of operating conditions has own readings, borrows those of neighbours, or has none.
     """
 
     version: int
@@ -143,7 +143,7 @@ class FilmReport(_Part):
 
 
 class RateReport(_Part):
-    """Rate of alarms (null if nothing was compared); on a healthy plant, that of false alarms."""
+    """Rate of alarms, null without compared readings; on a healthy plant all alarms are false."""
 
     unit_years: float
     """From the end of learning to the end of readings, all units together."""
@@ -154,9 +154,9 @@ class RateReport(_Part):
 
 
 class BackTestReport(_Part):
-    """Report of the back-test of a file, as printed with ``--json``.
+    """Report of the back-test of a file, in the form that ``--json`` prints.
 
-    `doubts` are sentences, empty without doubts; `duration_s` is the time of the run.
+    `doubts` are sentences on doubts about the result; `duration_s` is the run time of the program.
     """
 
     file: str
@@ -176,15 +176,15 @@ class AlarmStretch:
     Parameters
     ----------
     begin
-        First row with the alarm.
+        Index of the first row with the alarm.
     end
-        First row without the alarm; None if it lasts.
+        Index of the first row without the alarm; None if the alarm lasts to the last row.
     level
         Highest level.
     danger
-        First row at level danger; None if the alarm stayed at alert.
+        Index of the first row at level danger; None if the alarm stayed at alert.
     largest
-        Row of the largest change.
+        Index of the row with the largest change.
     """
 
     begin: int
@@ -266,7 +266,7 @@ def _alarm(
 
 
 def change_report(decided: DecisionHistory, row: int) -> ChangeReport:
-    """Return the change at a row with an alarm, in percent of the baseline."""
+    """Return the change at a row with an alarm, in percent of the baseline; `row` is its index."""
     change = float(decided.change[row])
     share, std = float(np.exp(change)), abs(change) / float(decided.significance[row])
     return ChangeReport(

@@ -33,7 +33,7 @@ Lines = tuple[bytes, TimeArray]
 
 
 def checked_lines(stream: BinaryIO) -> Iterator[Lines]:
-    """Yield the lines of a CSV file, some megabytes at a time, after checking them.
+    """Check the lines of a CSV file and yield them in blocks of some megabytes.
 
     Raises
     ------
@@ -81,12 +81,12 @@ def csv_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
     Yields
     ------
     tuple of pyarrow.RecordBatch and int
-        Rows as from `converted`, and the number of bytes read.
+        Rows with the required column types, and the number of bytes read for them.
 
     Raises
     ------
     ReadingsError
-        If it is not a valid file of readings; the message names the lines.
+        If the file is not a valid file of readings; the message names the lines.
     """
     headings: list[str] = []
     for text, numbers in checked_lines(stream):
@@ -161,12 +161,12 @@ def parquet_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
     Yields
     ------
     tuple of pyarrow.RecordBatch and int
-        Rows as from `converted`, and the approximate number of bytes read.
+        Rows with the required column types, and the approximate number of bytes read for them.
 
     Raises
     ------
     ReadingsError
-        If it is not a valid file of readings; the message names the rows.
+        If the file is not a valid file of readings; the message names the rows.
     """
     try:
         yield from _batches(stream)
@@ -204,7 +204,8 @@ WRONG_FILE = 3
 def main() -> None:
     """Write the rows of the file named by the first argument to standard output (Arrow stream).
 
-    Confines the process first. A wrong file ends it with `WRONG_FILE` and a message.
+    Limits memory, time and file access of the process first. A wrong file ends the process with
+    exit code `WRONG_FILE` and a message.
     """
     confine(MEMORY_BYTES)
     try:

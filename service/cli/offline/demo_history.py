@@ -28,7 +28,7 @@ EVENT = "learned from a simulated year"
 
 
 def without_past(store: FilmStore, plant: PlantFile) -> list[UnitSettings]:
-    """Return the units with monitored films without readings in the store."""
+    """Return the units that have monitored films, but no film readings in the store."""
     return [unit for unit, _ in _new_units(store, plant)]
 
 
@@ -107,7 +107,7 @@ def judged(
     learned: BearingBaseline,
     rules: FilmRules,
 ) -> FilmHistory:
-    """Return a history with the decisions of its comparison with a baseline learned from it.
+    """Compare a history with the baseline learned from it; return readings and decisions.
 
     Raises `ValueError` if the stiffness in a direction has no baseline.
     """

@@ -48,7 +48,7 @@ from service.settings.units import UnitSettings
 class CanLogDecoder:
     """Decoder of logged CAN frames into the blocks that a CAN source would have delivered.
 
-    Samples without a device time stamp get the time of the log.
+    Samples without a device time stamp get the time stamp of their frame in the log.
 
     Raises
     ------
@@ -62,7 +62,7 @@ class CanLogDecoder:
         self._gate = FrameGate(plan, self._assembler.refused)
 
     def take(self, frames: Frames) -> list[SampleBlock]:
-        """Decode the next frames of a log, and return the completed blocks, perhaps none.
+        """Decode the next frames of a log; return the blocks that they complete, possibly none.
 
         Raises
         ------
@@ -94,7 +94,7 @@ def _messages(frames: Frames) -> Iterator[can.Message]:
 
 
 def import_job(mapping: ImportMapping, unit: UnitSettings) -> ImportJob:
-    """Return the description of an import, which the reader of the file receives.
+    """Return the description of an import, the input of the process that reads the file.
 
     Raises
     ------

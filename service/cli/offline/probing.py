@@ -37,17 +37,17 @@ PAIR_TYPES = (NumberType.INT32, NumberType.UINT32, NumberType.FLOAT32)
 
 @dataclass(frozen=True)
 class RegisterLook:
-    """Register decoded in every type and byte order.
+    """Modbus register, decoded as every number type in every byte order.
 
     Parameters
     ----------
     singles
-        Values as int16 and uint16 in both byte orders, by name.
+        Values as int16 and uint16 in both byte orders, by the name of type and order.
     pairs
-        Values of types of two registers in each byte order, None unless finite; empty for the last
-        register.
+        Values of this and the next register as 32-bit types, by type and byte order; None if not
+        finite. Empty for the last register.
     plausible
-        Byte orders in which this register and the next are a float of 1e-3 to 1e6.
+        Byte orders in which this and the next register are a float32 of magnitude 1e-3 to 1e6.
     """
 
     address: int
@@ -59,14 +59,14 @@ class RegisterLook:
 
 @dataclass(frozen=True)
 class ValueLook:
-    """Value of a register map, None unless finite, with its raw registers.
+    """Value of a register map, None if it is not finite, with its raw registers.
 
     Parameters
     ----------
     state
-        "ok", or what is wrong: "clipped", "invalid" (by its number) or "flagged" (by a flag).
+        "ok"; "clipped"; "invalid" by the number itself; "flagged" as bad by a status register.
     registers
-        Raw words of the value; a bit of functions 1 and 2 is 0 or 1.
+        Raw 16-bit registers of the value; for functions 1 and 2 a bit, 0 or 1.
     flags
         Status registers of the value, by address.
     """
@@ -82,7 +82,7 @@ class ValueLook:
 
 @dataclass(frozen=True)
 class RingChannelLook:
-    """Counts of a channel in the newest slot of a block ring, and its state by the device.
+    """Counts of a channel in the newest slot of a block ring, and the state of its transducer.
 
     `channel` counts from 0; `ok` is the bit by which the device reports a healthy transducer.
     """
@@ -96,7 +96,7 @@ class RingChannelLook:
 
 @dataclass(frozen=True)
 class RingLook:
-    """Layout of a block ring, and its newest slot.
+    """Layout of a block ring, the ring buffer of a Modbus device, and its newest slot.
 
     Parameters
     ----------
@@ -104,9 +104,9 @@ class RingLook:
         State of the newest slot: "whole", "torn" (being written), "damaged" (wrong checksum) or
         "blank" (not written since the device started).
     start_ns
-        Device time of the first sample, UTC nanoseconds since 1970.
+        Device time of the first sample, ns since 1970 UTC.
     slow
-        Slow values; None for missing ones.
+        Slow values; None for a value that is not finite.
     """
 
     n_channels: int
@@ -153,12 +153,12 @@ def ring_look(header: RingHeader, slot: Slot) -> RingLook:
 
 
 def looks(data: bytes, address: int) -> list[RegisterLook]:
-    """Return each register of big-endian words from `address` on, in every type and byte order."""
+    """Decode the 16-bit big-endian registers `data`, from `address` on, as every number type."""
     return [_look(data[2 * n : 2 * n + 4], address + n) for n in range(len(data) // 2)]
 
 
 def value_looks(decoder: MapDecoder, content: bytes) -> list[ValueLook]:
-    """Return every value of a register map, decoded from `content`, with its raw registers."""
+    """Return every value of a register map, decoded from the registers `content`."""
     reading = decoder.read(content)
     return [
         ValueLook(
@@ -216,7 +216,7 @@ _TRIES_IN_FLIGHT = 20
 
 
 async def read_once(device: ModbusLinkSettings, function: int, address: int, count: int) -> bytes:
-    """Read registers; return big-endian words or, for functions 1 and 2, bits, eight in a byte."""
+    """Read `count` registers as 16-bit big-endian words; for functions 1 and 2 bits, 8 per byte."""
     client = ModbusClient(link_settings(LinkSettings, device))
     async with client.connected():
         return await client.read(address, count, function)
@@ -225,7 +225,7 @@ async def read_once(device: ModbusLinkSettings, function: int, address: int, cou
 async def read_map_once(
     device: ModbusLinkSettings, registers: RegisterMap
 ) -> tuple[MapDecoder, bytes]:
-    """Check the signature of a device; return the decoder and the content of its registers."""
+    """Check a device against a register map; return the map's decoder and the registers read."""
     decoder = MapDecoder(registers)
     reader = MapReader(link_settings(LinkSettings, device), decoder)
     async with reader.connected():
@@ -254,7 +254,7 @@ async def identify_once(device: ModbusLinkSettings) -> Identification:
 async def measure_in_flight(
     device: ModbusLinkSettings, address: int, function: int, most: int
 ) -> int:
-    """Return how many simultaneous requests of an existing register a device answers, 1 to `most`.
+    """Return how many simultaneous requests of one register a device answers, 1 to `most`.
 
     Raises `LinkError` or `ConfigError` if the device does not answer a single request.
     """

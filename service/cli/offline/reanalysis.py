@@ -16,7 +16,7 @@ from service.runtime.times import rfc3339
 
 
 def assessment_document(assessment: Assessment) -> dict[str, Any]:
-    """Return an assessment as a document for JSON, with the models of the API's ``latest``."""
+    """Return an assessment as a JSON document, in the form of the API's newest result."""
     return {
         "unit": assessment.unit,
         "bearing": assessment.bearing,
@@ -36,8 +36,8 @@ N_PER_GN = 1e9
 def stiffness_lines(assessment: Assessment) -> Iterator[str]:
     """Yield the film stiffness of a bearing in x and y as text, with its 95 % interval.
 
-    It is in GN/m or, where the bracket is unknown, in k_b. A stiffness without a value is shown
-    with its reason, an uncertain one with its doubt.
+    The unit is GN/m or, if the stiffness k_b of the bracket is unknown, k_b. A missing or uncertain
+    stiffness is shown with the reason.
     """
     for axis in ("xx", "yy"):
         absolute = f"stiffness_{axis}_n_per_m"
@@ -64,7 +64,7 @@ def stiffness_lines(assessment: Assessment) -> Iterator[str]:
 async def refreshes(
     source: SampleSource, monitor: UnitMonitor, passed: Callable[[int], None]
 ) -> AsyncIterator[Refresh]:
-    """Yield the input of each assessment of a finite source, without computing the assessments.
+    """Yield the input of each assessment of a finite source; no assessment is computed.
 
     Parameters
     ----------
@@ -84,12 +84,12 @@ async def refreshes(
 
 
 def is_full(averaged: AveragingWindow) -> bool:
-    """Return whether an average has the number of segments of a full average."""
+    """Return whether an average has as many segments as the settings require."""
     return averaged.n_segments >= averaged.n_segments_wanted
 
 
 class LastAverages:
-    """Last full average of each bearing, or its last average if none is full."""
+    """Store of the last full average of each bearing, or of the last average if none is full."""
 
     def __init__(self) -> None:
         self._kept: dict[str, Refresh] = {}
@@ -101,14 +101,14 @@ class LastAverages:
             self._kept[refresh.bearing.id] = refresh
 
     def all(self) -> Iterable[Refresh]:
-        """Return the kept average of each bearing, in the order of the first averages."""
+        """Return the stored averages, in the order of the first average of each bearing."""
         return self._kept.values()
 
 
 def calibration_differences(
     ids: Sequence[str], recorded: UnitCalibration, configured: UnitCalibration
 ) -> list[str]:
-    """Return a text on each difference between the recorded and the configured calibration.
+    """Return messages, one per difference between the recorded and the configured calibration.
 
     Parameters
     ----------

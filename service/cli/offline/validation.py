@@ -37,16 +37,16 @@ UNBALANCE_GRADE_MM_S: Final = 4.25
 
 @dataclass(frozen=True)
 class SimulatedRow:
-    """Condition in Table 4 or 5, and its repetition with estimated films in Table 6 or 7.
+    """Condition of Table 4 or 5 of the paper, repeated with estimated films in Table 6 or 7.
 
     Parameters
     ----------
     k_xx_gn_per_m, k_cross_gn_per_m, k_yy_gn_per_m
-        Film put into the model; the cross-coupled value is both k_xy and k_yx.
+        Film stiffness put into the model; the cross-coupled value is both k_xy and k_yx.
     original_um_pk
         |U_x|, |U_y|, |X_b|, |Y_b| of Table 4 or 5.
     k_eff_gn_per_m
-        Estimated in x and y by equation (5), put back into the model for Table 6 or 7.
+        Stiffness in x and y, estimated by equation (5) and used in the model for Table 6 or 7.
     repeated_um_pk
         |U_x|, |U_y|, |X_b|, |Y_b| of Table 6 or 7.
     """
@@ -63,7 +63,7 @@ class SimulatedRow:
 class MeasuredRow:
     """Measurement in X direction and the stiffness that the paper derives from it, as printed.
 
-    `table` is the number of the table, or of the section; `condition` is the time or load.
+    `table` is the number of the table or section of the paper, `condition` the time or the load.
     """
 
     table: int | str
@@ -149,7 +149,7 @@ class Row:
     Parameters
     ----------
     table
-        Number of the table, or of the section for a figure in the text.
+        Number of the table of the paper, or of the section for a figure in its text.
     quantity
         Quantity with unit; amplitudes are zero-to-peak.
     """
@@ -175,18 +175,18 @@ class Errors:
 
 
 def simulated_rows() -> list[Row]:
-    """Return Tables 4 to 7: 80 amplitudes from the frequency response of the 10-DOF model."""
+    """Recompute Tables 4 to 7: 80 amplitudes from the frequency response of the 10-DOF model."""
     rows = [row for condition in range(N_CONDITIONS) for row in _condition_rows(condition)]
     return sorted(rows, key=lambda row: int(row.table))
 
 
 def measured_rows() -> list[Row]:
-    """Return the stiffnesses of Tables 8 and 9 (X direction) and section 3.2, by equation (5)."""
+    """Recompute the stiffnesses of Tables 8 and 9 (X direction) and section 3.2 by equation (5)."""
     return [_measured_row(measured) for measured in MEASURED]
 
 
 def errors(rows: Sequence[Row]) -> Errors:
-    """Return the largest and the root-mean-square error of one or more rows."""
+    """Return the largest and the root-mean-square error of the rows, at least one, in percent."""
     percent = [abs(row.error_percent) for row in rows]
     return Errors(max(percent), math.sqrt(sum(p * p for p in percent) / len(percent)))
 
