@@ -48,7 +48,7 @@ class FrameAssembler:
     instant arrive in a fixed order, and instants are counted by the host. In both cases complete
     instants must be confirmed by the host's clock: delayed samples catch up with it within a
     second. If they do not, a device with a counter has paused sampling, and a new epoch begins.
-    Without a counter, other samples were lost, and all unconfirmed samples are dropped.
+    Without a counter, samples were lost, and all unconfirmed samples are dropped.
 
     Parameters
     ----------

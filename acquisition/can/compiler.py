@@ -21,7 +21,7 @@ _MAX_SHOWN = 12
 
 
 def compile_plan(settings: CanSettings, calibration: UnitCalibration) -> Plan:
-    """Return the decoding plan of a device; read the DBC and look up every signal.
+    """Return the decoding plan of a device; read the DBC file and look up every signal.
 
     Raises ConfigError if a setting does not fit the DBC; the message contains file, key and
     expected value.
@@ -106,7 +106,9 @@ class _Compiler:
             raise ConfigError(f"counters: {path} must have {least}")
         for part in self._parts_of(signal):
             if part.counter is not None:
-                raise ConfigError(f"counters: message {part.message} has a second counter {path}")
+                raise ConfigError(
+                    f"counters: message {part.message} has a second counter {path}; list only one"
+                )
             part.counter, part.counter_step = scalar_reader(signal), step
             part.modulus = step << n_bits
 

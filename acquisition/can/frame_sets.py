@@ -124,7 +124,7 @@ class FrameSets:
         self._n_unusable = [0] * n_waves
 
     def refuse(self, wave: int) -> None:
-        """Count the samples of a frame of wrong length, of the waveform message number `wave`."""
+        """Count the samples of a wrong-length frame; `wave` is the index of its message."""
         self._n_unusable[wave] += self._plan.samples_per_frame
 
     def open(self, index: int) -> None:

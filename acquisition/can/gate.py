@@ -73,7 +73,7 @@ def require_bus(message: Message, where: str) -> None:
     Parameters
     ----------
     where
-        Name of the bus for messages.
+        Name of the bus in error messages.
 
     Raises
     ------

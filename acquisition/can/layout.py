@@ -90,7 +90,7 @@ class WaveChannel:
     Parameters
     ----------
     wave
-        Number of the channel's message among the waveform messages.
+        Index of the channel's message among the waveform messages.
     columns
         Reader of each sample in a frame.
     gain

@@ -30,7 +30,7 @@ class Part:
     message
         Name of the message.
     wave
-        Number of the part among those with waveforms, from 0; None if it has no waveforms.
+        Index of the part among the parts with waveforms; None if it has no waveforms.
     counter
         Reader of the counter, in frames or samples; None without a counter.
     counter_step

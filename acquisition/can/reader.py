@@ -217,7 +217,8 @@ class FrameReader:
                 require_bus(message, self._where)
                 self._refused[Refusal.OVERFLOW] += lost_in_controller(message)
             return message
-        raise LinkError(f"{self._where}: {_MAX_NONSENSE} malformed messages; check the adapter")
+        words = f"{_MAX_NONSENSE} malformed messages in succession; check the adapter"
+        raise LinkError(f"{self._where}: {words}")
 
     def _hand_over(self, batch: Batch) -> None:
         n_frames = len(batch.frames)

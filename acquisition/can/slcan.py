@@ -111,7 +111,7 @@ class SlcanBus(slcanBus):
 
     @classmethod
     def require_speed(cls, bitrate: int | None, data_bitrate: int | None) -> None:
-        """Check that slcan has the bit rates in bit/s, if given; python-can reports a lost link.
+        """Check that slcan supports bit rates, in bit/s; None is accepted.
 
         Raises ConfigError if a bit rate is not supported; the message lists the supported rates.
         """

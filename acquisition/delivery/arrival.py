@@ -208,7 +208,7 @@ class HostStamps:
     def add(self, epoch: int, stop_index: int, arrived_ns: int) -> None:
         """Add the arrival of the samples before `stop_index`, at `arrived_ns` (ns since 1970 UTC).
 
-        `epoch` is that of the sample counter. The result of `start_ns` is undefined before the
+        `epoch` is the epoch of the sample count. The result of `start_ns` is undefined before the
         first call.
         """
         delay_ns = arrived_ns - self.start_ns(stop_index)

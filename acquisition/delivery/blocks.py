@@ -222,7 +222,7 @@ class BlockAssembler:
         self._fault: StampFault | None = None
 
     def note_fault(self, fault: StampFault) -> None:
-        """Count the fault of a stamp other than a sample stamp, and report it in the next block."""
+        """Count a time-stamp fault that the caller found, and report it in the next block."""
         self._stamps.n_faults += 1
         self._fault = fault
 

@@ -105,9 +105,9 @@ class Cell:
         return N_BYTES[self.type] // 2
 
     def start(self, base: int) -> int:
-        """Return the first address of the cell on the wire, for a map that starts at `base`."""
+        """Return the first address of the cell on the wire, where the manual's `base` is 0."""
         return self.address - base
 
     def stop(self, base: int) -> int:
-        """Return the address on the wire after the cell, for a map that starts at `base`."""
+        """Return the address after the cell on the wire, where the manual's `base` is 0."""
         return self.start(base) + self.n_places

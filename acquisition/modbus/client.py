@@ -132,9 +132,10 @@ class ModbusClient:
         self._protocol.close()
 
     async def read(self, address: int, count: int, function: int = READ_HOLDING_REGISTERS) -> bytes:
-        """Read `count` registers or bits from an address on; result as `read_spans`.
+        """Read `count` registers (as big-endian words) or packed bits, from an address on.
 
-        Raises ConfigError if function or address range are invalid.
+        The first of eight bits in a byte is the least significant. Raises ConfigError if function
+        or address range are invalid.
         """
         return await self.read_spans([Span(address, count, function)])
 

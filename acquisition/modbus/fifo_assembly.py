@@ -126,7 +126,7 @@ class UncountedSamples:
         return SamplePlace(self._epochs.number, first)
 
     def has_lost(self, now_s: float) -> bool:
-        """Return whether samples were lost by the monotonic time `now_s`, at an empty queue."""
+        """Return whether samples were lost; `now_s` is the monotonic time of an empty queue."""
         return self._delay.late_s(now_s - self._next / self._rate_hz, now_s) > self._tolerance_s
 
 
@@ -155,7 +155,7 @@ def place_records(
 ) -> list[PlacedSamples]:
     """Return the samples of one reading of a queue as runs of consecutive sample indices.
 
-    Samples that were read before are left out.
+    Samples that were read before are left out. `now_s` is the monotonic time of the reading.
 
     Raises LinkError if the counter restarts more than once in a reading, so that it cannot count
     samples.
@@ -167,7 +167,9 @@ def place_records(
     counters = () if piece.counters is None else piece.counters
     places = [samples.place(int(counter), now_s) for counter in counters]
     if len({place.epoch for place in places if place is not None}) > _MAX_EPOCHS:
-        raise LinkError("FIFO: the sample counter restarts repeatedly in a read; check address")
+        raise LinkError(
+            "FIFO: the sample counter restarts repeatedly in one read; check the queue address"
+        )
     return list(_joined(places, piece.counts))
 
 

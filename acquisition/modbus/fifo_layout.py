@@ -64,7 +64,7 @@ class FifoLayout:
 
     @property
     def record_registers(self) -> int:
-        """Registers of one interleaved record; for one queue per channel, of counter and sample."""
+        """Number of registers in a record: those of the samples, and of the counter if any."""
         n_samples = self.n_channels if self.kind is FifoKind.INTERLEAVED else 1
         return n_samples + self.has_counter
 
@@ -86,6 +86,7 @@ class FifoLayout:
         if words.size % self.record_registers:
             raise LinkError(
                 f"FIFO: {words.size} registers are not whole records of {self.record_registers}"
+                " registers; check channels and counter"
             )
         records = words.reshape(-1, self.record_registers)
         counters = records[:, 0].astype(np.int64) if self.has_counter else None

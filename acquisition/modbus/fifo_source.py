@@ -78,9 +78,9 @@ class FifoSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link and yield blocks; see `SampleSource`.
+        """Open the link and yield an iterator of sample blocks; close the link on exit.
 
-        Raises LinkError also if the link is too slow for the sampling rate.
+        Iteration raises LinkError if the link is lost, or too slow for the sampling rate.
         """
         async with self._client.connected():
             await self._begin()

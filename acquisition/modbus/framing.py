@@ -34,8 +34,8 @@ class TcpFraming:
     def take_all(self, data: bytes, burst: Iterable[PendingRequest]) -> list[bytes]:
         """Return the PDUs of the replies if the bytes are exactly the usual replies to a burst.
 
-        Empty if any reply needs `take`: an incomplete or wrong one, an exception, or one of
-        variable length.
+        The list is empty if a reply must be extracted by `take`: if it is incomplete, wrong, an
+        exception, or of variable length.
         """
         pdus, at = [], 0
         for request, unit, transaction in burst:
@@ -85,11 +85,14 @@ class RtuFraming:
         return body + crc16(body).to_bytes(2, "little")
 
     def take_all(self, _data: bytes, _burst: Iterable[PendingRequest]) -> list[bytes]:
-        """Return no PDUs: one request at a time is in flight, and `take` checks its reply."""
+        """Return an empty list, because replies are extracted one at a time by `take`."""
         return []
 
     def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, bytes] | None:
-        """Extract the reply to a request; results and errors are as those of `TcpFraming.take`."""
+        """Return the frame length in bytes and the PDU of a reply; None if it is incomplete.
+
+        Raises FrameError if the bytes are not the start of a valid reply to the request.
+        """
         if len(data) < 2:
             return None
         if data[0] != pending.unit:

@@ -54,13 +54,14 @@ class MapReader:
             yield
 
     async def read(self) -> MapReading:
-        """Read and decode all values; errors as `connected`."""
+        """Read and decode all values; raise LinkError if the device does not reply correctly."""
         return self._decoder.read(await self.content())
 
     async def content(self) -> bytes:
         """Read all registers of the map; return their bytes in the order of `ReadPlan.spans`.
 
-        Checks identity and signature first if connections are not kept; errors as `connected`.
+        If connections are not kept, identity and signature are checked first. Raises LinkError if
+        the device does not reply correctly, and ConfigError if it is another device.
         """
         if not self._client.is_kept:
             await self._client.require_device()
@@ -141,7 +142,7 @@ class PolledSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link, check identity and signature, and yield blocks; see `SampleSource`."""
+        """Open the link, check identity and signature, and yield an iterator of sample blocks."""
         async with self._reader.connected():
             self._freshness.opened(self._clock.monotonic_s())
             async with aclosing(self._blocks()) as blocks:
@@ -209,7 +210,7 @@ def vector_calibration(
 
 
 def slow_number(reading: MapReading, position: int) -> float:
-    """Return the value at a position of the register map; NaN unless its state is OK."""
+    """Return the value with an index in the register map; NaN unless its state is OK."""
     is_ok = reading.states[position] is ValueState.OK
     return float(reading.values[position]) if is_ok else math.nan
 

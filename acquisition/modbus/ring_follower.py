@@ -50,7 +50,7 @@ class RingReader:
         ConfigError
             If the registers contain no valid block-ring header.
         LinkError
-            As `ModbusClient.read_spans`; also if the checksum is wrong in every read.
+            If the device does not reply correctly, or the checksum is wrong in every read.
         """
         for _ in range(_N_TRIES):
             content = await self._client.read_spans([self._header])

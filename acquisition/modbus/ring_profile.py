@@ -225,7 +225,7 @@ def slot_records(content: bytes, layout: RingLayout) -> SlotRecords:
 
 
 def damages_of(records: SlotRecords) -> list[int]:
-    """Return `Slot.damage` of each record."""
+    """Return the exclusive-or of stored and computed checksum of each slot; 0 if equal."""
     n_bytes, content = records.itemsize, records.tobytes()
     view = memoryview(content)
     starts = range(0, len(content), n_bytes)
@@ -236,7 +236,7 @@ def damages_of(records: SlotRecords) -> list[int]:
 
 
 def decode_slots(records: SlotRecords) -> list[Slot]:
-    """Return records of slots as values."""
+    """Return the decoded slots of records as read; checksums are not checked."""
     counts, damages = records["counts"].astype(np.int16), damages_of(records)
     heads, slow, trailers = (records[name].tolist() for name in ("head", "slow", "trailer"))
     slots = []

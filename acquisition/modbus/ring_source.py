@@ -57,7 +57,7 @@ class RingSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link, check the header of the ring, and yield blocks; see `SampleSource`."""
+        """Open the link, check the header of the ring, and yield an iterator of sample blocks."""
         async with self._client.connected():
             slot_s = (await self._follower.header()).layout.slot_duration_s
             if self._freshness is None:

@@ -77,9 +77,9 @@ class Timeline:
         return self._accepted_index
 
     def place_run(self, newest: Slot, n_slots: int) -> int | None:
-        """Accept slots that follow each other, given by the newest, if they are on the axis.
+        """Accept `n_slots` consecutive slots that end with `newest`, if they continue the axis.
 
-        Returns the index of their first sample; None if `place` must decide on each.
+        Returns the index of their first sample; None if each slot must be checked by `place`.
         """
         before = self._accepted
         if before is None or not self._on_one_axis(before, newest):

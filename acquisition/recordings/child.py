@@ -94,7 +94,7 @@ def _memory_bytes(request: Mapping[str, Any]) -> int:
 
 
 def answer(request: Mapping[str, Any], out: BinaryIO) -> None:
-    """Write the content of a file to `out` as messages; if rejected, the last is an error message.
+    """Write the content of a file to `out` as messages; a rejected file ends with an error message.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ class _Counts:
 
     def read(self, first_row: int, n_rows: int) -> RawArray:
         if first_row + n_rows > self._n_rows:
-            raise ConfigError("the blocks have more samples than the samples file")
+            raise ConfigError("the blocks have more samples than the samples file; it is damaged")
         parts: list[Any] = []
         while n_rows > 0:
             group, offset = divmod(first_row, ROWS_PER_GROUP)

@@ -91,7 +91,7 @@ class RecordedUnit(ManifestPart):
         "int16": counts of an A/D converter. "float32": engineering units from a device without
         counts; NaN for a missing sample.
     block_samples
-        Block length in samples; see :class:`core.samples.calibration.UnitCalibration`.
+        Number of samples that share one OK state per channel and one set of slow values.
 
     Raises
     ------

@@ -137,7 +137,7 @@ def blocks_in(
     Raises
     ------
     ConfigError
-        If the message does not contain such blocks of the channels in the calibration.
+        If the message does not contain blocks of a permitted type with the calibrated channels.
     """
     heads, rejected, sample_type = heads_in(message, len(calibration.slow))
     n_channels, n_samples = len(calibration.channels), heads["n_samples"]
@@ -200,7 +200,7 @@ class Progress:
     n_blocks, n_samples
         Number of blocks, and of samples per channel, so far.
     n_passed
-        The same number of samples, with the samples missing in gaps within an epoch.
+        Number of samples per channel, including those missing in gaps within an epoch.
     epoch
         Epoch of the last block; None before the first block.
     stop_index
@@ -214,7 +214,7 @@ class Progress:
     stop_index: int = 0
 
     def missing(self, heads: Heads) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
-        """Return whether each next block continues an epoch, and the samples missing before it.
+        """Return whether each block continues an epoch, and the number of samples missing before.
 
         Both are (n_blocks,) arrays. In a new epoch, the samples before the first index are missing.
         """

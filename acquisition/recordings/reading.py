@@ -53,7 +53,7 @@ def confined_messages(
     Parameters
     ----------
     format_
-        Format in the request; see :func:`acquisition.recordings.child.answer`.
+        Format of the file: "recording", or the format of an import job.
     kind
         Expected kind of the messages, "blocks" or "frames".
     request
@@ -163,7 +163,10 @@ def imported_blocks(path: Path, job: ImportJob) -> Generator[tuple[SampleBlock, 
 
 
 def imported_frames(path: Path, job: ImportJob) -> Generator[tuple[Frames, float]]:
-    """Yield the frames of a CAN log in batches, as :func:`imported_blocks` yields blocks."""
+    """Yield the frames of a CAN log in batches, each with the fraction of the log read so far.
+
+    Raises ConfigError if the log is missing or invalid; the message contains its path.
+    """
     for message in _imported(path, job, "frames"):
         yield frames_of(message), _done(message)
 

@@ -24,9 +24,9 @@ class Selection:
     Parameters
     ----------
     channels
-        Positions of the selected waveform channels in the recording.
+        Indices of the selected waveform channels in the recording.
     slow
-        Positions of the selected slow channels in the recording.
+        Indices of the selected slow channels in the recording.
     calibration
         Calibration of the selected channels, which replaces that of the recording.
     """
@@ -154,7 +154,7 @@ class RecordingSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Start the replay and yield its blocks; see :class:`acquisition.source.SampleSource`.
+        """Start or continue the replay, and yield an iterator of its sample blocks.
 
         Raises
         ------

@@ -56,7 +56,7 @@ def samples_table(counts: RawArray, unit: RecordedUnit) -> Any:
 
 
 def blocks_table(heads: Heads, rejected: Sequence[Sequence[Rejection]], unit: RecordedUnit) -> Any:
-    """Return the headers of blocks and the rejections before each block as a table."""
+    """Return a pyarrow table with one row per block: its header, and the rejections before it."""
     columns = [
         *(heads[name] for name in HEAD_NUMBERS),
         *heads["slow"].T,
@@ -129,7 +129,7 @@ def read_counts(file: Any, group: int) -> RawArray:
 
 
 def read_heads(file: Any, n_slow: int) -> Iterator[tuple[Heads, list[Rejected]]]:
-    """Yield the block headers and their rejections, some hundred blocks at a time."""
+    """Yield block headers and the rejections before them, some hundred blocks at a time."""
     for batch in file.iter_batches(_HEADS_AT_ONCE, use_threads=False):
         *numbers, rejected = batch.columns
         heads = np.empty(len(batch), head_type(n_slow))

@@ -118,7 +118,7 @@ class SimulatedSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Yield an iterator of the feed's blocks; see :class:`acquisition.source.SampleSource`."""
+        """Start the feed, or continue it, and yield an iterator of its calibrated blocks."""
         if self._start_s is None:
             self._start_s = self._clock.monotonic_s()
         if self._paced:

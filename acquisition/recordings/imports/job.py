@@ -136,7 +136,7 @@ class ImportJob:
     slow
         Columns of the slow channels, in the order of the unit.
     block_samples
-        Block length in samples; see :class:`core.samples.calibration.UnitCalibration`.
+        Number of samples that share one OK state per channel and one set of slow values.
     bus
         Bus to read from a CAN log; empty for a log of a single bus.
     """

@@ -76,7 +76,7 @@ def _series(mdf: Any, group: int, index: int, place: ColumnName, start_ns: int) 
         found = mdf.get_master(group, record_offset=start, record_count=stop - start)
         us = np.rint(found.astype(np.float64) * 1e6)
         if len(us) != stop - start or not np.all(np.abs(us) < 2**53):
-            raise ConfigError("a channel group has no valid time channel")
+            raise ConfigError(f"channel group {group} has no valid time channel")
         return utc_ns(us.astype(np.int64), start_ns)
 
     is_int16 = channel.bit_count == 16 and raw(0, 1).dtype == np.int16

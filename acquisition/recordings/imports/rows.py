@@ -85,7 +85,7 @@ class Indexer:
         self._last_ns = 0
 
     def stretches(self, times_ns: TimeArray) -> Iterator[Stretch]:
-        """Yield the ranges without a gap of the next rows; rows are positions in `times_ns` (n,).
+        """Yield the ranges without a gap in the next rows, given by their times (n,).
 
         Raises ConfigError if times decrease, are irregular or have a wrong rate; the message names
         the row.

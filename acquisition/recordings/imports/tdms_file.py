@@ -108,7 +108,7 @@ def _require_whole(stream: BinaryIO) -> None:
 def _stamps_ns(stamps: Any) -> npt.NDArray[np.int64]:
     seconds: npt.NDArray[np.int64] = np.asarray(stamps["seconds"]).astype(np.int64) + _EPOCH_1904_S
     if np.any(np.abs(seconds) > 2**33):
-        raise ConfigError("a time stamp is after the year 2242")
+        raise ConfigError("a time stamp is after the year 2242; check the clock of the recorder")
     # the upper 53 of 64 bits are exact in a double, a resolution far below the microsecond needed
     us = np.rint((np.asarray(stamps["second_fractions"]) >> np.uint64(11)) * 2.0**-53 * 1e6)
     found: npt.NDArray[np.int64] = seconds * NS_PER_S + us.astype(np.int64) * 1000

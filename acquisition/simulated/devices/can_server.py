@@ -126,8 +126,8 @@ class CanBusServer(CanDaqServer):
     """Server that sends the frames of one simulated CAN device on a python-can bus.
 
     The interface "virtual" is limited to one process. "udp_multicast" reaches other processes and
-    hosts over the route to its group, usually the default route; slow readers lose frames. Other
-    parameters are those of `CanDaqServer`.
+    hosts over the route to its group, usually the default route; slow readers lose frames. Without
+    a clock, `on_demand` produces a block when all are sent; with one, `patient` waits for a client.
 
     Parameters
     ----------

@@ -104,8 +104,8 @@ class _SlcanServer(CanDaqServer):
 class SlcanTcpServer(_SlcanServer):
     """Simulated slcan adapter on a TCP port; a new client replaces the previous client.
 
-    Port 0 selects a free port, which is kept when the server is entered again. The other parameters
-    are those of `CanDaqServer`.
+    Port 0 selects a free port, which is kept when the server is entered again. Without a clock,
+    `on_demand` produces a block when all are sent; with one, `patient` waits for the client.
     """
 
     def __init__(
@@ -178,8 +178,8 @@ class SlcanTcpServer(_SlcanServer):
 class SlcanPtyServer(_SlcanServer):
     """Simulated slcan adapter on a pseudo-terminal.
 
-    `link` is the path of a symbolic link to the terminal; None for no link. The other parameters
-    are those of `CanDaqServer`.
+    `link` is the path of a symbolic link to the terminal; None for no link. Without a clock,
+    `on_demand` produces a block when all are sent; with one, `patient` waits for the client.
     """
 
     def __init__(

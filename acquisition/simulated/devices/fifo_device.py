@@ -24,7 +24,7 @@ _ON_DEMAND_STEPS = 16
 class FifoDevice(ModbusDevice):
     """Simulated Modbus device of one unit with sample queues; a full queue drops its oldest sample.
 
-    `unit` and `ledger` are those of `ModbusDevice`.
+    `ledger` counts the produced samples, by default in a new `Ledger`, for the unit named `unit`.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class FifoDevice(ModbusDevice):
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Fault functions by name, which take a count: lost steps, overflow, freeze, restart."""
+        """Fault injectors by name, called with a count: lost steps, overflow, freeze, restart."""
         return {
             **super().faults,
             "drop": self._drop,

@@ -26,7 +26,7 @@ _SENTINEL, _FLAG = "sentinel", "flag"
 class MapDevice(ModbusDevice):
     """Simulated Modbus device of one unit with the newest sample of each channel in registers.
 
-    `unit` and `ledger` are those of `ModbusDevice`.
+    `ledger` counts the produced samples, by default in a new `Ledger`, for the unit named `unit`.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class MapDevice(ModbusDevice):
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Fault functions by name, which take a count: frozen data, invalid numbers, bad status."""
+        """Fault injectors by name, called with a count: frozen data, invalid numbers, status."""
         spoils = {name: partial(self._spoil_values, name) for name in (_SENTINEL, _FLAG)}
         return {**super().faults, **spoils}
 
@@ -157,8 +157,8 @@ def in_units(raw: SampleBlock, calibration: UnitCalibration) -> FloatArray:
 class VectorDevice(MapDevice):
     """Simulated monitoring rack of one unit: amplitudes and phases over a window of samples.
 
-    At constant speed, phases refer to a key-phase mark at sample index 0 of the feed. The other
-    parameters are those of `MapDevice`.
+    At constant speed, phases refer to a key-phase mark at sample index 0 of the feed. Registers
+    are updated every `step_samples` samples, which `ledger` counts for the unit named `unit`.
 
     Parameters
     ----------

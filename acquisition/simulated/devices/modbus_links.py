@@ -27,8 +27,8 @@ _MAX_REQUEST_BYTES = 8
 class ModbusTcpServer(ModbusServer):
     """Modbus TCP server of a simulated device, for any number of clients.
 
-    Port 0 selects a free port, which the attribute `port` contains after entering. The other
-    parameters are those of `ModbusServer`.
+    Port 0 selects a free port, which the attribute `port` contains after entering. Without a clock,
+    data are produced only by ``device.produce``; if `patient`, from the first request on.
 
     Raises
     ------
@@ -132,8 +132,9 @@ class _Connection(asyncio.Protocol):
 class ModbusRtuServer(ModbusServer):
     """Modbus RTU server of a simulated device, for one client on a pseudo-terminal.
 
-    `link` is the path of a symbolic link to the terminal; None for no link. The other parameters
-    are those of `ModbusServer`, and the errors on entering are those of `PseudoTerminal.open`.
+    `link` is the path of a symbolic link to the terminal; None for no link. Without a clock, data
+    are produced only by ``device.produce``; if `patient`, from the first request on. Entering
+    raises ConfigError if the path of the link is in use, and LinkError if the system fails.
     """
 
     def __init__(

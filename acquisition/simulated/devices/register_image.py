@@ -182,7 +182,7 @@ def encode_header(header: RingHeader) -> bytes:
 
 
 def encode_slot(slot: Slot) -> bytes:
-    """Return one slot of a block ring as big-endian words with checksum."""
+    """Return one slot of a block ring as big-endian bytes that end with its checksum."""
     head = struct.pack(
         ">6I",
         *(slot.sequence, slot.first_index, slot.seconds, slot.microseconds),

@@ -48,8 +48,8 @@ class RingDevice(ModbusDevice):
 
     Slots begin at multiples of their length in the sample index of the feed. In a gap of the feed
     the device writes no slots; after the gap, sequence number, sample index and time continue
-    consistently. A new epoch of the feed restarts the device. `unit` and `ledger` are those of
-    `ModbusDevice`.
+    consistently. A new epoch of the feed restarts the device. `ledger` counts the produced samples,
+    by default in a new `Ledger`, for the unit named `unit`.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class RingDevice(ModbusDevice):
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Fault functions by name, which take a count: faulty slots, frozen data, restarts."""
+        """Fault injectors by name, called with a count: faulty slots, frozen data, restarts."""
         slot_faults = {**SLOT_FAULTS, "repeat": self._repeated}
         return {
             **super().faults,
@@ -131,8 +131,8 @@ class RingDevice(ModbusDevice):
     def produce_unpaced(self, n_slots: int) -> None:
         """Write the next slots without delay, also after a gap, without overwriting a new slot.
 
-        `n_slots` is the maximum number of places of the ring, including gaps except one before the
-        first slot.
+        At most `n_slots` places of the ring are used by slots and gaps; a gap before the first slot
+        does not count.
         """
         if self._n_frozen:
             self._n_frozen -= 1
@@ -163,7 +163,7 @@ class RingDevice(ModbusDevice):
         self._power_up(first, self._settings.first_index or 0)
 
     def read_registers(self, function: int, address: int, count: int) -> bytes | None:  # noqa: ARG002
-        """Return registers, equal for functions 3 and 4; None if a register does not exist."""
+        """Return `count` registers as big-endian words; None if an address does not exist."""
         asked = range(address, address + count)
         if self._settings.base_address in asked:
             self._look()

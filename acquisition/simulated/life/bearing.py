@@ -23,8 +23,8 @@ class LifeBearing:
     Parameters
     ----------
     ring
-        Pads of Table 1 with the stiffness of Table 2 at its operating clearance (Brito et al.); at
-        the TJB with a tenth of it, as assumed, at the warm clearance.
+        Pads of Brito et al., Table 1, with the stiffness of Table 2 at the operating clearance; for
+        the TJB, with a tenth of this stiffness (an assumption) at the warm clearance.
     cold_clearance_um
         Radial clearance with shaft and housing at the same temperature.
     closing_um
@@ -153,7 +153,7 @@ def draw_water_c(random: np.random.Generator, operation: Operation) -> FloatArra
 
 
 def draw_closing_share(random: np.random.Generator, operation: Operation) -> FloatArray:
-    """Draw the ratio of the closing to `LifeBearing.closing_um`, with random variation, (n,)."""
+    """Draw the ratio of the actual to the nominal thermal decrease of the clearance, (n,)."""
     n, step_s = len(operation), operation.step_s
     return 1.0 + wander(random, n, step_s, CLOSING_TIME_S, CLOSING_RMS)
 
@@ -173,7 +173,7 @@ def thermal_course(
     water_c : (n,)
         Temperature of the cooling water.
     closing_share : (n,) or one number
-        Ratio of the closing to `LifeBearing.closing_um`.
+        Ratio of the actual to the nominal decrease of the clearance, `LifeBearing.closing_um`.
     oil_offset_c : (n,) or one number
         Additional oil temperature while running, caused by insufficient cooling.
     initial_oil_c

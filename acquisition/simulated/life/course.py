@@ -42,7 +42,7 @@ class LifeCourse:
     damage
         Damage, which begins at its exact onset, not at the next reading.
     machine
-        Unit to be sampled, as in `scenario_at`.
+        Unit to be sampled; its bearings must be in the life.
     start_ns
         Time of the first sample, ns since 1970 UTC.
 
@@ -187,7 +187,7 @@ class LifePlan:
 
 
 def history_until(plan: LifePlan, now_ns: int, years: float = 1.0) -> UnitLife:
-    """Return the readings and the true state of a life until `now_ns`.
+    """Return the readings and the true state of a life until `now_ns`, ns since 1970 UTC.
 
     `years` is the length of the history; up to one year is always available.
 
@@ -210,7 +210,7 @@ def history_until(plan: LifePlan, now_ns: int, years: float = 1.0) -> UnitLife:
 def course_from(
     plan: LifePlan, now_ns: int, machine: Unit, noise: TransducerNoise = TRANSDUCER_NOISE
 ) -> LifeCourse:
-    """Return the life of `history_until` from `now_ns` to the end of next year, as scenarios.
+    """Return the scenarios of a life from `now_ns`, ns since 1970 UTC, to the end of next year.
 
     Raises `ValueError` if damage has an unknown bearing, and `KeyError` if a bearing of the machine
     is missing from the life.

@@ -151,8 +151,10 @@ def live(
 
     Parameters
     ----------
-    start_ns, changes, held
-        As in `draw_inputs`.
+    start_ns
+        Time of the first row: midnight in the time zone of the plant.
+    held
+        Operation at constant load; None for random starts and stops.
 
     Raises
     ------
@@ -166,7 +168,7 @@ def live(
 
 
 def require_known_bearings(damage: tuple[Damage, ...], bearings: tuple[LifeBearing, ...]) -> None:
-    """Check the bearings of all damage; raise `ValueError` with the id of an unknown bearing."""
+    """Check that the bearings of all damage are known; raise `ValueError` for an unknown id."""
     known = {bearing.id for bearing in bearings}
     for one in damage:
         if one.bearing not in known:

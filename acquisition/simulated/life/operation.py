@@ -32,7 +32,7 @@ class Operation:
 
     @property
     def step_s(self) -> float:
-        """Time between the first two rows."""
+        """Time between the first two rows, s."""
         return float(self.time_ns[1] - self.time_ns[0]) / NS_PER_S
 
     @property

@@ -101,9 +101,9 @@ class Film:
         return Film(*np.concatenate([whole.real, whole.imag / frequency_rad_s], None).tolist())
 
     def effective_stiffness_n_per_m(self, frequency_rad_s: float) -> tuple[float, float]:
-        """Return the magnitudes ``|k_xx + iωc_xx|`` and ``|k_yy + iωc_yy|``.
+        """Return the magnitudes ``|k_xx + iωc_xx|`` and ``|k_yy + iωc_yy|`` in N/m.
 
-        In N/m. Equation (5) of Brito et al. estimates them if cross-coupling is negligible.
+        Equation (5) of Brito et al. estimates them if cross-coupling is negligible.
         """
         x, y = abs(np.diag(self.dynamic_stiffness_n_per_m(frequency_rad_s))).tolist()
         return x, y

@@ -92,7 +92,7 @@ def _step(
 
 @dataclass(frozen=True)
 class LiftedRotor:
-    """`n_steps` steps of a :class:`DiscreteRotor` combined into one.
+    """Rotor that combines `n_steps` steps of a :class:`DiscreteRotor` into one.
 
     Parameters
     ----------
