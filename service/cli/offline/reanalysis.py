@@ -46,7 +46,7 @@ def stiffness_lines(assessment: Assessment) -> Iterator[str]:
         scale, unit = (N_PER_GN, "GN/m") if name == absolute else (1.0, "k_b")
         words = f"{assessment.unit} {assessment.bearing} film stiffness {axis}: "
         if reading.value is None:
-            yield f"{words}not available, {reading.quality.reason.value}"
+            yield f"{words}not available: {reading.quality.reason.value.replace('_', ' ')}"
             continue
         words += f"{reading.value / scale:.3f}"
         if reading.interval_95 is not None:
@@ -55,8 +55,11 @@ def stiffness_lines(assessment: Assessment) -> Iterator[str]:
         else:
             words += f" {unit}, uncertainty unknown"
         reason = reading.quality.reason
-        signs = f"check the sign of shaft_{axis[0]} or bearing_{axis[0]}"
-        doubt = signs if reason is Reason.POLARITY else reason.value
+        doubts = {
+            Reason.POLARITY: f"check the sign of shaft_{axis[0]} or bearing_{axis[0]}",
+            Reason.SWAPPED_AXES: "the shaft whirls backward; check the signs and order of x and y",
+        }
+        doubt = doubts.get(reason, reason.value.replace("_", " "))
         is_good = reading.quality.level is Level.GOOD
         yield words if is_good else f"{words}, uncertain: {doubt}"
 

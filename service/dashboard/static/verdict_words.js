@@ -4,6 +4,7 @@ import { ALARM_KINDS } from "./alarm_kinds.js";
 import { kindWords } from "./alarm_words.js";
 import { expectedWords, signedPercent, verdictMark } from "./film_words.js";
 import { formatTime } from "./format.js";
+import { serviceTimeMs } from "./server_time.js";
 
 const CAUSES = {
   all_films_changed: "all films alike: oil or cooling",
@@ -53,7 +54,7 @@ function changeWords(film, { directions, value, condition_reason: reason }) {
 
 /** `22:10` of today, else with the date. */
 function sinceWords(timeMs) {
-  const [time, today] = [timeMs, Date.now()].map(formatTime);
+  const [time, today] = [timeMs, serviceTimeMs()].map(formatTime);
   return time.slice(0, 10) === today.slice(0, 10) ? time.slice(11, 16) : time.slice(0, 16);
 }
 

@@ -307,4 +307,4 @@ def test_a_film_on_an_unknown_bracket_is_told_as_a_ratio_to_it():
     ratio = Reading(0.585, interval_95=(0.57, 0.60))
     x, y = stiffness_lines(assessment(stiffness_xx_of_kb=ratio))
     assert x == "U1 UJB film stiffness xx: 0.585 ± 0.015 k_b (95 %)"
-    assert y.endswith("not available, not_measured")
+    assert y.endswith("not available: not measured")

@@ -7,6 +7,7 @@ import { formatTime } from "../format.js";
 import { listing, listingCell, listingName, rowBelow } from "../parts/listing.js";
 import { mark } from "../parts/mark.js";
 import { labelled, question } from "../parts/question.js";
+import { serviceTimeMs } from "../server_time.js";
 import { opener, roleChoice } from "./account_list.js";
 import { newKey } from "./new_key.js";
 
@@ -45,7 +46,7 @@ function keyRow({ id, name }, again) {
   return {
     nodes: [element("tr", { role: "row", "data-key": id }, listingName(name), ...cells), below],
     draw(key) {
-      state.draw(...keyMark(key, Date.now()));
+      state.draw(...keyMark(key, serviceTimeMs()));
       revoking.hidden = key.state !== "valid";
       [key.role, unitsWords(key), formatTime(Date.parse(key.expires)), usedWords(key)].forEach((words, n) => setText(texts[n], words));
     },

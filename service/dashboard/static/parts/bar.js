@@ -3,6 +3,7 @@
 import { countWords } from "../alarm_words.js";
 import { setAttribute, setText } from "../dom.js";
 import { formatAge, formatTime, formatZone } from "../format.js";
+import { serviceTimeMs } from "../server_time.js";
 import { isLocked, mustChangePassword } from "../session.js";
 import { mark } from "./mark.js";
 import { navigation } from "./navigation.js";
@@ -21,7 +22,8 @@ export function bar(pages, alarmsPattern) {
   return {
     draw(view) {
       setText(part("plant"), view.plant ?? "");
-      setText(part("clock"), `${formatTime(Date.now())} ${formatZone(Date.now())}`);
+      const nowMs = serviceTimeMs();
+      setText(part("clock"), nowMs === null ? "" : `${formatTime(nowMs)} ${formatZone(nowMs)}`);
       setText(part("service"), serviceSentence(view));
       part("replay").hidden = view.origin !== "replay";
       part("alarms").hidden = isLocked();
