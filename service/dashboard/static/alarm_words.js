@@ -154,7 +154,7 @@ export function countWords(count) {
   if (count === null) return ["uncertain", "Alarms unknown"];
   const { n_active: active, n_danger: danger, n_unacknowledged: unseen, n_unjudged: unjudged } = count;
   const parts = [];
-  if (active) parts.push(`${active} ${active === 1 ? "alarm" : "alarms"}`);
+  if (active !== danger) parts.push(`${active} ${active === 1 ? "alarm" : "alarms"}`);
   if (danger) parts.push(`${danger} danger`);
   if (unseen) parts.push(`${unseen} not acknowledged`);
   if (!active && !unseen) parts.push("No alarms");

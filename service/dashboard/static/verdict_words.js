@@ -7,8 +7,9 @@ import { formatTime } from "./format.js";
 import { serviceTimeMs } from "./server_time.js";
 
 const CAUSES = {
-  all_films_changed: "all films alike: oil or cooling",
-  bracket_or_transducer_changed: "bracket or transducer",
+  film_changed: "cause: film",
+  all_films_changed: "cause: oil or cooling of all films",
+  bracket_or_transducer_changed: "cause: bracket or transducer",
   changed_cause_unknown: "cause unclear",
 };
 

@@ -11,9 +11,10 @@ from on_screen import (
     await_charts,
     await_orbit,
     await_spectra,
+    freeze,
     number_with,
 )
-from playwright.async_api import Page, expect
+from playwright.async_api import Browser, Page, expect
 from rigs.tiers import fast_and_long
 
 AXE = Path(__file__).parents[1] / "javascript" / "node_modules" / "axe-core" / "axe.min.js"
@@ -30,6 +31,22 @@ GRAVE = """async () => {
   const grave = violations.filter(({ impact }) => ["serious", "critical"].includes(impact));
   return grave.map(({ id, nodes }) => [id, nodes.map(({ html }) => html)]);
 }"""
+LONG_NAMES = (
+    "Гидроагрегат_№12_Саяно-Шушенской_ГЭС_имени_Непорожнего_640МВт",
+    "مولد الطاقة الكهرومائية رقم ١٢ في محطة السد العالي بأسوان ⚡🌊",
+    "三峡水电站左岸厂房第十二号水轮发电机组上导轴承油膜刚度在线监测系统甲乙丙丁戊己庚辛壬癸子丑寅卯辰巳午未申酉",
+)
+ONE_DAY_BEHIND = """(() => {
+  const Right = Date;
+  const now = () => Right.now() - 86_400_000;
+  window.Date = class extends Right {
+    constructor(...parts) { super(...(parts.length ? parts : [now()])); }
+    static now() { return now(); }
+  };
+})()"""
+SHOWN_CLOCK = """() => Date.parse(
+  document.querySelector("#clock").textContent.replace(/ UTC$/, "Z").replace(" ", "T")
+)"""
 REDRAWN = """before =>
     document.querySelector('[data-chart=spectrum] .chart path.xgrid').style.stroke !== before"""
 
@@ -86,6 +103,30 @@ async def test_no_page_scrolls_sideways_on_a_phone(plant, phone_page):
         await open_settled(phone_page, plant.url + address)
         await unfold(phone_page, address)
         await assert_fits(phone_page)
+
+
+async def test_names_of_sixty_characters_in_any_alphabet_fit_on_a_phone(plant, phone_page):
+    overview = await freeze(phone_page, plant.url)
+    for unit in overview["units"]:
+        unit["name"] = LONG_NAMES[0]
+        for bearing, name in zip(unit["bearings"], LONG_NAMES, strict=True):
+            bearing["name"] = name
+    for address in ("#/", "#/units/U1", BEARING):
+        await open_settled(phone_page, plant.url + address)
+        await expect(phone_page.locator("#main").get_by_text(LONG_NAMES[0]).first).to_be_visible()
+        await assert_fits(phone_page)
+
+
+async def test_a_wrong_clock_of_the_browser_changes_no_time_on_a_page(plant, browser: Browser):
+    context = await browser.new_context(timezone_id="UTC")
+    await context.add_init_script(ONE_DAY_BEHIND)
+    page = await context.new_page()
+    await open_settled(page, plant.url)
+    answer = await page.request.get(f"{plant.url}api/v1/overview")
+    time = answer.headers["padwatch-time"]
+    behind_ms = await page.evaluate(f"time => Date.parse(time) - ({SHOWN_CLOCK})()", time)
+    assert abs(behind_ms) < 3_600_000
+    await context.close()
 
 
 @pytest.mark.parametrize("schemes", fast_and_long(("light", "dark"), ("dark", "light")))

@@ -105,9 +105,9 @@ async def test_a_verdict_says_since_when_and_in_which_directions(plant, page):
     alert = {"level": "alert", "raised": "2026-01-02T10:00:00Z"}
     film = {"why_not": "no baseline", "x": None, "y": {"change_percent": 5.0}}
     for alarms, look, said in [
-        ([alarm | {"directions": "x"}], "danger", "film softer in x"),
-        ([alarm | {"directions": "xy"}], "danger", "film x softer, y stiffer"),
-        ([alarm | alert | {"directions": "y"}], "alert", "film stiffer in y"),
+        ([alarm | {"directions": "x"}], "danger", "film softer in x (cause: film)"),
+        ([alarm | {"directions": "xy"}], "danger", "film x softer, y stiffer (cause: film)"),
+        ([alarm | alert | {"directions": "y"}], "alert", "film stiffer in y (cause: film)"),
         ([alarm | {"directions": "x", "is_active": False}], "quiet", "Not watched"),
         (None, "quiet", "Not watched"),
     ]:

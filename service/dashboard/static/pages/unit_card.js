@@ -15,7 +15,7 @@ import { qualityOf, sourceState } from "../words.js";
 const HEADS = [
   ["Bearing", ""],
   ["Film stiffness", "GN/m"],
-  ["Change", "from expected"],
+  ["Change", "%"],
   ["Trend", ""],
   ["Eccentricity", ""],
   ["Oil", "°C"],
@@ -79,7 +79,7 @@ function bearingRow(unit, { bearing, name }) {
     draw(latest, itsFilm, alarms, history) {
       const whole = qualityOf(latest);
       stiffness.draw(asCompared(latest, itsFilm), whole.reason);
-      changes.forEach((node, n) => setText(node, changeOf(itsFilm["xy"[n]])));
+      changes.forEach((node, n) => setText(node, changeOf(itsFilm["xy"[n]]).replace(/ %$/, "")));
       trend.draw(history);
       for (const view of [eccentricity, oil]) view.draw(latest, whole.reason);
       film.draw(itsFilm, alarms);

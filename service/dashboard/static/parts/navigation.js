@@ -25,6 +25,7 @@ export function navigation(pages) {
     node,
     show(here) {
       for (const [page, link] of links) setAttribute(link, "aria-current", page === here ? "page" : null);
+      amplitude.hidden = here === pages[0]; // the overview shows none
     },
     close: () => unfold(false),
     draw() {
