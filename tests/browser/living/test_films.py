@@ -105,11 +105,16 @@ COUNT_WORDS = "document.querySelector('#main').innerText.split(/\\s+/).filter(Bo
 LOOKS = "marks => marks.map((mark) => mark.dataset.look)"
 
 
+def has_stiffness(overview: dict) -> bool:
+    bearings = overview["units"][0]["bearings"]
+    return all(one["readings"]["stiffness_xx_n_per_m"]["value"] for one in bearings)
+
+
 async def test_the_first_screen_says_which_bearing_is_unwell_by_how_much_since_when_and_why(
     plant, page, phone_page
 ):
     for shown in (page, phone_page):
-        overview = await freeze(shown, plant.url)
+        overview = await freeze(shown, plant.url, has_stiffness)
         other = copy.deepcopy(overview["units"][0]) | {"id": "U2", "name": "Unit 2"}
         film = other["bearings"][1]["film"]
         film |= {"x": film["x"] | UNWELL, "y": film["y"] | UNWELL}
