@@ -57,7 +57,7 @@ async def run_acquire(
     Parameters
     ----------
     units
-        Units whose devices are read; their monitors are not used.
+        Units whose devices are read, by unit id; their monitors are not used.
     listener, announce
         Listening socket of the health page, and the function that is called with its URL.
     """
@@ -117,9 +117,9 @@ async def run_analyse(
     Parameters
     ----------
     plant
-        Complete plant, with the units of all partitions.
+        Plant with the units of all partitions.
     monitors
-        Monitors of the units of the partition.
+        Monitors of the units of the partition, by unit id.
     listener, announce
         Listening socket of the health page, and the function that is called with its URL.
 
@@ -248,7 +248,7 @@ class Analysing:
         return max((progress.behind_s for progress in units.values()), default=0.0)
 
     def health(self) -> Health:
-        """Return the contents of the health page."""
+        """Return the present contents of the health page of this process."""
 
         def checks() -> dict[str, str | None]:
             consumer = self._consumer

@@ -25,9 +25,9 @@ class Health:
     Parameters
     ----------
     checks
-        Function that returns the fault of each required part by name; None for a working part.
+        Function that returns the fault of each required part, by name of the part; None without.
     shown
-        Function that returns status texts by name, such as link states; readiness ignores them.
+        Function that returns further status texts by name, which do not affect readiness.
     metrics
         Function that returns the metrics in the Prometheus text format.
     """
@@ -37,7 +37,7 @@ class Health:
     metrics: Callable[[], bytes]
 
     async def page(self, path: str) -> tuple[int, str, bytes]:
-        """Return status, content type and content of a page."""
+        """Return the HTTP status, content type and content of the page at a URL path."""
         if path == "/metrics":
             return 200, TEXT, self.metrics()
         if path == "/livez":
@@ -55,13 +55,13 @@ def _document(status: int, checks: Mapping[str, str]) -> tuple[int, str, bytes]:
 
 
 class HealthServer:
-    """HTTP server of the health page in separate threads; the event loop makes the pages."""
+    """HTTP server of the health page; it runs in threads and gets the pages from the event loop."""
 
     def __init__(self, health: Health, listener: socket.socket) -> None:
         self._health, self._listener = health, listener
 
     async def run(self, pulse: Pulse) -> None:
-        """Serve the page until cancelled: in threads, which ask the event loop for its content.
+        """Serve the page until cancelled; `pulse` gets heartbeats.
 
         Takes over the listening socket and closes it at the end; call it once.
         """
@@ -83,7 +83,7 @@ class HealthServer:
 
 
 def handler_of(page: Callable[[str], tuple[int, str, bytes]]) -> type[BaseHTTPRequestHandler]:
-    """Return the request handler of a server whose pages come from a function of the path."""
+    """Return a request handler; `page` maps a path to status, content type and content."""
 
     class Handler(BaseHTTPRequestHandler):
         timeout = ANSWERS_WITHIN_S

@@ -42,7 +42,7 @@ from service.store.waveforms import WaveformKind
 
 
 def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
-    """Return the capture recorder of the units of a live plant; a replay makes no captures."""
+    """Return the recorder of captures (samples around alarms); with a replay it records nothing."""
     found = plant.capture
     kept = origin is Origin.LIVE and found.samples == "kept"
     # a vector rack has no samples
@@ -73,7 +73,7 @@ def _window_s(plant: PlantFile, unit: UnitSettings) -> float:
 def tape_of(
     plant: PlantFile, origin: Origin, clock: Clock, press: Callable[[], DropReason | None]
 ) -> ContinuousRecorder:
-    """Return the continuous recorder of the selected units; `press` returns why it must pause."""
+    """Return the continuous recorder of a plant; `press` returns why it must pause, None if not."""
     found = plant.recording
     units = {
         unit.id: recorded_unit(unit)
@@ -97,7 +97,7 @@ def evidence_of(
     captures: Captures,
     clock: Clock,
 ) -> EvidenceCollector:
-    """Return the collector of alarm evidence; `watch` connects it to the alarms."""
+    """Return the collector of alarm evidence, which `watch` connects to the alarms."""
     limits, folders = plant.evidence, evidence_folders(plant)
     configuration = built_configuration(plant)
     maker = Maker(plant, configuration, f"padwatch {version('padwatch')}", origin)
@@ -110,14 +110,14 @@ def evidence_of(
 def watch(
     keeper: EvidenceCollector, alarms: AlarmEngine, captures: Captures, origin: Origin
 ) -> None:
-    """Connect the collector of evidence to the alarms; a replay collects no evidence."""
+    """Connect the collector of evidence to alarms and captures; a replay collects no evidence."""
     if origin is Origin.LIVE:
         alarms.set_observer(keeper.see)
         captures.set_listener(keeper.captured)
 
 
 def space_watch(plant: PlantFile, clock: Clock) -> SpaceWatch:
-    """Return the free-space monitor of all data folders; they may be on different disks."""
+    """Return the monitor of free disk space of all data folders, which may be on several disks."""
     data = Path(plant.service.data_folder)
     folders = {"data": data, CAPTURES: data / CAPTURES, EVIDENCE: data / EVIDENCE}
     if plant.recording.samples == "kept":
@@ -136,7 +136,7 @@ def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> RecordingIn
 
 
 def retention_rules(plant: PlantFile) -> RetentionRules:
-    """Return the folders of recordings and the rules of their retention."""
+    """Return the retention rules of the recordings of a plant: folders, limits of size and age."""
     data = Path(plant.service.data_folder)
     room = RoomLimits(
         continuous_bytes=round(plant.recording.max_gb * BYTES_PER_GB),

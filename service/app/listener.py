@@ -13,18 +13,18 @@ from service.store.access.tables import AccessStore
 
 
 class ClosedError(Exception):
-    """Error raised if the service would be reachable from other hosts without an account."""
+    """Error raised if other hosts could reach the service while no account exists."""
 
 
 def require_protected(plant: PlantFile, store: AccessStore) -> None:
-    """Check that a service that is reachable from other hosts has an account.
+    """Check that an account exists if other hosts can reach the service.
 
-    The plant file requires TLS of such a service. A Unix socket is reachable only by a proxy.
+    TLS is checked with the plant file. Only a reverse proxy can reach a Unix socket.
 
     Raises
     ------
     ClosedError
-        If the service would be reachable from other hosts without an account.
+        If other hosts can reach the service and no account exists.
     StoreError
         If accounts cannot be read.
     """
@@ -39,7 +39,7 @@ def require_protected(plant: PlantFile, store: AccessStore) -> None:
 
 @contextmanager
 def listener_of(plant: PlantFile, port: int) -> Iterator[socket.socket]:
-    """Open the listening socket of the server; to be called before other parts start.
+    """Open the listening socket of the server, before other parts of the process start.
 
     Parameters
     ----------
@@ -61,6 +61,6 @@ def listener_of(plant: PlantFile, port: int) -> Iterator[socket.socket]:
 
 
 def tls_of(plant: PlantFile) -> SSLContext | None:
-    """Return the server's TLS context, or None; raise `CertificateError` if it cannot be made."""
+    """Return the server's TLS context, None without TLS; raise `CertificateError` if unusable."""
     tls = plant.service.tls
     return None if tls is None else server_tls(Path(tls.certificate), Path(tls.key))

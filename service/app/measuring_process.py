@@ -71,10 +71,10 @@ class ProcessContext:
 
 @dataclass(frozen=True)
 class Analysis:
-    """Parts of the analysis; the caller passes blocks to `analyser` and runs `recorder`.
+    """Parts of the analysis and the background services of a process.
 
-    The other fields are the background services of the process. The caller runs their loops, those
-    of `own_loops` and `shared_loops`, and then calls `close`.
+    The caller passes blocks to `analyser`, runs `recorder` and the loops of `own_loops` and
+    `shared_loops`, and finally calls `close`.
     """
 
     process: ProcessContext
@@ -97,7 +97,7 @@ class Analysis:
 
     @property
     def own_loops(self) -> dict[str, Loop]:
-        """Loops that every process runs for its own units."""
+        """Loops that every process runs for its own units, by name."""
         loops: dict[str, Loop] = {
             "references": self.references.run,
             "alarms": self.alarms.run,
@@ -113,7 +113,7 @@ class Analysis:
 
     @property
     def shared_loops(self) -> dict[str, Loop]:
-        """Plant-wide loops, which only one process runs."""
+        """Loops for the whole plant, by name; only one process runs them."""
         loops: dict[str, Loop] = {"gather": self.rolling.run, "deliver": self._deliver}
         if self.process.origin is Origin.LIVE:
             loops["retain"] = self.retaining.run
@@ -148,13 +148,13 @@ async def analysis_on(
     Parameters
     ----------
     bus
-        Queue of blocks to the analysis.
+        Queue of the blocks that wait for the analysis.
     alarm_context
-        Context from which alarm messages take values; it is given access to the newest films.
+        Context from which alarm messages take values; this function adds the newest films to it.
     part
         Part of the plant for which this process is responsible.
     memories
-        Saved state of the units whose samples have no gap since it was saved.
+        Saved state by unit, only of units without missing samples since it was saved.
     stream
         Status of the stream; None if the blocks come directly from the sources.
 
@@ -260,7 +260,7 @@ def plant_snapshot(analysis: Analysis, sources: Mapping[str, TimedSource]) -> Pl
 
 
 def counts_of(source: TimedSource) -> SourceCounts:
-    """Return the counts of a data source."""
+    """Return the counts of polls and refused frames of a sample source."""
     found, refused = source.statistics, dict(source.refused_frames)
     if found is None:
         return SourceCounts(0, None, None, refused)
@@ -268,13 +268,13 @@ def counts_of(source: TimedSource) -> SourceCounts:
 
 
 def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> Mapping[str, Loop]:
-    """Return the loops that publish the state of units and carry out operators' commands.
+    """Return the loops that report the state of units and execute operators' commands, by name.
 
     Parameters
     ----------
     held
-        Function that returns the units of this process; also `PLANT` if it publishes alarms without
-        a unit, and `SHARED` if it runs the plant-wide tasks.
+        Function that returns the units of this process, also `PLANT` if it reports alarms without
+        a unit, `SHARED` if it runs the plant-wide tasks.
     """
     process, name = analysis.process, process_name()
     store, clock = process.store, process.clock

@@ -60,7 +60,7 @@ EVIDENCE = {
 
 
 def add_evidence(families: Families, evidence: "EvidenceCollector") -> None:
-    """Add the numbers of evidence bundles."""
+    """Add the numbers of stored and failed evidence bundles."""
     families.declare(EVIDENCE)
     families.add("evidence_written_total", evidence.n_written)
     families.add("evidence_failed_total", evidence.n_failed)

@@ -14,7 +14,7 @@ from service.store.outbox import Address, no_recipients
 
 
 def channels_of(settings: AnyReceiver, clock: Clock) -> list[Channel]:
-    """Return the channels of one receiver entry of the plant file, in the order of its names."""
+    """Return one channel per recipient of a receiver in the plant file, in the given order."""
     match settings:
         case WebhookSettings():
             return [Webhook(settings, clock)]
@@ -24,7 +24,7 @@ def channels_of(settings: AnyReceiver, clock: Clock) -> list[Channel]:
 
 
 def receivers_of(plant: PlantFile, origin: Origin, clock: Clock) -> list[Receiver]:
-    """Return all receivers, with one for each mail recipient; none for a replay."""
+    """Return all receivers of notifications, one per mail recipient; a replay has none."""
     if origin is not Origin.LIVE:
         return []
     return [
@@ -35,14 +35,14 @@ def receivers_of(plant: PlantFile, origin: Origin, clock: Clock) -> list[Receive
 
 
 def router_of(plant: PlantFile, origin: Origin, context: FindContext, clock: Clock) -> Address:
-    """Return the router of messages about stored events; in a replay it queues no messages."""
+    """Return the function that chooses the recipients of a stored event; a replay has none."""
     if origin is not Origin.LIVE or not plant.delivery.receiver:
         return no_recipients
     return Router(plant.delivery.receiver, composer_of(plant, context), clock.now_ns)
 
 
 def composer_of(plant: PlantFile, context: FindContext) -> Composer:
-    """Return the composer of the message texts of a plant."""
+    """Return the composer of the texts of the notifications of a plant."""
     service = plant.service
     host = f"[{service.host}]" if ":" in service.host else service.host
     scheme = "http" if service.tls is None else "https"

@@ -22,7 +22,7 @@ async def _no_job() -> None:
 
 
 class Supervision:
-    """Supervisor of loops, which notifies the watchdog while all are alive and logs dead loops.
+    """Supervisor of loops that notifies the watchdog while all loops run, and logs dead loops.
 
     The supervisor runs on the event loop, so that a blocked event loop stops the notifications.
     """
@@ -46,7 +46,7 @@ class Supervision:
         self._manager.notify(READY="1", STATUS=self._status())
 
     def announce(self, write: Callable[[str], None], url: str, token: str | None) -> None:
-        """Notify the service manager; write the URL, and the set-up token unless it is None."""
+        """Notify the service manager; `write` the URL and the set-up token, None if unused."""
         self.ready()
         write(url)
         if token is not None:
@@ -63,7 +63,7 @@ class Supervision:
             await self._clock.sleep(self._every_s)
 
     def look(self) -> None:
-        """Check the heartbeats of all loops once."""
+        """Check the heartbeats of all loops once; notify the watchdog, log loops that stopped."""
         troubles = self._beats.troubles
         words = [f"{name} {trouble}" for name, trouble in troubles.items()]
         if set(troubles) != self._logged:
@@ -94,9 +94,9 @@ class Supervision:
         Parameters
         ----------
         job
-            Coroutine function without a heartbeat of its own; it may end before the process.
+            Coroutine function of the main work, without heartbeats; it may end early.
         drain
-            Coroutine function that is called with the task of the job before all are cancelled.
+            Coroutine function that is called with the task of the job before the cancellation.
         ends
             Whether the process stops when the job has ended.
         """

@@ -24,7 +24,7 @@ from service.settings.units import UnitSettings
 
 
 def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> RecordingWriter:
-    """Return the writer of a unit's recording; the first block determines the type of samples.
+    """Return a writer of a recording of a unit; the first block determines the sample type.
 
     Raises
     ------
@@ -49,18 +49,18 @@ def recordings_by_unit(folders: Iterable[Path], plant: PlantFile) -> dict[str, P
         if unit not in known:
             raise ConfigError(f"{folder}: unknown unit {unit}; known units: {', '.join(known)}")
         if unit in found:
-            raise ConfigError(f"{folder} and {found[unit]} are both of unit {unit}; replay one")
+            raise ConfigError(f"{folder} and {found[unit]} are both of unit {unit}; give one only")
         found[unit] = folder
     return found
 
 
 def selection_of(recording: Recording, unit: UnitSettings) -> Selection:
-    """Return the selection of a unit's channels in a recording.
+    """Return the selection of the channels of a recording that a unit of the plant file has.
 
     Raises
     ------
     ConfigError
-        If a channel is missing, or its rate or unit differs from the plant file.
+        If a channel is missing, or its rate or measuring unit differs from the plant file.
     """
     slow_units = {channel.id: channel.unit for channel in unit.slow_channel}
     machine = replace(machine_of(unit), rate_hz=unit.sampling_hz)
@@ -70,12 +70,12 @@ def selection_of(recording: Recording, unit: UnitSettings) -> Selection:
 def replay_source(
     folder: Path, unit: UnitSettings, clock: Clock, speed: float | None
 ) -> SampleSource:
-    """Return a source that replays a recording, with the calibration of the unit.
+    """Return a source that replays a recording, with the calibration of the plant file.
 
     Parameters
     ----------
     speed
-        Seconds of the recording per second; None for the maximum speed of the reader.
+        Seconds of the recording per second of replay; None for as fast as it is read.
 
     Raises
     ------
@@ -92,7 +92,7 @@ REPLAYS = "replays"
 
 
 def replayed_plant(plant: PlantFile, units: Iterable[str], folder: Path) -> PlantFile:
-    """Return the plant with only the given units, a data folder, SQLite, and a loopback host."""
+    """Return a copy of the plant for a replay of `units`: data in `folder`, SQLite, on loopback."""
     closed = {"host": "127.0.0.1", "socket": None, "tls": None}
     service = plant.service.model_copy(update={"data_folder": str(folder), **closed})
     chosen = tuple(unit for unit in plant.unit if unit.id in set(units))
@@ -101,7 +101,7 @@ def replayed_plant(plant: PlantFile, units: Iterable[str], folder: Path) -> Plan
 
 
 def replay_folder(plant: PlantFile, recordings: Iterable[Path], now_ns: int) -> Path:
-    """Return the results folder of one replay, named after its recordings and the time."""
+    """Return the folder for the results of a replay, named after its recordings and the time."""
     moment = datetime.fromtimestamp(now_ns // NS_PER_S, UTC).strftime("%Y%m%dT%H%M%SZ")
     name = "+".join(path.resolve().name for path in recordings)[:80]
     return Path(plant.service.data_folder) / REPLAYS / f"{name}-{moment}"
@@ -133,7 +133,7 @@ class PlayedOut:
         Raises
         ------
         LinkError, ConfigError
-            As the wrapped source, until the end of the recording.
+            If the wrapped source raises it before the end of the recording.
         """
         async with AsyncExitStack() as stack:
             try:

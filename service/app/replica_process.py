@@ -27,7 +27,7 @@ from service.store.store import Store
 
 
 class Replica:
-    """State of a plant from the reports of other processes in the database."""
+    """State of a plant, read from the reports of other processes in the database."""
 
     def __init__(self, plant: PlantFile, store: Store, clock: Clock) -> None:
         self._plant, self._store, self._clock = plant, store, clock
@@ -37,7 +37,7 @@ class Replica:
         self.deliveries = ReplicaDeliveries(receivers_of(plant, Origin.LIVE, clock), store.outbox)
 
     async def start(self) -> None:
-        """Read the current state; to be called before the first request.
+        """Read the present state of the plant; call it before the first request.
 
         Raises
         ------
@@ -48,7 +48,7 @@ class Replica:
         await self.references.look()
 
     def checks(self) -> dict[str, str]:
-        """Return the status of each unit's analysis in words, by name of the check."""
+        """Return the status of the analysis of each unit as text, by name of the check."""
         return {f"analysis of {unit.id}": self._words_of(unit.id) for unit in self._plant.unit}
 
     def _words_of(self, unit: str) -> str:
@@ -90,7 +90,7 @@ async def run_serve(
     Parameters
     ----------
     listener, announce
-        As in `run_service`.
+        Listening socket, and the function called with the URL when requests are served.
 
     Raises
     ------

@@ -54,9 +54,9 @@ class ServiceRun:
     is_demo
         Whether local clients have the admin role without a login.
     child
-        Serving process that has been started already, or None.
+        Serving process that was started before; with None one is started.
     at_end
-        Called with the newest results when all sources have ended; or None.
+        Function called with the newest results when all sources have ended; None for no call.
     """
 
     plant: PlantFile
@@ -75,7 +75,7 @@ async def run_service(
     announce: Callable[[str], None],
     manager: ServiceManager = NO_MANAGER,
 ) -> None:
-    """Run the service until SIGINT or SIGTERM, or with `ends` until all sources have ended.
+    """Run the service until SIGINT or SIGTERM, or as configured until all sources have ended.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ Release = Mapping[str, str]
 
 
 def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[AuditAction]:
-    """Return the audit entries of a start, preceded by one for a changed configuration.
+    """Return the audit entries of a start: first, if it has changed, the configuration.
 
     Parameters
     ----------
@@ -66,17 +66,17 @@ class ServiceTrail:
         self._audit, self._clock = audit, clock
 
     async def begin(self) -> None:
-        """Record the start, and the configuration if it has changed."""
+        """Record the start of the service, and the configuration if it has changed."""
         await self._attempt(self._record_start)
 
     async def end(self) -> None:
-        """Record the stop."""
+        """Record the stop of the service."""
         now_ns = self._clock.now_ns()
         deed = AuditAction(now_ns, PADWATCH, STOPPED, SERVICE, before=self._release)
         await self._attempt(self._audit.record, [deed])
 
     async def watch_clock(self, pulse: Pulse = UNHEARD) -> None:
-        """Record steps of the host's clock that exceed `CLOCK_STEP_S`, until cancelled."""
+        """Record steps of the host clock of over `CLOCK_STEP_S` seconds, until cancelled."""
         seen = Arrival.now(self._clock)
         while True:
             pulse.beat(LOOK_S)

@@ -25,7 +25,7 @@ def health_of(
     soundness: IntegrityMonitor,
     stream: StreamStatus | None = None,
 ) -> HealthProbe:
-    """Return a function that returns the current health of the service."""
+    """Return a function without arguments that returns the present health of the service."""
     names = list(units)
 
     def look() -> ServiceHealth:
@@ -55,7 +55,7 @@ def health_of(
 
 
 def recording_error(tape: ContinuousRecorder, recordings: RecordingIndexer) -> str | None:
-    """Return the error of the continuous recorder or the recording indexer; None without one."""
+    """Return the error of the continuous recorder, else of the recording indexer; None without."""
     return tape.trouble or recordings.lasting_trouble
 
 
@@ -70,7 +70,7 @@ CAUGHT_UP = 1.0 / 3.0
 
 
 class Pressure:
-    """Backpressure on recording by the queue of the analysis and the free disk space.
+    """Control that pauses recording while the analysis is behind or the disk is nearly full.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ async def serve_requests(
     Parameters
     ----------
     loops
-        Background loops of the process, which run while it serves.
+        Background loops of the process by name, which run while it serves.
     on_ready
         Coroutine function that is called with URL and set-up token (None if an account exists)
         when requests are accepted.
@@ -108,7 +108,7 @@ def context_of(
     desk: Authenticator,
     clock: Clock,
 ) -> Context:
-    """Return the API context that every serving process has."""
+    """Return the context of the API, with the parts that are the same in every serving process."""
     return Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},
@@ -128,7 +128,7 @@ def context_of(
 
 
 def references_of(plant: PlantFile, store: Store, clock: Clock) -> ReferencesInForce:
-    """Return the gap references in force of a process without monitors."""
+    """Return the reader of the gap references that apply, for a process without monitors."""
     return ReferencesInForce(map(machine_of, plant.unit), store, clock)
 
 
@@ -145,7 +145,7 @@ ACCESS_EVERY_S = 10.0
 
 
 def access_reports(access: AccessStore, exchange: ServingEnd, clock: Clock) -> Loop:
-    """Return a loop that reports faults of the database of accounts, which raise an alarm."""
+    """Return a loop that reports faults of the accounts to the measuring process, for its alarm."""
 
     async def report(pulse: Pulse) -> None:
         while True:
@@ -165,7 +165,7 @@ async def serve_beside(
     listener: socket.socket,
     clock: Clock,
 ) -> None:
-    """Serve until the measuring process ends or sends SIGTERM."""
+    """Serve requests until the measuring process, at `reader` and `writer`, ends or stops this."""
     plant, stopped = start.plant, stop_on_signals()
     with (
         closing(open_store_to_serve(plant, start.origin)) as store,

@@ -112,7 +112,7 @@ def _read_lines(loop: asyncio.AbstractEventLoop, put: Callable[[str], None]) -> 
 
 
 def execute_command(servers: Mapping[str, DaqServer], line: str) -> dict[str, str]:
-    """Inject faults into the device of a unit by a command ``UNIT FAULT [COUNT]``.
+    """Inject faults into the simulated device of a unit by a command ``UNIT FAULT [COUNT]``.
 
     Returns
     -------
@@ -165,7 +165,7 @@ def _rack(
 ) -> VectorDevice:
     """Return a rack that computes vectors from the samples of a feed at each poll."""
     if unit.speed_channel is None:
-        raise LookupError(f"a simulated rack of unit {unit.id} requires speed_channel")
+        raise LookupError(f"unit {unit.id}: a simulated rack requires speed_channel; set it")
     calibration = calibration_of(unit)
     step_samples = max(1, round(min(source.poll_period_s, 1.0) * calibration.rate_hz))
     return VectorDevice(
@@ -189,9 +189,9 @@ def modbus_server(
     Parameters
     ----------
     clock
-        As in `daq_of`.
+        Clock that paces the device; None to produce samples as fast as they are read.
     patient
-        Whether the clock of the device starts with the first request.
+        Whether the device starts to produce samples at the first request.
     """
     device.on_demand = clock is None
     if source.host is not None:
@@ -248,7 +248,7 @@ STALE_AFTER_S = 5.0
 
 
 class Wire(StrEnum):
-    """Protocol and transport of a simulated DAQ."""
+    """Protocol and transport over which a simulated DAQ is read."""
 
     MODBUS_TCP = "modbus_tcp"
     MODBUS_RTU = "modbus_rtu"
@@ -257,7 +257,7 @@ class Wire(StrEnum):
 
 
 def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
-    """Return the plant with a source of kind `wire` for each unit; addresses are set later."""
+    """Return a copy of the plant with a source of kind `wire` for each unit, without addresses."""
     units = tuple(
         # the recording of a polled source has the rate of its polls
         unit.model_copy(update={"source": _source(wire), "rate_hz": unit.sampling_hz})

@@ -33,7 +33,7 @@ def access_path(plant: PlantFile) -> Path:
 
 
 def has_store(plant: PlantFile) -> bool:
-    """Return whether the database exists; always True for PostgreSQL."""
+    """Return whether the plant's database exists; always True for PostgreSQL."""
     return plant.store.postgresql is not None or database_path(plant).exists()
 
 
@@ -56,7 +56,7 @@ def access_name(plant: PlantFile) -> str:
 
 
 def head_file(plant: PlantFile) -> Path:
-    """Return the path of the local file that identifies the newest audit entry."""
+    """Return the path of the head file, a local file with the newest entry of the audit trail."""
     if plant.store.postgresql is not None:
         return head_path(Path(plant.service.data_folder) / "postgresql")
     return head_path(database_path(plant))
@@ -70,12 +70,12 @@ def open_store(
     Parameters
     ----------
     address
-        Function that returns the recipients of an alarm event.
+        Function that returns the recipients of the notification of an alarm event.
 
     Raises
     ------
     StoreError
-        If the database cannot be used, or contains results of the other origin.
+        If the database cannot be used, or contains results of another origin (live, replay).
     """
     if plant.store.postgresql is None:
         return SqliteStore(database_path(plant), origin, address, plant.spectra)
@@ -86,9 +86,9 @@ def open_store(
 
 
 def open_store_to_serve(plant: PlantFile, origin: Origin = Origin.LIVE) -> Store:
-    """Open the plant's database for a process that only serves.
+    """Open the plant's database for a process that only serves requests.
 
-    A SQLite file is opened read-only. With PostgreSQL, operators' commands are written.
+    A SQLite file is opened read-only; with PostgreSQL operators' commands can be written.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def open_access(plant: PlantFile, origin: Origin = Origin.LIVE) -> AccessStore:
 
 
 def open_trails(plant: PlantFile) -> list[Trail]:
-    """Open the chains of the plant's audit trail for reading."""
+    """Open the plant's audit trail, one chain of entries per database, for reading."""
     if plant.store.postgresql is None:
         return [file_trail(database_path(plant)), file_trail(access_path(plant))]
     from service.store.postgres.store import server_trail
@@ -150,5 +150,5 @@ def evidence_folders(plant: PlantFile) -> EvidenceFolders:
 
 
 def built_configuration(plant: PlantFile) -> Configuration:
-    """Return the effective configuration of the plant in this build, without secrets."""
+    """Return the plant file with all defaults and the program version, without secrets."""
     return configuration_of(plant, version("padwatch"), built_from())

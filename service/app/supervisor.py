@@ -57,12 +57,12 @@ class ServingChild:
         Listening socket of the HTTP server. It stays open while the child is started again, so
         that requests wait instead of being refused.
     report, answer
-        As in `MeasuringEnd`.
+        Functions that make the reports to the serving process and answer its questions.
     on_ready
         Function that is called with URL and set-up token (None if an account exists) when requests
         are served for the first time.
     child
-        Serving process that has been started already, or None.
+        Serving process that was started before; with None one is started.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class ServingChild:
         self.n_restarts = 0
 
     async def run(self, pulse: Pulse) -> None:
-        """Keep the serving process running until cancelled."""
+        """Keep the serving process running until cancelled; `pulse` gets heartbeats."""
         while True:
             pulse.rest()
             since_s = self._clock.monotonic_s()
@@ -96,7 +96,7 @@ class ServingChild:
                 await self._clock.sleep(PAUSE_S)
 
     async def stop(self) -> None:
-        """Let the serving process finish its requests; kill it after `STOPS_WITHIN_S`."""
+        """Let the serving process finish its requests; kill it after `STOPS_WITHIN_S` seconds."""
         self._is_stopping = True
         if self.process is None:
             return
@@ -138,7 +138,7 @@ def _end_of(process: subprocess.Popen[bytes]) -> int:
 
 
 def write_start(writer: asyncio.StreamWriter, start: Start) -> None:
-    """Write the version of this program and the start options of the serving process."""
+    """Write the version of padwatch and the start options of the serving process."""
     content = pickle.dumps(start, pickle.HIGHEST_PROTOCOL)
     writer.write(b"%s %d\n" % (version("padwatch").encode(), len(content)) + content)
 

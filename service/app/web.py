@@ -28,7 +28,7 @@ HSTS = ("Strict-Transport-Security", "max-age=31536000")
 
 
 def server_of(app: ASGIApp, plant: PlantFile, origin: Origin) -> HttpServer:
-    """Return the server of an application with the limits and host names of the plant file."""
+    """Return an HTTP server for `app` with the limits, host names and TLS of the plant file."""
     service, tls = plant.service, tls_of(plant)
     if service.socket is not None:
         app = TrustedProxy(app)
@@ -49,7 +49,7 @@ def _names(plant: PlantFile) -> list[str]:
 def access_desk(
     plant: PlantFile, store: AccessStore, clock: Clock, is_demo: bool = False
 ) -> Authenticator:
-    """Return the authenticator of requests; log an error if the accounts are an older copy.
+    """Return the authenticator of requests; log an error if the accounts are of another copy.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def access_desk(
         Whether local clients have the admin role without a login.
     """
     if (difference := store.accept(clock.now_ns())) is not None:
-        log.error("the accounts are not those of the last run", reason=difference)
+        log.error("the database of accounts is not that of the last run", reason=difference)
     service, access = plant.service, plant.access
     local_role: Role | None = Role.ADMIN if is_demo else Role.VIEWER
     if access.login or service.socket is not None or not is_loopback(service.host):

@@ -54,19 +54,19 @@ GROUPS = {
     "Maintain": {
         "backup": (
             "store.backup",
-            "Copy both databases, also while padwatch runs; verify the copies, remove the"
-            " oldest ones.",
+            "Copy the databases of results and accounts, also while padwatch runs; verify the"
+            " copies.",
         ),
         "restore": (
             "store.restore",
-            "Replace the databases by copies, while padwatch is stopped; the old ones are"
-            " kept beside.",
+            "Replace the databases by copies while padwatch is stopped; the old databases"
+            " are kept.",
         ),
         "store": ("store.store_app", "The databases: integrity check."),
         "audit": ("audit.app", "Verify and export the audit trail."),
         "validate": (
             "validate.validate",
-            "Recompute the published tables and print them beside padwatch's figures.",
+            "Recompute the tables of the paper and print the published beside the computed figures.",
         ),
     },
     "Run as several processes": {

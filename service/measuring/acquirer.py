@@ -22,7 +22,7 @@ from service.runtime.polls import TimedSource
 
 @dataclass(frozen=True)
 class LinkNews:
-    """Link state of a unit, reported at each change and at each failed attempt to connect.
+    """Link state of a unit, reported after a change and after a failed attempt to connect.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Bus:
 
     @property
     def depth(self) -> int:
-        """Number of waiting blocks."""
+        """Number of blocks that wait for the analysis."""
         return self._queue.qsize()
 
     @property
@@ -93,7 +93,7 @@ class Bus:
 
 
 class ConnectGate:
-    """Rate limiter of connection attempts over all links; ``per_s`` is the rate per second."""
+    """Rate limiter of connection attempts to all devices, ``per_s`` attempts per second."""
 
     def __init__(self, per_s: float, clock: Clock) -> None:
         self._interval_s = 1.0 / per_s
@@ -101,7 +101,7 @@ class ConnectGate:
         self._next_s = clock.monotonic_s()
 
     async def turn(self) -> None:
-        """Wait until an attempt is allowed; callers are served in order."""
+        """Wait until a connection attempt is allowed; callers are served in order."""
         now_s = self._clock.monotonic_s()
         turn_s = max(self._next_s, now_s)
         self._next_s = turn_s + self._interval_s
@@ -152,7 +152,7 @@ class Acquirer:
         self._beats = beats or Heartbeats(clock)
 
     async def run(self) -> None:
-        """Read until all sources have ended; an unexpected exception in one task ends all."""
+        """Read until all sources have ended; an unexpected exception in one task ends all tasks."""
         units = self._units.items()
         loops = {f"acquire {unit}": partial(self._acquire, unit, its) for unit, its in units}
         async with asyncio.TaskGroup() as sources:

@@ -54,12 +54,12 @@ Listener = Callable[[SampleBlock, Sequence[AlarmNews]], None]
 
 
 class AlarmEngine:
-    """Engine that updates all alarms; it runs on the event loop without blocking it.
+    """Engine that updates, stores and announces all alarms of a process, on the event loop.
 
     Parameters
     ----------
     units
-        Alarms of each unit.
+        Alarms of each unit, by unit id.
     put
         Function that queues findings for the store.
     listener
@@ -69,7 +69,7 @@ class AlarmEngine:
     chatter
         Rule that classifies alarms as chattering.
     stream
-        Alarms about refused messages, if blocks come over a stream.
+        Alarms about refused stream messages; None if blocks do not come over a stream.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class AlarmEngine:
         """Revision number, increased whenever alarms may have changed."""
 
     def set_observer(self, observer: Callable[[Sequence[AlarmNews]], None]) -> None:
-        """Set the function that receives every non-empty list of changes of alarms."""
+        """Set the function that receives the changes of alarms, in non-empty lists."""
         self._observer = observer
 
     def restore(
@@ -102,7 +102,7 @@ class AlarmEngine:
         alarms: Iterable[Alarm],
         memories: Mapping[str, AlarmMemory] = MappingProxyType({}),
     ) -> None:
-        """Restore stored alarms; called before the first block.
+        """Restore stored alarms; call it before the first block.
 
         Parameters
         ----------
@@ -122,13 +122,13 @@ class AlarmEngine:
         self._publish(self._service.restore(others, now_ns))
 
     def add_alarms(self, board: ReportedAlarms, stored: Iterable[Alarm]) -> None:
-        """Add alarms taken over from another process, with their stored state."""
+        """Add a board of alarms taken over from another process; `stored` has their state."""
         self._reported.append(board)
         self._publish(board.restore(stored, self._clock.now_ns()))
         self.revision += 1
 
     def remove_alarms(self, board: ReportedAlarms) -> None:
-        """Remove alarms that another process takes over."""
+        """Remove a board of alarms that another process takes over."""
         self._reported.remove(board)
         self.revision += 1
 
@@ -138,11 +138,11 @@ class AlarmEngine:
             report_refused(self._stream, unit, reason)
 
     def is_connected(self, unit: str) -> bool:
-        """Return whether samples of a unit arrive, as last reported."""
+        """Return whether samples of a unit arrive, by the newest report on its link."""
         return self._units[unit].is_connected
 
     def memory(self, unit: str) -> AlarmMemory:
-        """Return the state of a unit's alarms, for restoring in another process."""
+        """Return the state of a unit's alarms, with which another process restores them."""
         return self._units[unit].memory
 
     def recall(self, events: Iterable[AlarmEvent]) -> None:
@@ -161,7 +161,7 @@ class AlarmEngine:
         Parameters
         ----------
         films
-            Judged conditions of the film alarms, by alarm id.
+            Judgements for the film alarms, by alarm id and direction.
         """
         own = self._units[block.unit]
         if assessments or films:
@@ -179,7 +179,7 @@ class AlarmEngine:
         self._publish(self._units[unit].link(is_connected, reason, self._host_ns()))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Call `tick` periodically until cancelled."""
+        """Update the alarms that depend on time periodically, until cancelled."""
         while True:
             pulse.beat(TICK_S)
             await self._clock.sleep(TICK_S)
@@ -211,7 +211,7 @@ class AlarmEngine:
         return self._board_of(id_).alarm(id_)
 
     def is_chattering(self, alarm: Alarm) -> bool:
-        """Return whether an alarm is chattering now, by `chatter_rule`."""
+        """Return whether an alarm is chattering now, that is, changes too often."""
         return self._chatter.is_chattering(alarm.identity.id, self._clock.now_ns())
 
     def set_reference(self, reference: VectorReference) -> None:
@@ -221,7 +221,7 @@ class AlarmEngine:
 
     @property
     def alarms(self) -> list[Alarm]:
-        """All alarms, in any state."""
+        """All alarms of this process, active or not."""
         return [alarm for board in self._boards for alarm in board.alarms]
 
     def is_judged(self, alarm: Alarm) -> bool:
@@ -285,9 +285,9 @@ class PlantPart:
     Parameters
     ----------
     own
-        Units of this process; empty if it is the only process.
+        Ids of the units of this process; empty if it is the only process.
     elsewhere
-        Units of other processes.
+        Ids of the units of other processes.
     leads
         Whether this process raises the alarms about the service and closes alarms of units that
         are no longer in the plant file; exactly one process leads.
@@ -298,7 +298,7 @@ class PlantPart:
     leads: bool = True
 
     def looks_after(self, unit: str) -> bool:
-        """Return whether this process is responsible for a unit, or for the pseudo-unit `plant`."""
+        """Return whether this process is responsible for a unit, or for `PLANT` (no unit)."""
         return unit in self.own or (self.leads and unit not in self.elsewhere)
 
 

@@ -70,7 +70,7 @@ ASSESSMENTS = Histogram(
 def timed(
     results: Iterator[Assessment], unit: str, now_s: Callable[[], float] = perf_counter
 ) -> Iterator[Assessment]:
-    """Yield the results of a unit, and observe the duration of each in `ASSESSMENTS`."""
+    """Yield the results of a unit; record the time that each takes in the metric `ASSESSMENTS`."""
     began_s = now_s()
     for result in results:
         ASSESSMENTS.labels(unit).observe(now_s() - began_s)
@@ -112,7 +112,7 @@ class Analyser:
             self._recorder.put(findings)
 
     async def analyse(self, block: SampleBlock, sampled_s: float) -> Findings:
-        """Analyse a block and return its findings; ``sampled_s`` is as in `take`."""
+        """Analyse a block, last sampled at the monotonic time ``sampled_s``; return findings."""
         monitor = self._monitors[block.unit]
         block = self._counts[block.unit].placed(block)
         found = []
@@ -137,8 +137,8 @@ class Analyser:
         Parameters
         ----------
         account
-            Stored account of the unit's samples, shown instead of the monitor's, which counts
-            replayed samples twice.
+            Stored sample counts, shown instead of those of the monitor, which counts replayed
+            samples twice.
         """
         monitor = self._monitors[block.unit]
         block = self._counts[block.unit].replayed(block)
@@ -148,11 +148,11 @@ class Analyser:
         self._live.set_received(block, account or monitor.account, sampled_s)
 
     def state(self, unit: str) -> MonitorState:
-        """Return the state of a unit's monitor without its newest samples."""
+        """Return the state of a unit's monitor, except the samples that it still needs."""
         return self._monitors[unit].state
 
     def memory(self, unit: str) -> UnitMemory:
-        """Return the analysis state of a unit, which another process restores by a replay."""
+        """Return the analysis state of a unit, from which another process continues."""
         return UnitMemory(
             self.state(unit),
             self._alarms.memory(unit),
@@ -179,7 +179,7 @@ class Analyser:
         self._alarms.link(news.unit, news.is_connected, news.reason)
 
     def is_connected(self, unit: str) -> bool:
-        """Return whether samples of a unit arrive, as last reported."""
+        """Return whether samples of a unit arrive, by the newest report on its link."""
         return self._alarms.is_connected(unit)
 
 
@@ -193,7 +193,7 @@ BUS_CAPACITY = 512
 
 
 class Runner:
-    """Acquisition, analysis and storage in one process; an exception in one task ends all."""
+    """Acquisition, analysis and storage in one process; an exception in one task ends all tasks."""
 
     def __init__(
         self,

@@ -27,7 +27,7 @@ SURE = 3.0
 
 
 class Learner:
-    """Learner of baselines and shaft responses; stateless and thread-safe."""
+    """Learner of baselines and shaft responses from stored readings; stateless and thread-safe."""
 
     def __init__(self, store: FilmStore, settings: FilmAlarmSettings) -> None:
         self._store, self._settings = store, settings
@@ -60,7 +60,7 @@ class Learner:
     def learn(
         self, place: FilmPlace, now_ns: int, author: str = PADWATCH, reason: str = ""
     ) -> BearingBaseline | None:
-        """Learn and store a baseline; accept it if acceptance is automatic and no check objects.
+        """Learn and store a baseline; accept it if that is automatic and all checks pass.
 
         Returns
         -------
@@ -86,7 +86,7 @@ class Learner:
         return baseline
 
     def learn_response(self, unit: str, rules: FilmRules, now_ns: int) -> ShaftResponse | None:
-        """Learn and store the response of a unit's shaft to its films.
+        """Learn and store how the shaft motion of a unit responds to film stiffness.
 
         Returns
         -------
@@ -156,10 +156,10 @@ def drifted(
     baseline: BearingBaseline,
     limit: Callable[[str], float],
 ) -> str | None:
-    """Describe a change during learning; None if below the limit or not significant.
+    """Describe a change of a quantity during learning, which may be a fault of the bearing.
 
-    A significant change may be a fault of the bearing. ``limit`` returns the limit of a quantity,
-    as a fraction of its value.
+    Return None if no change is significant and above ``limit``, a function from the name of a
+    quantity to its limit as a fraction. ``is_healthy`` (n,) marks the readings to use.
     """
     for quantity in baseline.quantities:
         found = learning_drift(history, is_healthy, quantity)
@@ -188,13 +188,13 @@ def _step(baseline: BearingBaseline, step: BaselineStep, reason: str) -> StoredS
 
 
 def healthy(film: FilmHistory) -> npt.NDArray[np.bool_]:
-    """Return a mask (n,) of the readings in a settled state without an alarm."""
+    """Return a mask (n,) of the readings in a settled operating state without an alarm."""
     is_healthy: npt.NDArray[np.bool_] = film.is_settled & ~np.any(film.level > 0, axis=0)
     return is_healthy
 
 
 def common_rows(found: Mapping[str, FilmHistory]) -> dict[str, npt.NDArray[np.bool_]]:
-    """Return, by bearing, a mask (n,) of the readings at times that all histories contain."""
+    """Return the mask (n,) of readings at times common to all histories, by bearing."""
     times = {bearing: film.history.time_ns for bearing, film in found.items()}
     common = reduce(partial(np.intersect1d, assume_unique=True), times.values())
     return {bearing: np.isin(time_ns, common) for bearing, time_ns in times.items()}

@@ -30,9 +30,9 @@ CATCH_UP_NS = 21 * DAY_NS
 def in_force(
     store: FilmStore, place: FilmPlace, rules: FilmRules
 ) -> tuple[BearingBaseline | None, tuple[Decision, ...]]:
-    """Return the baseline in force for a bearing, and the newest decisions based on it.
+    """Return the baseline in force for a bearing, and its newest decision for each quantity.
 
-    Returns None and an empty tuple if no baseline for the estimator of ``place`` is in force.
+    Return None and an empty tuple if no baseline for the estimator of ``place`` is in force.
     """
     version = versions_after(store.steps(place.unit, place.bearing)).in_force
     baseline = None if version is None else store.baseline(place.unit, place.bearing, version)
@@ -70,7 +70,7 @@ def resume_films(
     response: ShaftResponse | None,
     watch: FilmWatch,
 ) -> None:
-    """Restore the state of the film monitoring of a unit, ``watch``, from stored readings."""
+    """Restore the film monitor ``watch`` of a unit from stored readings, decisions and response."""
     places = [FilmPlace(unit, *item) for item in rules.estimators.items()]
     start_ns = _newest_ns(store, places[0]) - TAIL_NS
     found = {

@@ -35,7 +35,7 @@ WITHIN_S = 10.0
 
 
 class CommandExecutor:
-    """Executor of operators' commands; the answer `DONE` means that the result is on the disk."""
+    """Executor of operators' commands; it answers `DONE` when the result is on the disk."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class CommandExecutor:
         self._recorder, self._store, self._clock = recorder, store, clock
 
     async def execute(self, command: OperatorCommand, who: Acting) -> Answer:
-        """Carry out a command for `who`, and return its answer once the result is stored."""
+        """Execute a command of the actor `who`; return the answer once the result is stored."""
         try:
             with acting_as(who):
                 return await self._execute(command)
@@ -102,7 +102,7 @@ class CommandExecutor:
 
 
 class Questions:
-    """Answers to the questions of the serving process.
+    """Answerer of the questions of the serving process to the measuring process.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ MAX_LEARN_S = 900.0
 
 @dataclass(frozen=True)
 class WatchedFilms:
-    """Films of a unit: rules, state, and newest findings by bearing."""
+    """Films of a unit: rules, state, and newest reading with findings by bearing id."""
 
     rules: FilmRules
     watch: FilmWatch
@@ -44,7 +44,7 @@ class WatchedFilms:
 
 
 class FilmMonitor:
-    """Monitor of the films of all units.
+    """Monitor of the oil films of all units.
 
     Films are evaluated on the event loop; threads read the store and learn baselines.
 
@@ -87,11 +87,11 @@ class FilmMonitor:
             await asyncio.to_thread(resume_films, self._store, *how)
 
     def memory(self, unit: str) -> FilmMemory | None:
-        """Return the state of a unit's films, for restoring in another process."""
+        """Return the state of a unit's films for another process; None if not monitored."""
         return self._films[unit].watch.memory if unit in self._films else None
 
     def resume(self, unit: str, memory: FilmMemory | None) -> None:
-        """Restore the state of a unit's films from another process; called after `start`."""
+        """Restore a unit's films to a state of another process, if any; call it after `start`."""
         if memory is not None and unit in self._films:
             self._films[unit].watch.restore(memory)
 
@@ -100,7 +100,7 @@ class FilmMonitor:
         return self._films[unit].rules if unit in self._films else None
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
-        """Return the newest film reading and findings of a bearing; None before the first one."""
+        """Return the newest film reading of a bearing with findings; None before the first."""
         return self._films[unit].newest.get(bearing) if unit in self._films else None
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
@@ -111,11 +111,11 @@ class FilmMonitor:
     def take(
         self, unit: str, assessments: Sequence[Assessment]
     ) -> tuple[Sequence[Assessment], list[FilmNews]]:
-        """Add the operating condition to results, and evaluate the films if a reading is due.
+        """Add the operating condition to results; evaluate the films when a reading is due.
 
         Returns
         -------
-        The results with their conditions, and the newly judged film readings.
+        The results with their operating conditions, and the new film readings with findings.
         """
         films = self._films.get(unit)
         if films is None or not assessments:
@@ -126,7 +126,7 @@ class FilmMonitor:
         return seen, news
 
     def conditions(self, news: Sequence[FilmNews]) -> dict[str, dict[str, Judgement]]:
-        """Return the judgement of each direction after new readings, by film alarm id."""
+        """Return the judgements from new readings, by film alarm id and direction."""
         return {
             AlarmIdentity(each.reading.unit, each.reading.bearing, FILM_STIFFNESS).id: {
                 axis: alarm_condition(each.findings, axis) for axis in DIRECTIONS
@@ -135,7 +135,7 @@ class FilmMonitor:
         }
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Learn due baselines periodically until cancelled."""
+        """Learn due baselines periodically, until cancelled; `pulse` gets heartbeats."""
         period_s = min(3600.0, 86_400.0 * self.settings.learn_every_days / 4)
         while True:
             try:
@@ -167,7 +167,7 @@ class FilmMonitor:
     async def learn(self, place: FilmPlace, **why: str) -> BearingBaseline | None:
         """Learn a baseline of a bearing now; return None if there are too few readings.
 
-        ``why`` are the arguments ``author`` and ``reason`` of `Learner.learn`.
+        ``why`` are author and reason, stored with the baseline; by default padwatch, no reason.
         """
         now_ns = self._clock.now_ns()
         async with self._acting:
@@ -209,7 +209,7 @@ class FilmMonitor:
         return baseline_step(action, place, versions, entries, actor, reason, self._clock.now_ns())
 
     async def put_in_force(self, place: FilmPlace) -> None:
-        """Activate the baseline of a bearing that is in force according to the stored steps."""
+        """Use the baseline of a bearing that is in force by the steps stored in the database."""
         films = self._films[place.unit]
         held = films.watch.judge.baseline(place.bearing)
         found, decisions = await asyncio.to_thread(in_force, self._store, place, films.rules)

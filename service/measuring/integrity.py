@@ -27,14 +27,14 @@ class IntegrityMonitor:
     Parameters
     ----------
     live
-        View whose store error is set while the database file is missing or replaced.
+        Live view; its store error is set while the database file is missing or replaced.
 
     Attributes
     ----------
     stored
         Checks of the stored data, and their results.
     rolled_back
-        Description of how the database differs from that of the last run; None if it does not.
+        Description of how the database differs from that of the last run; None if it is the same.
     access_trouble
         Faults of the database of accounts that the serving process reported; None without faults.
     """
@@ -62,14 +62,14 @@ class IntegrityMonitor:
         return "; ".join(each for each in faults if each) or None
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Check the database periodically until cancelled."""
+        """Check the database periodically, until cancelled; `pulse` gets heartbeats."""
         while True:
             await self.look()
             pulse.beat(LOOK_EVERY_S)
             await self._clock.sleep(LOOK_EVERY_S)
 
     async def look(self) -> None:
-        """Check the database once."""
+        """Check the database file and stored rows once; log and audit new faults."""
         if not await self._has_file():
             return
         try:
@@ -89,7 +89,7 @@ class IntegrityMonitor:
             return False
         self._no_file = None
         if before is not None:
-            log.info("the database file is back")
+            log.info("the database file is in place again")
             if self._live.store_error == before:
                 self._live.store_error = None
         return True

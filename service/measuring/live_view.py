@@ -44,18 +44,18 @@ class LiveView:
         self.unstored_reason: str | None = None
 
     def note_stored(self, assessments: Iterable[Assessment], gaps: Iterable[UnitGap] = ()) -> None:
-        """Note the results and gaps of one transaction, which are now in the database."""
+        """Record that the results and gaps of one transaction are now in the database."""
         newest_ns = {gap.unit: 0 for gap in gaps} | {a.unit: a.time_ns for a in assessments}
         for unit, time_ns in newest_ns.items():
             before = self._stored[unit]
             self._stored[unit] = StoredResults(before.n_writes + 1, max(before.newest_ns, time_ns))
 
     def stored(self, unit: str) -> StoredResults:
-        """Return which results of a unit are in the database."""
+        """Return number of writes and newest result of a unit in the database."""
         return self._stored[unit]
 
     def note_unstored(self, n_findings: int, reason: str) -> None:
-        """Add to the number of findings lost because they could not be stored; keep the reason."""
+        """Count findings that were lost because they could not be stored; keep the reason."""
         self.n_unstored += n_findings
         self.unstored_reason = reason
 
@@ -74,7 +74,7 @@ class LiveView:
     def set_received(
         self, block: SampleBlock, account: SampleAccount, sampled_s: float | None = None
     ) -> None:
-        """Set a unit's newest block; ``sampled_s`` is the monotonic time of its samples, or now."""
+        """Set a unit's newest block, last sampled at the monotonic time ``sampled_s`` (now)."""
         if block.unit not in self._blocks:
             most = HELD_SAMPLES // max(block.counts.shape[0], 1)
             self._blocks[block.unit] = BlockHistory(min(round(HELD_S * block.rate_hz), most))
@@ -89,14 +89,14 @@ class LiveView:
         )
 
     def set_assessment(self, assessment: Assessment, sampled_s: float | None = None) -> None:
-        """Set a bearing's newest result; ``sampled_s`` is as in `set_received`."""
+        """Set a bearing's newest result, sampled at the monotonic time ``sampled_s`` (now)."""
         self._revisions[assessment.unit] += 1
         key = (assessment.unit, assessment.bearing)
         since_s = self._clock.monotonic_s() if sampled_s is None else sampled_s
         self._assessments[key] = (since_s, assessment)
 
     def revision(self, unit: str) -> int:
-        """Return a counter that increases with every change of a unit's link and every result."""
+        """Return a counter that increases with each result and change of the link of a unit."""
         return self._revisions[unit]
 
     def status(self, unit: str) -> UnitStatus:
@@ -104,7 +104,7 @@ class LiveView:
         return self._status[unit]
 
     def blocks(self, unit: str) -> list[SampleBlock]:
-        """Return the held blocks of a unit, oldest first; they may be out of date."""
+        """Return the newest blocks of a unit, oldest first; they may be out of date."""
         return list(self._blocks.get(unit, ()))
 
     def data_age_s(self, unit: str) -> float | None:

@@ -43,7 +43,7 @@ def add_samples(
     sources: Mapping[str, TimedSource],
     now_ns: int,
 ) -> None:
-    """Add the sample accounts (offered = received + missing + rejected) and polls of units."""
+    """Add sample counts (offered = received + missing + rejected) and poll durations by unit."""
     families.declare(SAMPLES)
     for unit in units:
         status = live.status(unit)
@@ -70,7 +70,7 @@ def add_samples(
 
 
 def bounded(rejected: Mapping[str, int]) -> dict[str, int]:
-    """Return counts by reason; invalid labels, and those beyond `MAX_REASONS`, count as `OTHER`."""
+    """Return counts by reason; invalid reasons and those after `MAX_REASONS` are `OTHER`."""
     counts: dict[str, int] = {}
     for reason, n_samples in rejected.items():
         is_label = _WORD.fullmatch(reason) and len(counts) < MAX_REASONS
@@ -93,7 +93,7 @@ STORE = {
 
 
 def add_store(families: Families, bus: Bus, recorder: Recorder, live: LiveView) -> None:
-    """Add the registry `MEASURED`, the queue to the analysis, and the writes to the store."""
+    """Add the metrics of durations, of the queue to the analysis, and of writes to the store."""
     families.declare(STORE)
     families.include(MEASURED)
     families.add("queue_blocks", bus.depth)
@@ -115,7 +115,7 @@ INTEGRITY = {
 
 
 def add_integrity(families: Families, found: IntegrityMonitor) -> None:
-    """Add the results of the integrity checks."""
+    """Add the metrics of the integrity checks of stored data."""
     families.declare(INTEGRITY)
     families.add("store_damaged_rows", found.stored.n_damaged)
     families.add("store_rolled_back", found.rolled_back is not None)
@@ -130,7 +130,7 @@ DISKS = {
 
 
 def add_disks(families: Families, space: SpaceWatch) -> None:
-    """Add the space of the disks that the service writes to."""
+    """Add the metrics of the disks that the service writes to."""
     families.declare(DISKS)
     for disk in space.disks:
         days = disk.days_until_full

@@ -35,13 +35,13 @@ MAX_BYTES = 16_000_000
 
 
 class ParkedRows:
-    """File of refused rows with the reasons, one JSON object per line; only its owner may read."""
+    """File of the rows that the database refused, with reasons; JSON lines for its owner only."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def add(self, time_ns: int, refused: Iterable[tuple[object, str]]) -> None:
-        """Append refused rows, as pairs of row and reason, and sync the file to the disk.
+        """Append pairs of row and reason, refused at ``time_ns`` (ns since 1970 UTC); sync.
 
         Raises
         ------
@@ -88,7 +88,7 @@ T = TypeVar("T")
 
 
 class NotStoredError(Exception):
-    """Changes of alarms were not stored; the message states why."""
+    """Error raised if changes of alarms were not stored; the message states why."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Findings:
 
     @property
     def parts(self) -> Iterator["Findings"]:
-        """Findings of one row each that together equal these findings, in the order of storing."""
+        """These findings split into findings of one row each, in the order of storing."""
         yield from (Findings(alarms=[news]) for news in self.alarms)
         yield from (Findings([assessment]) for assessment in self.assessments)
         yield from (Findings(gaps=[gap]) for gap in self.gaps)
@@ -173,7 +173,7 @@ class Recorder:
 
     @property
     def n_waiting(self) -> int:
-        """Number of queued findings and changes of alarms."""
+        """Number of queued findings plus queued changes of alarms."""
         return len(self._waiting) + len(self._alarms)
 
     @property
@@ -238,7 +238,7 @@ class Recorder:
             )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Write queued findings until cancelled."""
+        """Write queued findings until cancelled; `pulse` gets heartbeats."""
         while True:
             pulse.rest()
             await self._news.wait()
@@ -253,9 +253,9 @@ class Recorder:
         if (self._waiting or self._alarms) and not await self._write():
             counts = {"n_findings": len(self._waiting), "n_alarm_news": len(self._alarms)}
             if self._finds_again:
-                log.warning("results were not stored; the next start repeats them", **counts)
+                log.warning("results are not stored; the next start repeats them", **counts)
             else:
-                log.error("results are lost", **counts)
+                log.error("results are lost: the process ends before they are stored", **counts)
 
     def _drop_oldest(self) -> None:
         """Drop the oldest findings above the capacity, except those being written."""

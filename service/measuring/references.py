@@ -25,7 +25,7 @@ Gaps = tuple[MicrometrePair, MicrometrePair | None]
 
 
 def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
-    """Return gaps (x, y) in µm that a user entered, checked against the probes of the bearing.
+    """Check gaps (x, y) in µm that a user entered against the probes of the bearing; return them.
 
     ``near`` are gaps of the probes on the positive axes, ``opposite`` those of opposite probes.
 
@@ -54,10 +54,10 @@ def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) 
     Raises
     ------
     ReferenceRefusedError
-        If there is no result, its time is more than ten minutes from now, or a gap has no value.
+        If there is no result, it is not of the last ten minutes, or a gap has no value.
     """
     if newest is None:
-        raise ReferenceRefusedError("no result is stored yet")
+        raise ReferenceRefusedError("no result is stored yet; wait for one or give the gaps")
     _check_age(newest.time_ns, now_ns)
     near = (_usable(newest, NEAR_GAPS[0]), _usable(newest, NEAR_GAPS[1]))
     x, y = (
@@ -112,7 +112,7 @@ NOT_STEADY = (Reason.NON_STATIONARY, Reason.SPEED_IMPLAUSIBLE, Reason.FEW_SEGMEN
 
 
 def measured_vectors(assessment: Assessment | None) -> VectorReference:
-    """Return the 1× vectors of a current result as a reference for its operating state.
+    """Return the 1× vectors of a result as the reference for the operating state of the result.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def measured_vectors(assessment: Assessment | None) -> VectorReference:
         If there is no result, an amplitude has no value, or the machine did not run steadily.
     """
     if assessment is None:
-        raise ReferenceRefusedError("the bearing has no current result")
+        raise ReferenceRefusedError("the bearing has no current result; check its samples")
     condition = assessment.condition
     return VectorReference(
         unit=assessment.unit,

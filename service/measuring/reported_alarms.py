@@ -11,7 +11,7 @@ from service.settings.alarm_kinds import ANALYSIS_GONE, MESSAGES_REFUSED, STREAM
 
 
 class ReportedAlarms(AlarmBoard):
-    """Alarms whose conditions are reported by other components and evaluated at the next tick."""
+    """Board of alarms with conditions that other components report, applied at the next update."""
 
     def __init__(self, watches: Iterable[Watch]) -> None:
         self._watches = {watch.id: watch for watch in watches}
@@ -25,12 +25,12 @@ class ReportedAlarms(AlarmBoard):
         self._once.discard(id_)
 
     def report_event(self, id_: str, condition: Judgement) -> None:
-        """Set the condition of an alarm for one tick."""
+        """Set the condition of an alarm for one update."""
         self.report(id_, condition)
         self._once.add(id_)
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Update the alarms from the reported conditions."""
+        """Update the alarms from the reported conditions at the host time ``host_ns``, ns."""
         for id_, condition in self._found.items():
             self.update(self._watches[id_], condition, host_ns)
         self._found |= dict.fromkeys(self._once, WITHIN)
@@ -39,14 +39,14 @@ class ReportedAlarms(AlarmBoard):
 
 
 def gone_alarms(units: Iterable[str]) -> ReportedAlarms:
-    """Return the alarms about missing analysis, one for each unit."""
+    """Return the alarms about units that no process analyses, one for each unit."""
     return ReportedAlarms(Watch(identity_of(unit), rule_of(0.0, 0.0), unit) for unit in units)
 
 
 def report_silence(
     alarms: ReportedAlarms, silent: Sequence[str], alive: Sequence[str], after_s: float
 ) -> None:
-    """Set the conditions of the alarms of ``silent`` and ``alive`` units.
+    """Raise the alarms about ``silent`` units and end those about ``alive`` units.
 
     A unit is silent if no process has analysed it for ``after_s`` seconds.
     """

@@ -34,8 +34,8 @@ class ServiceHealth:
     Parameters
     ----------
     readings
-        Readings by their names in the table of alarm kinds: a number to compare with limits, the
-        text of a fault, or None.
+        Readings by their names in the table of alarm kinds: a number to compare with limits, or
+        the text of a fault; None if unknown or without fault.
     store_error
         Reason why the store refused the newest write; None if it was accepted.
     store_behind_s
@@ -47,7 +47,7 @@ class ServiceHealth:
     accounts
         Sample account of each unit that has sent samples since the start.
     disk
-        Function that judges the space on the fullest disk; argument: the previous alarm level.
+        Function from the previous alarm level to the judgement of the fullest disk.
     """
 
     readings: Mapping[str, float | str | None] = field(default_factory=dict)
@@ -72,7 +72,7 @@ class StreamStatus:
     trouble
         Function that returns the reason why no blocks arrive; None if they arrive.
     behind_s
-        Function that returns the delay of the block analysed last, s.
+        Function that returns the delay of the newest analysed block, s.
     """
 
     trouble: Callable[[], str | None]
@@ -83,14 +83,14 @@ log = structlog.get_logger()
 
 
 class HostTime:
-    """Wall clock of the host, compared with its monotonic clock."""
+    """Wall clock of the host; detects that the clock was set by the monotonic clock."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._seen: tuple[int, float] | None = None
 
     def look(self) -> tuple[int, bool]:
-        """Return the time, ns UTC, and whether the clock was set since the last call."""
+        """Return the time, ns since 1970 UTC, and whether the clock was set since the last call."""
         now_ns, steady_s = self._clock.now_ns(), self._clock.monotonic_s()
         before, self._seen = self._seen, (now_ns, steady_s)
         if before is None:
@@ -126,7 +126,8 @@ class ServiceRules:
     loss
         Limit of the fraction of lost samples of a unit in ten minutes.
     at_once, steady, lasting
-        Rules without limits: no delays, delays of 5 s and 30 s, and an off-delay of ten minutes.
+        Rules without limits, with an on-delay and off-delay of 0 s and 0 s; 5 s and 30 s; 0 s and
+        ten minutes.
     """
 
     store_behind: LimitRule
@@ -171,7 +172,7 @@ class SampleLoss:
         self._seen: deque[tuple[int, int, int, int]] = deque()
 
     def share(self, account: SampleAccount, now_ns: int) -> float:
-        """Add the present state of the sample account and return the lost fraction, 0 to 1."""
+        """Add the present sample counts; return the fraction lost in ten minutes, 0 to 1."""
         offered = account.n_offered
         lost = account.n_gap + sum(account.rejected.values())
         if self._seen and offered < self._seen[-1][1]:
@@ -186,7 +187,7 @@ class SampleLoss:
         return (lost - lost_then + n_dropped) / max(n_new + n_dropped, 1)
 
     def is_complete(self, now_ns: int) -> bool:
-        """Return whether at least ten minutes less one update period were observed."""
+        """Return whether ten minutes, less one update period, have been observed."""
         return bool(self._seen) and now_ns - self._seen[0][0] >= LOSS_NS - LOOK_EVERY_NS
 
 
@@ -196,7 +197,7 @@ class ServiceAlarms(AlarmBoard):
     Parameters
     ----------
     units
-        Units with an alarm about lost samples.
+        Ids of the units with an alarm about lost samples.
     rules
         Rules of the alarms.
     look
@@ -250,7 +251,7 @@ class ServiceAlarms(AlarmBoard):
         return news
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Update the alarms from the health of the service."""
+        """Update the alarms from the health of the service at the host time ``host_ns``, ns."""
         if self._look is not None:
             health = self._look()
             for kind in self._judged:

@@ -45,9 +45,9 @@ def simulated_history(
     Parameters
     ----------
     now_ns
-        End of the readings, ns UTC, and start of the live samples of the same machine life.
+        End of the readings, ns since 1970 UTC, and start of the live samples of the same life.
     years
-        Length of the history before `now_ns`.
+        Length of the readings before `now_ns`.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def scenario_of(simulation: SimulationSettings) -> Scenario:
         If the unit has a machine life instead of constant films.
     """
     if simulation.speed_rpm is None or simulation.power_mw is None:
-        raise LookupError("a unit with life_seed has no constant scenario")
+        raise LookupError("a unit with life_seed has no constant scenario; remove life_seed")
     return Scenario(
         bearings={bearing.bearing: _bearing_scenario(bearing) for bearing in simulation.bearing},
         speed_rpm=simulation.speed_rpm,

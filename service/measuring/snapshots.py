@@ -44,7 +44,7 @@ class _Built:
 
 
 class SnapshotBuilder:
-    """Builder of the snapshots of units; a snapshot is built anew only after a change."""
+    """Builder of snapshots of units; it builds a snapshot again only after a change."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class SnapshotBuilder:
         self._owned: tuple[object, Mapping[str, list[Alarm]]] = (None, {})
 
     def report(self, unit: str) -> UnitReport:
-        """Return the present state of a unit, or of the alarms of `PLANT` or `SHARED`."""
+        """Return the present state of a unit, or the alarms of `PLANT` or `SHARED`."""
         built = self._newest(unit)
         return UnitReport(unit, self._link(unit), built.revision, built.snapshot)
 
@@ -122,7 +122,7 @@ class SnapshotBuilder:
 
 
 class SocketReports:
-    """Reports for the serving process on changes since the previous report.
+    """Builder of reports for the serving process, on the changes since the previous report.
 
     Parameters
     ----------

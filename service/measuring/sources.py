@@ -35,7 +35,7 @@ from service.settings.units import UnitSettings
 def modbus_source(
     source: ModbusSettings, unit: Unit, calibration: UnitCalibration, clock: Clock
 ) -> SampleSource:
-    """Return the sample source of a Modbus device; see `monitor_for` for the matching monitor."""
+    """Return the sample source of a Modbus device, of the kind in its settings."""
     ids = [channel.id for channel in unit.channels]
     match source:
         case ModbusPolledSettings():
@@ -110,12 +110,12 @@ def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> UnitMonitor:
 
 
 def live_units(plant: PlantFile, clock: Clock) -> dict[str, WatchedUnit]:
-    """Return the sources, with timed polls, and the monitors of all units of a plant, by unit."""
+    """Return the sources, with measured poll durations, and the monitors by unit id."""
     return watched_units(plant, lambda unit: TimedSource(partial(source_of, unit), clock))
 
 
 def vector_rows(plant: PlantFile) -> dict[str, list[str]]:
-    """Return, by unit, the channel of each row of the blocks, for devices that send vectors."""
+    """Return the channel of each row of a block by unit, for units whose devices send vectors."""
     return {
         unit.id: [row.channel for row in unit.source.rows]
         for unit in plant.unit
@@ -161,6 +161,6 @@ def _main_source(unit: UnitSettings, calibration: UnitCalibration, clock: Clock)
 
 
 def timed_sources(units: Mapping[str, WatchedUnit]) -> dict[str, TimedSource]:
-    """Return the sources that measure the durations of their polls, by unit."""
+    """Return the sources that measure the durations of their polls, by unit id."""
     sources = {unit: watched.source for unit, watched in units.items()}
     return {unit: each for unit, each in sources.items() if isinstance(each, TimedSource)}

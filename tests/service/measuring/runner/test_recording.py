@@ -110,8 +110,8 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
 @pytest.mark.parametrize(
     ("finds_again", "said"),
     [
-        (False, ("error", "results are lost")),
-        (True, ("warning", "results were not stored; the next start repeats them")),
+        (False, ("error", "results are lost: the process ends before they are stored")),
+        (True, ("warning", "results are not stored; the next start repeats them")),
     ],
 )
 async def test_only_results_that_nobody_finds_again_are_said_to_be_lost(plant, finds_again, said):
