@@ -66,7 +66,7 @@ GROUPS = {
         "audit": ("audit.app", "Verify and export the audit trail."),
         "validate": (
             "validate.validate",
-            "Recompute the tables of the paper and print the published beside the computed figures.",
+            "Recompute the tables of the paper; print published and computed figures.",
         ),
     },
     "Run as several processes": {

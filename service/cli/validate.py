@@ -29,7 +29,7 @@ def validate(
         bool, typer.Option("--json", help="Print the rows as a JSON array instead of tables.")
     ] = False,
 ) -> None:
-    """Recompute the tables of the paper and print the published beside the computed figures.
+    """Recompute the tables of the paper; print published and computed figures.
 
     Exit code 1 if a deviation exceeds its limit, or is larger than the rounding of the published
     figures explains.
