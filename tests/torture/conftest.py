@@ -23,11 +23,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--soak-minutes", type=float, default=20.0, help="of the whole torture's soak")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Note which tests plant a bug."""
-    summary.note_planted(items)
-
-
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Say what the whole torture has found, and write it down."""
     config = terminalreporter.config

@@ -21,7 +21,6 @@ from acquisition.recordings.summary import summary_of
 from acquisition.recordings.writer import RecordingWriter
 from service.store.access.tables import AccessStore
 from service.store.port import StoreError
-from service.store.seals import SealedTable
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.checking import Finding, findings
 from service.store.sqlite.store import open_access_file
@@ -128,18 +127,6 @@ def test_a_damaged_store_serves_no_wrong_value_and_tells_loss(whole, truth, tmp_
     print(dict(counted))
     assert counted["told"]
     assert counted["refused"]
-
-
-@pytest.mark.planted("seals that are not compared")
-@pytest.mark.long
-def test_a_store_without_seals_is_found_out(whole, truth, tmp_path, monkeypatch, torture):
-    monkeypatch.setattr(SealedTable, "is_whole", lambda *_: "1")
-    rng = np.random.default_rng(torture.seed)
-    for _ in range(300):
-        damaged(whole, tmp_path / "data", rng)
-        if outcome(tmp_path / "data", truth)[1]:
-            return
-    pytest.fail("nobody noticed that there are no seals")
 
 
 @pytest.fixture

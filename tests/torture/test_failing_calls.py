@@ -1,8 +1,8 @@
 """Any write or sync fails, once or for ever: transactions are whole or absent, the store lives."""
 
 import shutil
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, closing
+from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,6 @@ import pytest
 from harness.deeds import Build, Loss, deed, letters, loss
 from harness.enduring import DATABASE, GAVE_UP
 from harness.failing_calls import Case, FailingCalls, Outcome, failing_calls, n_calls
-from harness.summary import planted
 
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
@@ -31,20 +30,13 @@ N_CASES = 300
 pytestmark = pytest.mark.skipif(shutil.which("strace") is None, reason="needs strace")
 
 
-Begun = Callable[..., AbstractContextManager[FailingCalls]]
-
-
 @pytest.fixture(scope="module")
-def begun(tmp_path_factory: pytest.TempPathFactory, torture_seed: int, assessment: Build) -> Begun:
-    """Starts what processes are begun from, perhaps with a bug."""
+def calls(
+    tmp_path_factory: pytest.TempPathFactory, torture_seed: int, assessment: Build
+) -> Iterator[FailingCalls]:
+    """Processes that append the same transactions."""
     deeds = [deed(torture_seed, n, assessment) for n in range(N_DEEDS)]
-    return lambda *bugs: failing_calls(tmp_path_factory.mktemp("calls"), deeds, *bugs)
-
-
-@pytest.fixture(scope="module")
-def calls(begun: Begun) -> Iterator[FailingCalls]:
-    """Processes of the store as it is."""
-    with begun() as running:
+    with failing_calls(tmp_path_factory.mktemp("calls"), deeds) as running:
         yield running
 
 
@@ -142,32 +134,3 @@ def test_a_sync_that_fails_for_ever_acknowledges_nothing_more(calls, empty, asse
     assert 0 <= outcome.acknowledged < N_DEEDS - 1
     assert all("SQLITE_IOERR" in error for error in outcome.errors)
     assert wrong(empty.with_name("case"), outcome, torture.seed, assessment) is None
-
-
-@pytest.mark.parametrize(
-    ("bug", "what"),
-    [
-        planted(bug, what, mark=pytest.mark.long)
-        for bug, what in (("promises_anyway", "lost"), ("in_two_parts", "torn"))
-    ],
-)
-def test_planted_bugs_are_found(begun, empty, assessment, bug, what, torture):
-    """A program that promises what was refused, and one that writes in two transactions."""
-    with begun(bug) as calls:
-        provoke = {"lost": failing_for_ever, "torn": stopped_between}[what]
-        outcome = provoke(calls, empty)
-    found = wrong(empty.with_name("case"), outcome, torture.seed, assessment)
-
-    assert isinstance(found, Loss)
-    assert getattr(found, what)
-
-
-def stopped_between(calls: FailingCalls, base: Path) -> Outcome:
-    """Let syncs fail for ever from the second transaction of a deed on."""
-    for number in range(2, 40):
-        outcome = run_on_copy(calls, base, str(Case("fdatasync", "EIO", number, True)))
-        with closing(SqliteStore(base.with_name("case") / "data" / DATABASE)) as store:
-            n_gaps = len(store.gaps("U1", 0, 2**62))
-            if n_gaps > len(store.alarms()):
-                return outcome
-    pytest.fail("the second transaction could not be hit")

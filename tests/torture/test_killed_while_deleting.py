@@ -11,7 +11,6 @@ from harness.deeds import HOP_NS, T0_NS, value
 from harness.tape import environment, python
 from rigs.rolled_trends import gather_all
 
-from service.store import retention as deleting
 from service.store.port import Trend, TrendQuery
 from service.store.sqlite import SqliteStore
 
@@ -92,22 +91,3 @@ def require_same(found: Trend, before: Trend) -> None:
     assert list(ours.minimum) == list(theirs.minimum)
     assert list(ours.maximum) == list(theirs.maximum)
     assert list(ours.mean) == pytest.approx(list(theirs.mean), rel=1e-9)
-
-
-@pytest.mark.planted("mark of what is deleted in a transaction of its own")
-@pytest.mark.long
-def test_planted_bug_of_a_mark_in_its_own_transaction_is_found(old_file, tmp_path, monkeypatch):
-    """A kill between two transactions leaves readings deleted and nobody who knows of it."""
-    path = tmp_path / "old.sqlite3"
-    path.write_bytes(old_file)
-    with closing(SqliteStore(path)) as store:
-        before = by_the_hour(store)
-        monkeypatch.setattr(
-            deleting, "set_deleted", lambda *_: None
-        )  # killed before the second one
-        (series,) = store.retention.series()
-        store.retention.delete(series, {"readings_days": 0}, LATER_NS)
-        fine = TrendQuery("U1", "UJB", ("speed_rpm",), T0_NS, T0_NS + HOUR_NS, 5000, 1)
-
-        assert by_the_hour(store) == before  # by the hour nobody sees it
-        assert len(store.trend(fine).time_ns) == 0

@@ -9,12 +9,11 @@ from harness.ledger_daq import LedgerDaq
 from harness.ledger_plant import LedgerPlant
 from harness.recordings_ledger import Recorded, promised, recorded
 from harness.service_rig import ServiceRig, until
-from harness.summary import planted
 
 from service.recordings.folders import remove_incomplete
 from service.recordings.segment import join, unjoined
 
-N_CYCLES, N_FEW, N_PLANTED = 50, 2, 4
+N_CYCLES, N_FEW = 50, 2
 SYNC_S = 1.0
 RECORDING = f"""
 [recording]
@@ -63,26 +62,3 @@ def test_a_kill_costs_no_recorded_sample_and_every_hole_is_told(plant, daq, tmp_
     assert found.wrong == []
     assert found.n_samples > 0
     assert found.told["not_running"] > 0
-
-
-@pytest.mark.timeout(900)
-@pytest.mark.parametrize(
-    ("bug", "kind"),
-    [
-        planted(bug, kind, mark=pytest.mark.torture)
-        for bug, kind in (
-            ("promised_before_it_is_synced", "lost"),
-            ("parts_thrown_away_at_start", "lost"),
-            ("hole_of_the_outage_not_told", "not accounted for"),
-            ("part_joined_twice", "duplicated"),
-            ("sample_altered", "altered"),
-        )
-    ],
-)
-def test_a_bug_in_recording_is_found_out(plant, daq, tmp_path, bug, kind, torture):
-    plant_file = write_plant(plant, daq, tmp_path)
-    with ServiceRig(plant_file, "harness.planted", environment={"PLANTED": bug}) as rig:
-        root = tmp_path / "data" / "recordings"
-        found = killed(plant, daq, rig, root, N_PLANTED, torture.seed)
-
-    assert any(words.startswith(kind) for words in found.wrong), found.wrong

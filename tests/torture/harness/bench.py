@@ -195,8 +195,8 @@ class BadLinkBench(Bench):
         self.links = links
         self._wall_clock = folder / "wall-clock"
         self._wall_clock.write_text(f"{wrong_s}", encoding="ascii")
-        clock = {"PLANTED": "wrong_wall_clock", "WALL_CLOCK": str(self._wall_clock)}
-        how = {"program": "harness.planted", "environment": {**clock, "TZ": time_zone}}
+        environment = {"WALL_CLOCK": str(self._wall_clock), "TZ": time_zone}
+        how = {"program": "harness.wrong_clock", "environment": environment}
         super().__init__(plant, daq, folder, ports=links.ports, **how, **more)
 
     def step(self, wrong_s: float) -> None:

@@ -1,6 +1,6 @@
 """A program that appends transactions, and goes on when the disk fails.
 
-``python -m harness.enduring DEEDS FOLDER [BUG]`` appends the transactions that are pickled in the
+``python -m harness.enduring DEEDS FOLDER`` appends the transactions that are pickled in the
 file DEEDS to a store in FOLDER. One that fails is tried again, as the service does. The numbers of
 those that are durable go into the file ``acks``, what failed into ``errors``. The exit code is 0 if
 all are durable, 3 if it gave up. With ``-`` as FOLDER there is one process for each folder on the
@@ -32,36 +32,29 @@ def main() -> None:
     """Append them, here or in one process after the other."""
     with Path(sys.argv[1]).open("rb") as file:
         deeds: list[AuditAction] = pickle.load(file)  # noqa: S301  our own
-    folder, *bugs = sys.argv[2:]
+    folder = sys.argv[2]
     if folder != "-":
-        sys.exit(_endure(Path(folder), deeds, bugs))
+        sys.exit(_endure(Path(folder), deeds))
     for line in sys.stdin:
         sys.stdout.flush()
         pid = os.fork()
         if pid == 0:
             os.kill(os.getpid(), signal.SIGSTOP)
-            os._exit(_endure(Path(line.strip()), deeds, bugs))
+            os._exit(_endure(Path(line.strip()), deeds))
         print(pid, flush=True)
         _, status = os.waitpid(pid, 0)
         print("END", os.waitstatus_to_exitcode(status), flush=True)
 
 
-def _endure(folder: Path, deeds: Sequence[AuditAction], bugs: Sequence[str]) -> int:
+def _endure(folder: Path, deeds: Sequence[AuditAction]) -> int:
     acks = os.open(folder / "acks", os.O_WRONLY | os.O_CREAT)
     errors = os.open(folder / "errors", os.O_WRONLY | os.O_CREAT)
     path = folder / "data" / DATABASE
     store = _tried(lambda: SqliteStore(path, address=letters), errors)
     if store is None:
         return GAVE_UP
-    if "synchronous_normal" in bugs:
-        store._writer.execute("PRAGMA synchronous = NORMAL")
     for number, deed in enumerate(deeds):
-        if "acknowledged_before_commit" in bugs:
-            os.write(acks, f"{number}\n".encode())
-        if (
-            not _tried(partial(_append, store, deed, bugs), errors)
-            and "promises_anyway" not in bugs
-        ):
+        if not _tried(partial(_append, store, deed), errors):
             return GAVE_UP
         os.write(acks, f"{number}\n".encode())
     with suppress(StoreError):
@@ -79,10 +72,7 @@ def _tried(do: Callable[[], T], errors: int) -> T | None:
     return None
 
 
-def _append(store: SqliteStore, deed: AuditAction, bugs: Sequence[str]) -> bool:
-    if "in_two_parts" in bugs or "two_transactions" in bugs:
-        store.append([deed.assessment], [deed.gap])
-        store.append([], [], [deed.alarm], [deed.film])
+def _append(store: SqliteStore, deed: AuditAction) -> bool:
     deed.append_to(store)
     return True
 

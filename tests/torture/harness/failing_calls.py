@@ -89,12 +89,12 @@ class FailingCalls:
 
 
 @contextmanager
-def failing_calls(folder: Path, deeds: Sequence[AuditAction], *bugs: str) -> Iterator[FailingCalls]:
+def failing_calls(folder: Path, deeds: Sequence[AuditAction]) -> Iterator[FailingCalls]:
     """Start what processes are begun from."""
     with (folder / "deeds").open("wb") as file:
         pickle.dump(list(deeds), file)
     server = subprocess.Popen(
-        python("-m", "harness.enduring", folder / "deeds", "-", *bugs),
+        python("-m", "harness.enduring", folder / "deeds", "-"),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

@@ -71,7 +71,7 @@ class ServiceRig:
     Parameters
     ----------
     program
-        Module that is run instead of the command, as one with a planted bug.
+        Module that is run instead of the command.
     before
         Words before the interpreter, such as ``strace``.
     role

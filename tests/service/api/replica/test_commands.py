@@ -137,18 +137,6 @@ async def test_a_process_killed_after_its_commit_is_not_followed_by_a_second_tim
     assert pair.service.store.commands.look(command.id).state is CommandState.DONE
 
 
-@pytest.mark.long
-@pytest.mark.planted("command answered apart from what it did")
-async def test_an_answer_apart_from_the_event_would_be_noticed(pair, monkeypatch):
-    """The same with a planted bug: a command that is answered on its own comes twice."""
-    await raise_alarm(pair)
-    ask_for_a_comment(pair)
-    monkeypatch.setattr("service.store.alarms.answer_command", lambda *_: None)
-    await kill_after_commit(pair, monkeypatch)
-
-    assert changes(pair).count("commented") == 2
-
-
 async def test_a_store_that_comes_back_late_is_told_of(pair, monkeypatch):
     await raise_alarm(pair)
     monkeypatch.setattr(pair.service.alarms, "_put", lambda _: None)

@@ -2,7 +2,7 @@
 
 import asyncio
 import sqlite3
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, closing
 from itertools import chain, islice
 from pathlib import Path
@@ -28,11 +28,8 @@ from nats.js.errors import NotFoundError
 
 from service.app.storage import open_store
 from service.cluster import consumer as consuming
-from service.cluster.consumer import Consumer
 from service.cluster.session import consumer_name, stream_name, subject
 from service.settings.plant import PlantFile, load_plant_file
-from service.store.port import StoreError
-from service.store.store import Store
 
 N_BLOCKS = 60
 UNIT = "U1"
@@ -173,69 +170,6 @@ async def test_a_unit_is_known_to_have_blocks_that_wait_while_nothing_can_be_sto
             await until(lambda: _is(consumer.waiting == {UNIT}))
         await until(lambda: _is(look.stored() == N_BLOCKS))
         assert consumer.waiting == set()
-
-
-@pytest.mark.long
-@pytest.mark.planted("acknowledged before the commit")
-async def test_who_acknowledges_before_the_commit_is_caught(plant, server, monkeypatch):
-    async def at_once(*_: object) -> None:
-        """Wait for nothing."""
-
-    monkeypatch.setattr(Consumer, "_stored", at_once)
-    with pytest.raises(AssertionError, match="acknowledged before it was stored"):
-        await check_acknowledging(plant, server)
-
-
-Append = Callable[..., None]
-
-
-def dying(append: Append, died: list[bool], *, position_apart: bool) -> Append:
-    """An append that dies at the second results; with a bug, after it has stored the position."""
-    n_results = 0
-
-    def planted(
-        store: Store,
-        results: Sequence[Any],
-        gaps: Sequence[Any],
-        alarms: Sequence[Any] = (),
-        films: Sequence[Any] = (),
-        positions: Sequence[Any] = (),
-    ) -> None:
-        nonlocal n_results
-        n_results += bool(results)
-        if position_apart:
-            append(store, [], [], positions=positions)
-        if n_results >= 2:
-            died.append(True)
-            raise StoreError("it is dead")
-        append(store, results, gaps, alarms, films, () if position_apart else positions)
-
-    return planted
-
-
-BUG = (pytest.mark.long, pytest.mark.planted("position stored apart from its results"))
-
-
-@pytest.mark.parametrize(
-    "position_apart",
-    [pytest.param(False, id="as it is"), pytest.param(True, marks=BUG, id="planted bug")],
-)
-async def test_a_position_that_is_not_stored_with_its_results_is_caught(
-    plant, server, tmp_path, monkeypatch, position_apart
-):
-    await publish(plant)
-    database = tmp_path / "plant" / "padwatch.sqlite3"
-    with monkeypatch.context() as patched:
-        died: list[bool] = []
-        planted = dying(Store.append, died, position_apart=position_apart)
-        patched.setattr(Store, "append", planted)
-        async with analysing(plant):
-            await until(lambda: _is(bool(died)))
-    async with analysing(plant):
-        await until(lambda: _is(positions(database).get(UNIT) == N_BLOCKS))
-    sent = await on_the_stream(plant, server)
-    wanted = found_in(await single_process(written_plant(tmp_path, server, "single"), sent))
-    assert (found_in(database) == wanted) == (not position_apart)
 
 
 N_PER_UNIT = 120

@@ -192,16 +192,3 @@ def test_the_mark_is_written_before_a_transaction_is_acknowledged_and_not_when_i
         with pytest.raises(StoreError, match="no"):
             fill(store, range(9, 10))
         assert file.read() == newest
-
-
-@pytest.mark.long
-@pytest.mark.planted("high-water mark not compared")
-def test_a_store_whose_newest_mark_is_never_compared_is_found_out(crashed, monkeypatch):
-    """The planted bug: what the tests above would miss if nobody looked at the mark."""
-    monkeypatch.setattr("service.store.highwater.commits.compared", lambda *_: [])
-    beside(crashed, "-wal").unlink()
-
-    found, left = opened(crashed)
-
-    assert found == []
-    assert len(left) == N_KEPT  # a loss without a word

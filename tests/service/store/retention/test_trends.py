@@ -1,7 +1,6 @@
 """Trends over what has become coarser say the same, whatever comes late, in whatever order."""
 
 from contextlib import ExitStack, closing
-from typing import Any
 
 import numpy as np
 import pytest
@@ -27,9 +26,7 @@ from rigs.rolled_trends import gather_all, n_rows
 from rigs.tiers import fast_and_long
 
 from core.condition.operating_state import OperatingState
-from service.store import retention as deleting
 from service.store.port import ValueRange
-from service.store.rollups import gathering as rolling
 from service.store.sqlite import SqliteStore
 
 
@@ -107,41 +104,6 @@ def _delete_until(store: SqliteStore, what: str, hour: int) -> None:
         "ten_minutes_days": age_ns if what == "ten" else None,
     }
     delete_all(store, {name: age for name, age in limits.items() if age is not None})
-
-
-def overwritten(writer: Any, series: int, hour_ns: int, _: object) -> None:
-    """What gathering anew does, done to an hour of which only late readings are left."""
-    rolling._gather_hour(writer, series, (hour_ns, hour_ns + HOUR_NS))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("module", "name", "bug"),
-    [
-        pytest.param(
-            *(rolling, "merge_late", overwritten),
-            marks=pytest.mark.planted("late readings overwrite what was rolled up"),
-        ),
-        pytest.param(
-            *(deleting, "_agrees", lambda *_: True),
-            marks=pytest.mark.planted("readings deleted before they were rolled up"),
-        ),
-    ],
-)
-def test_planted_bugs_are_found(rolled, plain, execute, monkeypatch, module, name, bug):
-    """Late readings that overwrite their hour, and deleting unseen what was not rolled up."""
-    monkeypatch.setattr(module, name, bug)
-    execute("DELETE FROM rollup_cell WHERE width_s = 3600 AND start_ns = ?", (T0 + 2 * HOUR_NS,))
-    delete_all(rolled)
-    gather_all(rolled)
-    delete_all(rolled)
-    late = reading(assessment, np.random.default_rng(2), T0 + HOUR_NS + 7)
-    for store in (rolled, plain):
-        store.append([late], [])
-    gather_all(rolled)
-
-    with pytest.raises(AssertionError):
-        require_same_hours(rolled.trend(asked(60)), plain.trend(asked(60)))
 
 
 @pytest.mark.parametrize(
