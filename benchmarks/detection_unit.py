@@ -17,10 +17,13 @@ from core.baseline.baseline import Origin, QuantityBaseline
 from core.baseline.history import DIRECTIONS, QUANTITIES, StiffnessHistory
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
-from core.change.backtest import DecisionHistory, decide_all, operation_history
+from core.change.backtest import DecisionHistory, decide_all, last_decision, operation_history
 from core.change.cause import Attribution, UnitReadings, attribute
+from core.change.damping_cause import FilmEvidence, line_finding, told_by_damping
 from core.change.decision import JUDGED
-from core.change.settings import CK_CHANGE, ChangeLimits
+from core.change.evidence import Finding
+from core.change.film_judge import MAX_RECENT
+from core.change.settings import ChangeLimits, FilmRules
 from core.change.shaft_response import MEAN_READINGS, FilmDirection, film_columns, learn_response
 from core.condition.operating_state import OperatingLimits
 
@@ -32,8 +35,9 @@ YEARS = 2.0
 LEARNING_DAYS = 365
 BRACKETS_N_PER_M = {b.bearing: b.stiffness_n_per_m for b in RotorParameters().brackets}
 SETTINGS = BaselineSettings()
-LIMITS = {"ln_k": ChangeLimits(), "ln_ck": CK_CHANGE}
-"""Limits by column of the quantity."""
+RULES = FilmRules({}, SETTINGS.grid, OperatingLimits(1.0, 1.0), ChangeLimits(), 600 * 10**9)
+EVIDENCE_ROWS = 3000
+"""Readings from which mean deviations are calculated: three weeks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +46,11 @@ class Later:
 
     histories: Mapping[str, StiffnessHistory]
     is_settled: npt.NDArray[np.bool_]
+
+    def rows(self, start: int, stop: int) -> "Later":
+        """The readings from row `start` up to `stop`."""
+        histories = {bearing: one.rows(start, stop) for bearing, one in self.histories.items()}
+        return Later(histories, self.is_settled[start:stop])
 
     @property
     def time_ns(self) -> npt.NDArray[np.int64]:
@@ -75,9 +84,9 @@ class LearnedUnit:
         return _later(live(self.seed, START_NS, YEARS, damage, changes))
 
     def decide(self, later: Later, bearing: str, quantity: str) -> DecisionHistory:
-        limits = LIMITS[QUANTITIES[quantity].value]
         columns = later.histories[bearing], later.is_settled
-        return decide_all(*columns, quantity, self.learned(bearing, quantity), limits)
+        learned, limits = self.learned(bearing, quantity), RULES.limits(quantity)
+        return decide_all(*columns, quantity, learned, limits)
 
     def learned(self, bearing: str, quantity: str) -> QuantityBaseline:
         found = self.baselines[bearing].of(quantity)
@@ -101,9 +110,31 @@ class LearnedUnit:
         """What a change at a place is put down to after a row."""
         readings = self.place_readings(later)
         known = np.isfinite(readings.deviation[self.places().index(place), : row + 1])
-        newest = readings.columns(np.flatnonzero(known)[-MEAN_READINGS:])
+        newest = readings.columns(np.flatnonzero(known)[-MAX_RECENT:])
         brackets = np.array([BRACKETS_N_PER_M[bearing] for bearing, _ in self.places()])
-        return attribute(place, self.response, newest, brackets)
+        found = attribute(
+            *(place, self.response, newest.columns(slice(-MEAN_READINGS, None))),
+            brackets,
+        )
+        before = later.rows(max(0, row - EVIDENCE_ROWS), row + 1)
+        lines = {d: line_finding((place[0], d), self.response, newest) for d in DIRECTIONS}
+        evidence = {p: self._evidence(before, *p) for p in self.places()}
+        return told_by_damping(place, found, evidence, lines)
+
+    def _evidence(self, later: Later, bearing: str, direction: str) -> FilmEvidence:
+        return FilmEvidence(
+            *(self._findings(later, bearing, f"{name}_{direction}") for name in ("k", "ck"))
+        )
+
+    def _findings(self, later: Later, bearing: str, quantity: str) -> list[Finding]:
+        learned = self.learned(bearing, quantity)
+        last = last_decision(later.histories[bearing], later.is_settled, learned, RULES)
+        return last.evidence.findings(learned)
+
+    def last_change(self, later: Later, bearing: str, quantity: str) -> float:
+        """The most significant change after the last reading."""
+        found = self._findings(later, bearing, quantity)
+        return max(found, key=lambda each: each.significance).change if found else 0.0
 
     def place_readings(self, later: Later) -> UnitReadings:
         """All of a unit's settled readings."""
@@ -114,6 +145,7 @@ class LearnedUnit:
             np.stack([self._deviation(later, *place) for place in self.places()]),
             np.stack(rises),
             np.stack([history.attitude_deg for history, _ in places]),
+            np.concatenate([h.motion_um for h in later.histories.values()], axis=1),
         )
 
     def _deviation(self, later: Later, bearing: str, direction: str) -> FloatArray:

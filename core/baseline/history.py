@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray, TimeArray
+from core.arrays import ComplexArray, FloatArray, TimeArray
 from core.condition.cells import FilmConditions
 
 CodeArray: TypeAlias = npt.NDArray[np.int8]
@@ -96,8 +96,11 @@ class StiffnessHistory:
     outcome
         Values of `ReadingOutcome`; by default, a missing `ln_k` is `BAD_QUALITY`.
     ln_ck, u_ck
-        Natural logarithm of damping over stiffness in s, and its random standard uncertainty; by
-        default missing.
+        Natural logarithm of damping over stiffness in s, and its random standard uncertainty.
+    shaft_phase_deg, bearing_phase_deg
+        Phases of the 1× motion.
+
+    The columns of the last two items are missing by default.
 
     Raises
     ------
@@ -120,6 +123,8 @@ class StiffnessHistory:
     outcome: CodeArray = field(default_factory=lambda: np.empty((2, 0), np.int8))
     ln_ck: FloatArray = field(default_factory=lambda: np.empty((2, 0)))
     u_ck: FloatArray = field(default_factory=lambda: np.empty((2, 0)))
+    shaft_phase_deg: FloatArray = field(default_factory=lambda: np.empty((2, 0)))
+    bearing_phase_deg: FloatArray = field(default_factory=lambda: np.empty((2, 0)))
 
     def __post_init__(self) -> None:
         if self.outcome.size == 0:
@@ -127,8 +132,8 @@ class StiffnessHistory:
                 np.isnan(self.ln_k), ReadingOutcome.BAD_QUALITY, ReadingOutcome.MEASURED
             )
             object.__setattr__(self, "outcome", missing.astype(np.int8))
-        if self.ln_ck.size == 0:
-            for name in ("ln_ck", "u_ck"):
+        for name in MAY_BE_MISSING:
+            if getattr(self, name).size == 0:
                 object.__setattr__(self, name, np.full(self.ln_k.shape, np.nan))
         self._check_shapes()
         steps = np.flatnonzero(np.diff(self.time_ns) <= 0)
@@ -143,6 +148,13 @@ class StiffnessHistory:
     def conditions(self) -> FilmConditions:
         """Film conditions of all readings."""
         return FilmConditions(self.eccentricity_ratio, self.oil_temperature_c, self.attitude_deg)
+
+    @property
+    def motion_um(self) -> ComplexArray:
+        """1× phasors of shaft and bearing in µm, (2, 2, n) by part and direction."""
+        amplitude = np.stack([self.shaft_um_pk, self.bearing_um_pk])
+        phase = np.radians(np.stack([self.shaft_phase_deg, self.bearing_phase_deg]))
+        return np.asarray(amplitude * np.exp(1j * phase))
 
     def of(self, name: str) -> tuple[FloatArray, FloatArray, CodeArray]:
         """Return ln, random uncertainty and outcome (n,) of one of the `QUANTITIES`.
@@ -184,8 +196,9 @@ class StiffnessHistory:
         _refuse("u_ck", "must be above 0", has_ck & ~(self.u_ck > 0.0))
 
 
+MAY_BE_MISSING = ("ln_ck", "u_ck", "shaft_phase_deg", "bearing_phase_deg")
 PER_DIRECTION = frozenset(
-    {"ln_k", "u_random", "shaft_um_pk", "bearing_um_pk", "outcome", "ln_ck", "u_ck"}
+    {"ln_k", "u_random", "shaft_um_pk", "bearing_um_pk", "outcome", *MAY_BE_MISSING}
 )
 """Names of the columns of shape (2, n), with rows for x and y."""
 

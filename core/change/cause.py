@@ -13,14 +13,15 @@ learned from the healthy machine (`core.change.shaft_response`):
 A cause is reported only if the motion agrees with this cause and with no other.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import ComplexArray, FloatArray
 from core.change.shaft_response import MEAN_READINGS, FilmDirection, ShaftResponse
 
 
@@ -29,6 +30,9 @@ class Cause(StrEnum):
 
     FILM = "film"
     OIL = "oil"
+    CLEARANCE = "clearance"
+    BRACKET = "bracket"
+    TRANSDUCER = "transducer"
     BRACKET_OR_TRANSDUCER = "bracket_or_transducer"
     UNKNOWN = "unknown"
 
@@ -104,6 +108,8 @@ class UnitReadings:
         Derivative of the baseline's ln k with respect to ln of the eccentricity ratio.
     attitude_deg
         Attitude angle of the shaft centre.
+    motion_um : (2, n_films, n)
+        1× phasors of shaft and bearing; empty if there are none.
     """
 
     ln_k: FloatArray
@@ -111,10 +117,21 @@ class UnitReadings:
     deviation: FloatArray
     rise: FloatArray
     attitude_deg: FloatArray
+    motion_um: ComplexArray = field(default_factory=lambda: np.empty((2, 0, 0), np.complex128))
 
-    def columns(self, wanted: npt.NDArray[np.bool_ | np.int64]) -> "UnitReadings":
-        """Return the readings at the times selected by a mask (n,) or by column numbers."""
-        return UnitReadings(*(getattr(self, f.name)[:, wanted] for f in fields(self)))
+    @classmethod
+    def of(cls, rows: FloatArray) -> Self:
+        """Return the readings with fields as rows (9, n_films, n).
+
+        The last four rows are the real and imaginary part of the shaft's and the bearing's phasor.
+        """
+        columns = dict(zip((f.name for f in fields(cls)), rows[:5], strict=False))
+        return cls(**columns, motion_um=rows[5::2] + 1j * rows[6::2])
+
+    def columns(self, wanted: npt.NDArray[np.bool_ | np.int64] | slice) -> "UnitReadings":
+        """Return the readings at the times selected by a mask (n,), column numbers or a slice."""
+        found = {f.name: getattr(self, f.name) for f in fields(self)}
+        return UnitReadings(**{k: v[..., wanted] if v.size else v for k, v in found.items()})
 
 
 def attribute(

@@ -11,6 +11,7 @@ from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.history import DIRECTIONS, QUANTITIES, are_ratios
 from core.change.cause import Attribution, Cause, UnitReadings, attribute
+from core.change.damping_cause import FilmEvidence, line_finding, told_by_damping
 from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, outcomes, step
 from core.change.film_reading import FilmReading
 from core.change.settings import ChangeLimits, FilmRules, percent_of
@@ -79,7 +80,10 @@ def unjudged(verdict: Verdict) -> tuple[FilmFinding, ...]:
 
 ALARM_REASONS = {
     Cause.FILM: "film_changed",
-    Cause.OIL: "all_films_changed",
+    Cause.OIL: "oil_changed",
+    Cause.CLEARANCE: "clearance_changed",
+    Cause.BRACKET: "bracket_changed",
+    Cause.TRANSDUCER: "transducer_changed",
     Cause.BRACKET_OR_TRANSDUCER: "bracket_or_transducer_changed",
     Cause.UNKNOWN: "changed_cause_unknown",
 }
@@ -151,7 +155,7 @@ class FilmNews:
         return ranks.index(max(ranks))
 
 
-MAX_RECENT = 4 * MEAN_READINGS
+MAX_RECENT = 12 * MEAN_READINGS
 """Number of newest reading times kept to find causes; readings without a deviation are not used."""
 
 
@@ -222,7 +226,7 @@ class FilmJudge:
     def add_recent(self, columns: Iterable[FloatArray]) -> None:
         """Add settled readings of earlier times, to find the causes of changes.
 
-        Each item holds one time: (5, n_films), with the fields of `UnitReadings` as rows. Only the
+        Each item holds one time: (9, n_films), with the rows of `UnitReadings.of`. Only the
         newest `MAX_RECENT` times are kept.
         """
         self._recent.extend(columns)
@@ -300,6 +304,7 @@ class FilmJudge:
                     np.nan if deviation is None else deviation,
                     learned.eccentricity_rise(reading.conditions)[0] if learned else np.nan,
                     reading.attitude_deg,
+                    *(part for each in value.motion_um for part in (each.real, each.imag)),
                 )
             )
         self._recent.append(np.array(rows).T)
@@ -308,9 +313,26 @@ class FilmJudge:
         """Return the cause of a film's change, from its newest readings that have a deviation."""
         row = self._films.index(film)
         newest = [column for column in self._recent if np.isfinite(column[2, row])]
-        columns = newest[-MEAN_READINGS:] or [np.full((5, len(self._films)), np.nan)]
-        readings = UnitReadings(*np.stack(columns, axis=-1))
-        return attribute(film, self.response, readings, self._brackets)
+        columns = newest or [np.full((9, len(self._films)), np.nan)]
+        readings = UnitReadings.of(np.stack(columns, axis=-1))
+        latest = readings.columns(slice(-MEAN_READINGS, None))
+        found = attribute(film, self.response, latest, self._brackets)
+        lines = {
+            direction: line_finding((film[0], direction), self.response, readings)
+            for direction in DIRECTIONS
+        }
+        evidence = {each: self._evidence(*each) for each in self._films}
+        return told_by_damping(film, found, evidence, lines)
+
+    def _evidence(self, bearing: str, direction: str) -> FilmEvidence:
+        """Return the mean deviations of a film over each time scale."""
+        k, ck = (
+            self._decisions[bearing, name].evidence.findings(learned)
+            if (learned := self._learned(bearing, name))
+            else ()
+            for name in (f"k_{direction}", f"ck_{direction}")
+        )
+        return FilmEvidence(k, ck)
 
     def _is_comparable(self, baseline: BearingBaseline) -> bool:
         stiffness = [each for name in ("k_x", "k_y") if (each := baseline.of(name))]

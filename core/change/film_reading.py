@@ -1,5 +1,6 @@
 """`FilmReading`: stiffness reading of one film in x and y, with its operating condition."""
 
+import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,6 +31,8 @@ class FilmValue:
         Reason for the outcome; "ok" if measured.
     ln_ck, u_ck
         Natural logarithm of damping over stiffness in s, and its random standard uncertainty.
+    shaft_phase_deg, bearing_phase_deg
+        Phases of the 1× motion.
     """
 
     ln_k: float
@@ -40,6 +43,16 @@ class FilmValue:
     reason: Reason
     ln_ck: float = math.nan
     u_ck: float = math.nan
+    shaft_phase_deg: float = math.nan
+    bearing_phase_deg: float = math.nan
+
+    @property
+    def motion_um(self) -> tuple[complex, complex]:
+        """1× phasors of shaft and bearing in µm; NaN if unknown."""
+        return (
+            cmath.rect(self.shaft_um_pk, math.radians(self.shaft_phase_deg)),
+            cmath.rect(self.bearing_um_pk, math.radians(self.bearing_phase_deg)),
+        )
 
     def of(self, quantity: FilmQuantity) -> tuple[float, float, ReadingOutcome]:
         """Return ln, random uncertainty and outcome of a quantity, as `StiffnessHistory.of`."""
@@ -132,6 +145,8 @@ def _value(readings: Mapping[str, Reading], estimator: Estimator, direction: str
         reason=reason,
         ln_ck=ln_ck,
         u_ck=u_ck,
+        shaft_phase_deg=value_or_nan(readings[f"order1_shaft_{direction}_phase_deg"]),
+        bearing_phase_deg=value_or_nan(readings[f"order1_bearing_{direction}_phase_deg"]),
     )
 
 

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from core.arrays import FloatArray
 from core.baseline.grouping import bisquare, robust_std
 from core.baseline.history import DIRECTIONS, StiffnessHistory
+from core.change.shaft_line import ShaftLine, learn_lines
 
 FilmDirection: TypeAlias = tuple[str, str]
 """Bearing id and direction of a film."""
@@ -53,12 +54,15 @@ class ShaftResponse:
         Coefficients of the quadratic function (n_films, n_terms).
     std
         Cross-validated scatter of the means of `MEAN_READINGS` readings of each film, in ln.
+    lines
+        Lines of the shaft through three bearings, at most one for each direction.
     """
 
     places: tuple[FilmDirection, ...]
     centre: tuple[float, ...]
     coefficients: tuple[tuple[float, ...], ...]
     std: tuple[float, ...]
+    lines: tuple[ShaftLine, ...] = ()
 
     def __post_init__(self) -> None:
         n = len(self.places)
@@ -117,6 +121,7 @@ def learn_response(
         tuple(centre.tolist()),
         tuple(tuple(_fit(terms, share).tolist()) for share in shares),
         tuple(max(_mean_std(row), MIN_STD) for row in _held_out(terms, shares)),
+        learn_lines(histories, is_settled),
     )
 
 

@@ -92,9 +92,9 @@ def _newest_ns(store: FilmStore, place: FilmPlace) -> int:
 
 
 def _recent(found: Mapping[str, FilmHistory], watch: FilmWatch) -> list[FloatArray]:
-    """Return the newest settled readings at times common to all bearings, (5, n_films) each.
+    """Return the newest settled readings at times common to all bearings, (9, n_films) each.
 
-    Rows: ln stiffness, ln shaft motion, deviation, eccentricity rise, and attitude angle.
+    Rows are those of `UnitReadings.of`.
     """
     common, columns = common_rows(found), []
     settled = np.logical_and.reduce([film.is_settled[common[b]] for b, film in found.items()])
@@ -104,7 +104,8 @@ def _recent(found: Mapping[str, FilmHistory], watch: FilmWatch) -> list[FloatArr
         attitude = np.stack([history.attitude_deg] * 2)
         deviation = film.deviation[: len(DIRECTIONS), common[bearing]]
         rises = _rises(history, watch.judge.baseline(bearing))
-        columns.append(np.stack([history.ln_k, np.log(shaft), deviation, rises, attitude]))
+        motion = [part for each in history.motion_um for part in (each.real, each.imag)]
+        columns.append(np.stack([history.ln_k, np.log(shaft), deviation, rises, attitude, *motion]))
     whole = np.concatenate(columns, axis=1)[:, :, settled]
     return [whole[:, :, i] for i in range(max(0, whole.shape[2] - MAX_RECENT), whole.shape[2])]
 

@@ -73,7 +73,10 @@ footer { border-top: .6pt solid #888; margin-top: 1.4mm; padding-top: .8mm; font
 
 CAUSES = {
     "film": "the oil film itself",
-    "oil": "the oil or its cooling, in all films",
+    "oil": "the oil or its cooling",
+    "clearance": "the clearance, by wear or a moved pad",
+    "bracket": "the bracket, not the film",
+    "transducer": "a transducer, not the film",
     "bracket_or_transducer": "the bracket or a transducer, not the film",
     "unknown": "undetermined",
 }

@@ -148,7 +148,7 @@ class CausePart(EvidencePart):
     """Cause of a stiffness change, as attributed by comparing shaft and bearing motion."""
 
     cause: Annotated[str, Field(examples=["film"])]
-    """Cause: film, oil, bracket_or_transducer or unknown."""
+    """Cause: film, oil, clearance, bracket, transducer, bracket_or_transducer or unknown."""
 
     reason: Annotated[str, Field(examples=["shaft motion agrees with no single cause"])]
     """Reason for the attribution."""

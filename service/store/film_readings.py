@@ -110,7 +110,10 @@ CONDITION_COLUMNS = (
     *("speed_rpm", "power_mw", "eccentricity_ratio", "u_eccentricity"),
     *("attitude_deg", "oil_temperature_c"),
 )
-MEASURED_COLUMNS = ("ln_k", "u_random", "shaft_um_pk", "bearing_um_pk", "ln_ck", "u_ck")
+MEASURED_COLUMNS = (
+    *("ln_k", "u_random", "shaft_um_pk", "bearing_um_pk", "ln_ck", "u_ck"),
+    *("shaft_phase_deg", "bearing_phase_deg"),
+)
 CHANGE_COLUMNS = ("change", "change_std", "deviation", "deviation_std")
 VALUE_COLUMNS = (*MEASURED_COLUMNS, "evidence", "reason")
 FINDING_COLUMNS = (

@@ -194,6 +194,8 @@ DIRECTION_COLUMNS = """
     bearing_um_pk_{d} REAL,
     ln_ck_{d} REAL,
     u_ck_{d} REAL,
+    shaft_phase_deg_{d} REAL,
+    bearing_phase_deg_{d} REAL,
     evidence_{d} INTEGER NOT NULL,
     reason_{d} TEXT NOT NULL,
 """

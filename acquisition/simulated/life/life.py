@@ -69,6 +69,7 @@ def readings(
     ln_ck = truth.ln_ck + chain.ln_ck_error + u_ck * (CK_CORRELATION * error + own)
     measured = chain.evidence == ReadingOutcome.MEASURED
     shaft_um_pk, bearing_um_pk = _amplitudes_um_pk(random, truth, chain, probe_gain, bearing_gain)
+    shaft_deg, bearing_deg = _phases_deg(of_ck, truth, chain)
     out_of_order = chain.evidence == ReadingOutcome.BAD_QUALITY
     ratio, u_ratio, attitude_deg = _position(bearing, truth, chain)
     return StiffnessHistory(
@@ -86,6 +87,8 @@ def readings(
         outcome=chain.evidence,
         ln_ck=np.where(measured, ln_ck, np.nan),
         u_ck=np.where(measured, u_ck * _known(of_ck, n), np.nan),
+        shaft_phase_deg=np.where(out_of_order, np.nan, shaft_deg),
+        bearing_phase_deg=np.where(out_of_order, np.nan, bearing_deg),
     )
 
 
@@ -106,6 +109,20 @@ def _amplitudes_um_pk(
     shaft_um_pk += SHAFT_NOISE_UM * random.standard_normal(shaft_um_pk.shape)
     bearing_um_pk += BEARING_NOISE_UM * random.standard_normal(bearing_um_pk.shape)
     return np.abs(shaft_um_pk), np.abs(bearing_um_pk)
+
+
+def _phases_deg(
+    random: np.random.Generator, truth: BearingLifeTruth, chain: Chain
+) -> tuple[FloatArray, FloatArray]:
+    """Return the phases of the 1× motion of shaft and bearing, (2, n) each."""
+    shaft = truth.order1_um_pk[:2] + chain.runout_um_pk[:, np.newaxis]
+    bearing = truth.order1_um_pk[2:]
+    noise = ((shaft, SHAFT_NOISE_UM), (bearing, BEARING_NOISE_UM))
+    shaft_rad, bearing_rad = (
+        np.angle(phasor) + um / np.abs(phasor) * random.standard_normal(phasor.shape)
+        for phasor, um in noise
+    )
+    return np.degrees(shaft_rad), np.degrees(bearing_rad)
 
 
 def _position(

@@ -25,7 +25,15 @@ VerdictName = Literal[
     "no_reading",
 ]
 
-CauseName = Literal["film", "oil", "bracket_or_transducer", "unknown"]
+CauseName = Literal[
+    "film",
+    "oil",
+    "clearance",
+    "bracket",
+    "transducer",
+    "bracket_or_transducer",
+    "unknown",
+]
 
 
 LevelHeldName = Literal["alert", "danger"]
@@ -66,13 +74,14 @@ class FilmDeviationModel(ApiModel):
 
 
 class FilmCauseModel(ApiModel):
-    """Cause of a change of stiffness, inferred from the motion of shaft and bearing."""
+    """Cause of a change, inferred from damping over stiffness and the motion of the shaft."""
 
     cause: CauseName
-    """Cause: film of this bearing, oil of all bearings, bracket or transducer, or unknown."""
+    """Cause: film of this bearing, oil, clearance or wear, bracket, transducer, bracket or
+    transducer, or unknown."""
 
     reason: str
-    """Reason why this cause was inferred."""
+    """Reason why this cause was inferred, with its numbers."""
 
     film_share: float | None
     """Fraction of the change that is due to the film if a transducer error causes the rest, 0 to 1

@@ -35,7 +35,10 @@ const REASONS = {
 
 const CAUSES = {
   film: "film",
-  oil: "oil or cooling of all films",
+  oil: "oil",
+  clearance: "clearance or wear",
+  bracket: "bracket",
+  transducer: "transducer",
   bracket_or_transducer: "bracket or transducer",
   unknown: "unclear",
 };

@@ -8,7 +8,10 @@ import { serviceTimeMs } from "./server_time.js";
 
 const CAUSES = {
   film_changed: "cause: film",
-  all_films_changed: "cause: oil or cooling of all films",
+  oil_changed: "cause: oil or cooling",
+  clearance_changed: "cause: clearance or wear",
+  bracket_changed: "cause: bracket",
+  transducer_changed: "cause: transducer",
   bracket_or_transducer_changed: "cause: bracket or transducer",
   changed_cause_unknown: "cause unclear",
 };

@@ -1,0 +1,79 @@
+"""What c/k and the line of the shaft say of the cause of a change."""
+
+import pytest
+
+from core.change.cause import PROBE_REASON, Attribution, Cause
+from core.change.damping_cause import FilmEvidence, told_by_damping
+from core.change.evidence import Finding
+from core.change.shaft_line import LineFinding, LineVerdict
+
+BY_MOTION = Attribution(Cause.UNKNOWN, "shaft motion agrees with more than one cause")
+HOLDS = LineFinding(LineVerdict.HOLDS, 0.02, 0.03)
+NO_LINE = LineFinding()
+
+
+def evidence(k_x: float, k_y: float, ck: float, ck_std: float = 0.002) -> dict[str, FilmEvidence]:
+    """Changes of one bearing over one time scale, by direction."""
+    return {
+        direction: FilmEvidence([Finding(16.0, k, 0.008)], [Finding(16.0, ck, ck_std)])
+        for direction, k in (("x", k_x), ("y", k_y))
+    }
+
+
+def told(
+    own: dict[str, FilmEvidence],
+    others: tuple[float, ...] = (0.0, 0.0),
+    line: LineFinding = HOLDS,
+    found: Attribution = BY_MOTION,
+) -> Attribution:
+    films = {("UJB", direction): one for direction, one in own.items()}
+    for bearing, k in zip(("LJB", "TJB"), others, strict=False):
+        alike = evidence(k, k, 0.0).items()
+        films |= {(bearing, direction): one for direction, one in alike}
+    return told_by_damping(("UJB", "x"), found, films, {"x": line, "y": HOLDS})
+
+
+@pytest.mark.parametrize(
+    ("own", "others", "cause"),
+    [
+        (evidence(-0.22, -0.22, 0.001), (-0.2, -0.2), Cause.OIL),
+        (evidence(-0.22, -0.22, 0.001), (0.0, 0.0), Cause.OIL),
+        (evidence(-0.3, -0.28, 0.03), (0.0, 0.0), Cause.CLEARANCE),
+        (evidence(0.01, -0.01, 0.016), (0.0, 0.0), Cause.CLEARANCE),
+        (evidence(0.16, 0.15, 0.001), (0.0, 0.0), Cause.BRACKET),
+        (evidence(0.16, 0.15, 0.001), (0.14, 0.17), Cause.OIL),
+        (evidence(-0.2, 0.0, 0.001), (0.0, 0.0), Cause.UNKNOWN),  # one direction alone
+        (evidence(-0.05, -0.05, 0.001), (0.0, 0.0), Cause.UNKNOWN),  # c/k could not show it
+        (evidence(-0.22, -0.22, 0.001, 0.01), (0.0, 0.0), Cause.UNKNOWN),
+        (evidence(-0.22, -0.22, -0.03), (0.0, 0.0), Cause.UNKNOWN),
+    ],
+)
+def test_oil_clearance_and_bracket_are_told_by_what_c_over_k_does(own, others, cause):
+    found = told(own, others)
+    assert found.cause is cause
+    if cause is not Cause.UNKNOWN:
+        assert "c/k" in found.reason
+        assert "%" in found.reason
+
+
+@pytest.mark.parametrize("which", [LineVerdict.PROBE, LineVerdict.ACCELEROMETER])
+def test_a_broken_line_names_the_transducer_whatever_c_over_k_does(which):
+    broken = LineFinding(which, 0.8, 0.03)
+    found = told(evidence(-0.1, -0.02, 0.012), line=broken)
+    assert found.cause is Cause.TRANSDUCER
+    assert f"{which} of UJB in x" in found.reason
+    assert "0.80 ± 0.03 µm" in found.reason
+    assert told({}, line=broken).cause is Cause.TRANSDUCER
+
+
+def test_without_a_line_a_bracket_is_not_told_from_transducers():
+    assert told(evidence(0.16, 0.15, 0.001), line=NO_LINE) == BY_MOTION
+    assert told(evidence(-0.3, -0.28, 0.03), line=NO_LINE).cause is Cause.CLEARANCE
+    probes = Attribution(Cause.BRACKET_OR_TRANSDUCER, PROBE_REASON)
+    assert told(evidence(-0.3, -0.28, 0.03), line=NO_LINE, found=probes) == probes
+
+
+def test_without_damping_the_motion_of_the_shaft_alone_tells():
+    assert told({}) == BY_MOTION
+    k_only = {d: FilmEvidence(one.k, ()) for d, one in evidence(-0.3, -0.3, 0.0).items()}
+    assert told(k_only) == BY_MOTION
