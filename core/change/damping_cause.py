@@ -1,8 +1,8 @@
-"""Cause of a change told by damping over stiffness c/k: oil, clearance, bracket or transducer.
+"""Cause of a change by damping over stiffness c/k: oil, clearance, bracket or transducer.
 
 A change of the oil moves stiffness and damping alike and leaves c/k. More clearance lowers k and
 raises c/k. The stiffness of the bracket and the gains of transducers cancel in c/k. With the line
-through three bearings (`core.change.shaft_line`) a transducer is told from film and bracket.
+through three bearings (`core.change.shaft_line`), a transducer is distinguished from the rest.
 """
 
 import math
