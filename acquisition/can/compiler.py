@@ -60,8 +60,8 @@ class _Compiler:
                 )
         if not settings.counters and rate_hz / n_per_frame > MAX_INSTANTS_PER_S:
             raise ConfigError(
-                f"counters: required for {rate_hz / n_per_frame:.6g} frames/s of each message;"
-                f" without counters, losses are detected up to {MAX_INSTANTS_PER_S:g} frames/s"
+                f"counters: list the counter signals; they are required above"
+                f" {MAX_INSTANTS_PER_S:g} frames/s of each message, got {rate_hz / n_per_frame:.6g}"
             )
         self._add_values()
         hold = settings.hold_samples

@@ -67,7 +67,9 @@ class CounterFollower:
         self._left: tuple[int, int, int, int | None] | None = None
 
     def place(self, part: Part, data: bytes, arrived_ns: int) -> list[PlacedFrame]:
-        """Return the frames whose sample index is now known: this frame and those it confirms.
+        """Add a frame of `part`; return the frames whose sample index it makes known.
+
+        These are the frame itself, and earlier frames that it confirms; possibly none.
 
         Parameters
         ----------

@@ -163,6 +163,8 @@ def wave_channel(
 ) -> WaveChannel:
     """Return a waveform channel with the gain, offset and readers of its signals.
 
+    `wave` is the index of its message among the waveform messages.
+
     Raises ConfigError if unit, factor or full scale in the DBC do not match the channel, or its
     signals differ in their factors.
     """

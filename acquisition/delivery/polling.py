@@ -112,5 +112,6 @@ class Freshness:
         if standing_s > self._stale_after_s:
             self._stood_still = True
             raise LinkError(
-                f"the device replies, but {self._what} has not changed for {standing_s:.1f} s"
+                f"the device replies, but {self._what} has not changed for {standing_s:.1f} s;"
+                f" at most {self._stale_after_s:g} s are accepted"
             )

@@ -110,7 +110,8 @@ def answer(request: Mapping[str, Any], out: BinaryIO) -> None:
     except (ConfigError, MemoryError) as error:
         words, number = str(error), getattr(error.__cause__, "errno", None)
         if isinstance(error, MemoryError) or isinstance(error.__cause__, MemoryError):
-            words = f"reading requires more than {_memory_bytes(request) >> 20} MiB of memory"
+            n_mib = _memory_bytes(request) >> 20
+            words = f"reading requires more than {n_mib} MiB of memory; split the file"
         words = words if words.startswith(str(path)) else f"{path}: {words}"
         send(out, {"kind": "error", "message": words[:1000], "errno": number})
     out.flush()

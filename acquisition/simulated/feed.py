@@ -25,10 +25,7 @@ class SampleFeed(Protocol):
         A simulated unit returns exactly `n_samples` consecutive samples. A recording returns fewer
         before a gap or a restart of the device, and continues after it.
 
-        Raises
-        ------
-        FeedEndedError
-            If the feed has ended.
+        Raises FeedEndedError if the feed has ended.
         """
         ...
 

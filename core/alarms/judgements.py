@@ -21,7 +21,7 @@ SENSOR_FAULTS = (Reason.DEAD, Reason.STUCK, Reason.CLIPPED)
 
 
 def fault_judgement(fault: str | None) -> Judgement:
-    """Return an alert with the fault as its reason, or `WITHIN` if the fault is None."""
+    """Return an alert whose reason is the fault; without a fault, a judgement within limits."""
     return WITHIN if fault is None else Judgement(AlarmLevel.ALERT, reason=fault)
 
 
@@ -119,10 +119,7 @@ AMPLITUDE_ONLY = {"ok": "amplitude_change_only", "above_limit": "amplitude_chang
 class OrderVector:
     """1× vibration vector: amplitude, and phase lead over the key-phase pulse (None if unknown).
 
-    Raises
-    ------
-    ValueError
-        If the amplitude is negative or not finite, or the phase is not finite.
+    Raises ValueError if the amplitude is negative or not finite, or the phase is not finite.
     """
 
     amplitude_um_pk: float

@@ -215,7 +215,7 @@ class Watch:
         Raises `TypeError` if the alarm has no limits.
         """
         if self.limits is None:
-            raise TypeError(f"alarm {self.id} has no limits with which a reading can be compared")
+            raise TypeError(f"alarm {self.id} has no limits, so it cannot judge a reading")
         return self.limits.judge(reading, point, held)
 
 

@@ -82,10 +82,7 @@ Action: TypeAlias = (
 def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
     """Return the alarm after an action at host time `now_ns`, and its event if it had an effect.
 
-    Raises
-    ------
-    ActionRefusedError
-        If the action does not fit the state of the alarm.
+    Raises ActionRefusedError if the action does not fit the state of the alarm.
     """
     reason = ""
     match action:

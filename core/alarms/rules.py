@@ -53,7 +53,7 @@ class Region:
 
     @property
     def ranges(self) -> tuple[Range | None, Range | None, Range | None]:
-        """Ranges of eccentricity ratio, oil temperature and attitude angle, or None."""
+        """Ranges of eccentricity ratio, oil temperature and attitude; None if unrestricted."""
         return self.eccentricity_ratio, self.oil_temperature_c, self.attitude_deg
 
 
@@ -113,7 +113,7 @@ class LimitRule:
 
 
 def point_of(assessment: Assessment) -> OperatingPoint:
-    """Return the operating point of an assessment; missing readings are None.
+    """Return the operating point of an assessment; None for each unknown quantity.
 
     Standstill is also derived from the speed reading if the operating state is unknown.
     """

@@ -120,10 +120,7 @@ def figures_of(
     `events` are in order of time; those outside the period do not count. `rule` defines chattering
     and fleeting alarms.
 
-    Raises
-    ------
-    ValueError
-        If the end is not after the start.
+    Raises ValueError if the end is not after the start.
     """
     if end_ns <= start_ns:
         raise ValueError(f"the end, {end_ns} ns, must be after the start, {start_ns} ns")

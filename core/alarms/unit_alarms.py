@@ -138,10 +138,7 @@ class UnitAlarms(AlarmBoard):
 
         `conditions` are the judgements of each direction, "x" and "y", by alarm id.
 
-        Raises
-        ------
-        KeyError
-            If the unit has no film-stiffness alarm with one of the ids.
+        Raises KeyError if the unit has no film-stiffness alarm with one of the ids.
         """
         films = {watch.id: watch for watch in self._of_rule["films"]}
         for id_, found in conditions.items():

@@ -96,7 +96,7 @@ def channel_verdicts(
 
 
 def worst_qualities(verdicts: VerdictArray) -> tuple[Quality, ...]:
-    """Return the worst quality of each channel (n_channels,), the first of equally bad ones."""
+    """Return the worst quality of each channel over its cells; the first of equally bad ones."""
     if not verdicts.any():
         return (GOOD,) * len(verdicts)
     first = _LEVELS[verdicts].argmax(axis=1)

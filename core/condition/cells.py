@@ -51,11 +51,8 @@ class CellGrid:
 
     Without an attitude width, the cells do not depend on the attitude angle.
 
-    Raises
-    ------
-    ValueError
-        If a width is not a positive number, or the attitude width does not divide 360°. The message
-        states key and value.
+    Raises ValueError if a width is not a positive number, or the attitude width does not divide
+    360°. The message states key and value.
     """
 
     eccentricity_width: float = 0.05

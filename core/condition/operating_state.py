@@ -152,7 +152,10 @@ def step_operation(
     longest_ns = ns_from_s(limits.longest_gap_s)
     if operation.last_ns is not None:
         if time_ns <= operation.last_ns:
-            raise ValueError(f"reading at {time_ns} ns must be after {operation.last_ns} ns")
+            raise ValueError(
+                f"reading at {time_ns} ns must be after the previous reading at"
+                f" {operation.last_ns} ns"
+            )
         if time_ns - operation.last_ns > longest_ns:
             operation = UNKNOWN_OPERATION
     speed, power, was_at_speed = None, None, None

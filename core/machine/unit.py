@@ -255,10 +255,7 @@ def require_same_machine(here: Unit, there: Unit) -> None:
     Only the data of the bearings may differ, such as gap references, clearances and brackets; their
     ids and channels must agree.
 
-    Raises
-    ------
-    ValueError
-        If another field differs; the message gives its name and both values.
+    Raises ValueError if another field differs; the message gives its name and both values.
     """
     before, after = _fixed_parts(here), _fixed_parts(there)
     for name, value in before.items():

@@ -114,10 +114,7 @@ class UnitMonitor:
         Only the references, clearances and brackets of the bearings may differ; the averaged
         segments depend on all other fields.
 
-        Raises
-        ------
-        ValueError
-            If another field differs; the message gives its name and both values.
+        Raises ValueError if another field differs; the message gives its name and both values.
         """
         require_same_machine(self.unit, unit)
         for bearing in bearings_with_new_references(self.unit, unit):
@@ -169,10 +166,8 @@ class UnitMonitor:
     def require(self, block: SampleBlock) -> None:
         """Check that a block fits the unit; the state is unchanged.
 
-        Raises
-        ------
-        BlockMisfitError
-            If the unit, rate or number of channels differs; the message gives both values.
+        Raises BlockMisfitError if the unit, rate or number of channels differs; the message gives
+        both values.
         """
         if block.unit != self.unit.id:
             raise BlockMisfitError(f"expected a block of unit {self.unit.id!r}, got {block.unit!r}")

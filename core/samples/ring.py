@@ -118,10 +118,7 @@ class Ring:
         Repeated samples are counted in `account` and dropped. Not more rejected samples are counted
         than the index shows to be missing.
 
-        Raises
-        ------
-        BlockMisfitError
-            If the number of channels differs.
+        Raises BlockMisfitError if the number of channels differs.
         """
         self.require(block)
         if self.epoch is None:  # earlier samples do not count as offered
@@ -160,10 +157,7 @@ class Ring:
     def read(self, first_index: int, stop_index: int) -> Window:
         """Return the calibrated window of the samples `first_index` to `stop_index - 1`.
 
-        Raises
-        ------
-        LookupError
-            If the ring does not hold all of these samples, or the range is empty.
+        Raises LookupError if the ring does not hold all of these samples, or the range is empty.
         """
         if first_index == stop_index or not self.holds(first_index, stop_index):
             raise LookupError(f"samples {first_index} to {stop_index - 1} are not in the buffer")

@@ -115,7 +115,7 @@ class PollTransform(KeptSegments):
         known = {channel.id for channel in unit.channels}
         for row in rows:
             if row.channel not in known:
-                raise ValueError(f"row {row.id!r} belongs to no channel of unit {unit.id!r}")
+                raise ValueError(f"row {row.id!r}: unit {unit.id!r} has no channel {row.channel!r}")
         if len(self._row) < len(rows):
             raise ValueError("rows must be unique: two rows have the same channel and quantity")
         # the phase reference of a rack differs from that of padwatch's slow-roll vectors

@@ -102,7 +102,8 @@ class _CountingBlfReader(can.BLFReader):
         if self._tail.strip(b"\0"):
             raise ConfigError("the file is truncated: it ends within an object")
         if self.n_objects < self.object_count:
-            raise ConfigError(f"file has {self.n_objects} objects, expected {self.object_count}")
+            n_expected = self.object_count
+            raise ConfigError(f"truncated file: {self.n_objects} objects, expected {n_expected}")
 
     def _parse_container(self, data: bytes) -> Iterator[can.Message]:
         known, at = self._tail + data, -1

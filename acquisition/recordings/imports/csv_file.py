@@ -128,7 +128,7 @@ class _CsvFile:
         is_count = np.all((counts == np.rint(counts)) & (np.abs(counts + 0.5) < 32768), axis=0)
         if not np.all(is_count):
             line = self._line_of[int(np.argmin(is_count))]
-            raise self._wrong("a value is not a count of a 16-bit converter", line)
+            raise self._wrong("counts must be integers from -32768 to 32767", line)
         return counts.astype(np.int16)
 
     def _slow_values(self, number: int, columns: _Columns) -> FloatArray:

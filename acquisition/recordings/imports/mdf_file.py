@@ -26,7 +26,7 @@ def mdf_file(path: Path, job: ImportJob) -> SeriesFile:
     """
     with path.open("rb") as stream:
         if stream.read(len(_MAGIC)) != _MAGIC:  # asammdf extracts archives to the disk
-            raise ConfigError("not an MDF file of version 4, or an unfinished one; convert it")
+            raise ConfigError("not a finished MDF file of version 4; convert it to MDF 4")
     mdf = library("asammdf", "MDF4").MDF(path)
     is_local = bool(mdf.header.time_flags & _LOCAL_TIME)
     offset_s = job.time.utc_offset_s if is_local else 0

@@ -167,7 +167,7 @@ class _SlowFeed:
     def _read(self, start: int, stop: int) -> None:
         self._times_ns = np.append(self._times_ns, self._read_times_ns(start, stop))
         if np.any(np.diff(self._times_ns) < 0):
-            raise ConfigError(f"the times of slow channel {self._slow.id} go back")
+            raise ConfigError(f"the times of slow channel {self._slow.id} go back; sort them")
         found = _numbers(self._series.values, start, stop, self._slow.place)
         scale = (self._series.per_count or 1.0) * self._slow.factor
         values = found.astype(np.float64) * scale + self._slow.offset

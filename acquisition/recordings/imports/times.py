@@ -37,7 +37,7 @@ def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None
     """
     origin, _, unit = axis.form.partition("_")
     if unit not in _US_PER:
-        raise ConfigError(f"a time column of numbers cannot have the form {axis.form!r}")
+        raise ConfigError(f"a time column of numbers must be epoch or elapsed, not {axis.form!r}")
     if values.dtype.kind not in "iuf":
         raise ConfigError(f"the time column must be numbers, got {values.dtype}")
     if origin == "epoch":
@@ -55,7 +55,8 @@ def utc_ns(us: TimeArray, start_ns: int) -> TimeArray:
     found = us + np.int64(start_ns // 1000)
     wrong = np.abs(found) >= _MAX_US
     if wrong.any():
-        raise ConfigError(f"time {found[wrong][0] / 1e6:.6g} s since 1970 is out of range")
+        time_s, most_s = found[wrong][0] / 1e6, _MAX_US / 1e6
+        raise ConfigError(f"time {time_s:.6g} s since 1970 is out of range: ±{most_s:.3g} s")
     return found * 1000
 
 

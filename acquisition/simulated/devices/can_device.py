@@ -169,10 +169,7 @@ class CanDevice:
     def next_frames(self) -> list[WireFrame]:
         """Remove and return the frames of the oldest buffered block.
 
-        Raises
-        ------
-        LookupError
-            If the buffer is empty.
+        Raises LookupError if the buffer is empty.
         """
         return self._waiting.popleft()
 

@@ -73,7 +73,7 @@ class MapDevice(ModbusDevice):
         self._beat = 0
         if self._feed.peek() is None:
             raise ConfigError(
-                f"simulated Modbus device: the feed has no run of {step_samples} samples"
+                f"simulated Modbus device: the feed has no {step_samples} samples without a gap"
             )
         self._take()
 

@@ -196,10 +196,8 @@ class RegisterMemory:
     def write(self, address: int, data: bytes) -> None:
         """Write big-endian words to consecutive registers, beginning at `address`.
 
-        Raises
-        ------
-        ValueError
-            If a register does not exist; the message contains the requested and the valid range.
+        Raises ValueError if a register does not exist; the message contains the requested and the
+        valid range.
         """
         offset = 2 * (address - self._start)
         if offset < 0 or offset + len(data) > len(self._data):

@@ -75,10 +75,7 @@ class ModbusServer(DaqServer):
     def reply(self, request: bytes) -> bytes | None:
         """Return the reply PDU to a request PDU, with the next fault applied; None for no reply.
 
-        Raises
-        ------
-        HangUpError
-            If the device closes the connection instead of replying.
+        Raises HangUpError if the device closes the connection instead of replying.
         """
         self.function_codes[request[0]] += 1
         self._asked.set()

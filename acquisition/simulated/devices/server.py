@@ -42,10 +42,7 @@ class DaqServer(ABC):
     def inject(self, fault: str, count: int = 1) -> None:
         """Inject the fault with the name `fault` into the device or its link, `count` times.
 
-        Raises
-        ------
-        LookupError
-            If the fault is unknown; the message contains the known faults.
+        Raises LookupError if the fault is unknown; the message contains the known faults.
         """
         known = self._faults_by_name()
         if fault not in known:

@@ -83,10 +83,7 @@ class LifeCourse:
     def at(self, elapsed_s: float) -> Scenario:
         """Return the scenario at `elapsed_s` seconds after the first sample.
 
-        Raises
-        ------
-        ValueError
-            If the time is after the end of the life.
+        Raises ValueError if the time is after the end of the life.
         """
         time_ns = self._start_ns + ns_from_s(elapsed_s)
         row, share = self._place(time_ns)
@@ -191,10 +188,7 @@ def history_until(plan: LifePlan, now_ns: int, years: float = 1.0) -> UnitLife:
 
     `years` is the length of the history; up to one year is always available.
 
-    Raises
-    ------
-    ValueError
-        If the history begins before the life, or damage has an unknown bearing.
+    Raises ValueError if the history begins before the life, or damage has an unknown bearing.
     """
     require_known_bearings(plan.damage, LIFE_BEARINGS)
     inputs = _inputs(plan, now_ns)

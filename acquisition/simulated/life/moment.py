@@ -79,10 +79,7 @@ def growing(machine: Unit) -> frozenset[str]:
 def row_at(life: UnitLife, time_ns: int) -> int:
     """Return the row of the newest reading not later than `time_ns`.
 
-    Raises
-    ------
-    ValueError
-        If the time is before the first reading, or the unit is not at rated speed.
+    Raises ValueError if the time is before the first reading, or the unit is not at rated speed.
     """
     row = int(np.searchsorted(life.operation.time_ns, time_ns, side="right")) - 1
     if row < 0:

@@ -59,10 +59,7 @@ class Operation:
 def time_grid_ns(start_ns: int, years: float, step_s: float = STEP_S) -> TimeArray:
     """Return evenly spaced times of the readings over `years` of 365.25 days, (n,).
 
-    Raises
-    ------
-    ValueError
-        If `years` is less than a day.
+    Raises ValueError if `years` is less than a day.
     """
     n = int(years * YEAR_S / step_s)
     if not n * step_s >= DAY_S:

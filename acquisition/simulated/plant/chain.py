@@ -153,10 +153,8 @@ class TransducerChain:
     `white` and `own` are the random generators of the white noise and of the sensor noise of the
     accelerometers.
 
-    Raises
-    ------
-    ConfigError
-        If the scenario names an unknown channel or a response that cannot be simulated.
+    Raises ConfigError if the scenario names an unknown channel or a response that cannot be
+    simulated.
     """
 
     def __init__(

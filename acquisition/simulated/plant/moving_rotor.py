@@ -31,10 +31,7 @@ which is below their noise."""
 class MovingRotor:
     """Rotor on time-varying films and brackets, which returns the motion at the transducers.
 
-    Raises
-    ------
-    ConfigError
-        If machine and scenario do not fit together.
+    Raises ConfigError if machine and scenario do not fit together.
     """
 
     def __init__(self, machine: Unit, scenario: Scenario) -> None:

@@ -50,10 +50,7 @@ class SimulatedPlant:
 
     `course` is a `Scenario` for steady operation, or a course of scenarios.
 
-    Raises
-    ------
-    ConfigError
-        If machine and scenario do not fit together.
+    Raises ConfigError if machine and scenario do not fit together.
     """
 
     def __init__(self, machine: Unit, course: Course, seed: int) -> None:

@@ -28,10 +28,8 @@ class ResponseFilter:
 
     The initial filter state is the steady state for a constant signal equal to the first sample.
 
-    Raises
-    ------
-    ConfigError
-        If the response is a table, or cannot be simulated to `TOLERANCE` within `EXACT_BAND_HZ`.
+    Raises ConfigError if the response is a table, or cannot be simulated to `TOLERANCE` within
+    `EXACT_BAND_HZ`.
     """
 
     def __init__(self, response: Response, rate_hz: float) -> None:

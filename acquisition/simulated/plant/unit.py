@@ -167,10 +167,7 @@ class SimulatedUnit:
     def advance(self, n_samples: int) -> SampleBlock:
         """Return the next `n_samples` consecutive samples.
 
-        Raises
-        ------
-        ValueError
-            If `n_samples` is less than 1.
+        Raises ValueError if `n_samples` is less than 1.
         """
         if n_samples < 1:
             raise ValueError(f"n_samples must be at least 1, got {n_samples}")

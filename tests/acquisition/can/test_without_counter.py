@@ -138,7 +138,7 @@ def test_one_lost_instant_is_found_at_every_rate(rate_hz, what_is_left, settings
 
 
 def test_a_rate_at_which_the_clock_cannot_tell_losses_is_refused(settings, assembler_by):
-    with pytest.raises(ConfigError, match=r"counters: required for 1251 .* up to 1250"):
+    with pytest.raises(ConfigError, match=r"counters: list .* above 1250 .* got 1251"):
         assembler_by(settings, 1251.0)
 
 

@@ -81,7 +81,7 @@ def test_without_speed_or_power_or_after_a_gap_the_state_is_unknown_and_time_goe
     states = [o.state for o in run([float("nan"), 92.3], [200.0, float("nan")])]
     assert states == [OperatingState.UNKNOWN] * 2
     operation = step_operation(UNKNOWN_OPERATION, 5, 92.3, 200.0, LIMITS)
-    with pytest.raises(ValueError, match="must be after 5 ns"):
+    with pytest.raises(ValueError, match="must be after the previous reading at 5 ns"):
         step_operation(operation, 5, 92.3, 200.0, LIMITS)
 
 

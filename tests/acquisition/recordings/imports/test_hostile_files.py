@@ -99,7 +99,7 @@ def test_an_archive_is_not_unpacked(tmp_path, read, job):
     with zipfile.ZipFile(tmp_path / "run.mf4", "w") as archive:
         archive.writestr("../../escaped.mf4", b"MDF     4.10    " + bytes(100))
     says = refusal(read, tmp_path / "run.mf4", replace(job, format="mdf4"))
-    assert "not an MDF file of version 4" in says
+    assert "not a finished MDF file of version 4" in says
     assert [path.name for path in tmp_path.iterdir()] == ["run.mf4"]
 
 
