@@ -92,7 +92,7 @@ def encoding_of(headers: Headers) -> str:
 
 
 def encoded(body: bytes, encoding: str) -> tuple[bytes, dict[str, str]]:
-    """Return a body in a content encoding and its headers; a small body remains as it is."""
+    """Return a body in a content encoding, and headers for it; a small body is not encoded."""
     if not encoding or len(body) < MIN_ENCODED_BYTES:
         return body, {}
     return ENCODINGS[encoding](body), {"Content-Encoding": encoding}
@@ -117,8 +117,8 @@ class Answers:
     """Cache of encoded answers, by path, query, revision and content encoding.
 
     If the bodies exceed `max_bytes` together, the least recently used answers are dropped.
-    Concurrent requests for the same answer wait for one computation of it. Answered requests that
-    may be repeated are kept by caller, for `Repetition`.
+    Concurrent requests for the same answer wait for one computation of it. Answered requests are
+    remembered by caller, so that `Repetition` can answer them again without routing.
     """
 
     def __init__(self, max_bytes: int = MAX_CACHE_BYTES) -> None:
@@ -143,8 +143,8 @@ class Answers:
             Function that returns the answer; bytes are JSON. It is called in a thread and may
             block, or is a coroutine function.
         lasting
-            Function that returns `make` for a later request of the same URL, given the value of
-            its parameter ``since``, which may differ; None if `revision` does not apply to it.
+            Function from the parameter ``since`` of a repeated request, which may differ, to the
+            `make` of the answer; None if a repeated request must be routed again.
         """
         if lasting is not None:
             self._known[_asked(request.scope)[0]] = revision, lasting, request.scope.get("route")
@@ -224,7 +224,7 @@ class Answers:
 
 
 async def rendered(make: Callable[[], BaseModel]) -> Response:
-    """Return the JSON of a model that `make` builds in a thread; `AnswerHeaders` adds the tag."""
+    """Return a response with the JSON text of a model that `make` builds in a thread."""
     return Response(await asyncio.to_thread(lambda: json_of(make())), media_type=JSON)
 
 

@@ -63,7 +63,7 @@ class GuardedApi(FastAPI):
             self.add_route(self.openapi_url, self._published, include_in_schema=False)
 
     def require_declarations(self) -> None:
-        """Collect the declared permissions of all routes; call this after adding the last route.
+        """Collect the declared permissions of all routes; call it after adding the last route.
 
         Raises
         ------

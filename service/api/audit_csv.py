@@ -15,7 +15,7 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "|", "%", "'", "＝", "＋", "�
 
 
 def write_csv(file: TextIO, entries: Iterable[tuple[str, AuditEntry]]) -> int:
-    """Write audit entries with the names of their chains to an open CSV file; return their number.
+    """Write pairs of chain name and audit entry to an open CSV file; return their number.
 
     Text that a spreadsheet could interpret as a formula is prefixed with a single quote.
     """

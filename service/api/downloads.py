@@ -75,7 +75,7 @@ class Downloads:
 def attachment(
     pieces: AsyncIterator[bytes] | Iterator[bytes], media_type: str, name: str, **headers: str
 ) -> StreamingResponse:
-    """Return a response that browsers save as a file with a name, with further headers."""
+    """Return a response that browsers save as a file `name`; `headers` are added to it."""
     saved = {"Content-Disposition": f'attachment; filename="{name}"'}
     nosniff = {"X-Content-Type-Options": "nosniff"}
     return StreamingResponse(pieces, media_type=media_type, headers=saved | nosniff | headers)
@@ -84,6 +84,6 @@ def attachment(
 def file_content(
     media_type: str, description: str, schema: Any = None, **more: Any
 ) -> dict[int | str, dict[str, Any]]:
-    """Return the OpenAPI entry of a file as answer; without a `schema`, the file is binary."""
+    """Return the OpenAPI entry of an answer that is a file, binary unless it has a `schema`."""
     content = {"schema": schema or {"type": "string", "format": "binary"}, **more}
     return {200: {"description": description, "content": {media_type: content}}}

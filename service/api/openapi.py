@@ -12,7 +12,7 @@ from service.api.problems import WORDS, problem_schemas
 
 
 def header(description: str, example: Any, kind: str = "string", **limits: Any) -> dict[str, Any]:
-    """Return the OpenAPI entry of a header whose schema has a type and further limits."""
+    """Return the OpenAPI entry of a header; `limits` are further members of its schema."""
     return {
         "description": description,
         "schema": {"type": kind, **limits},

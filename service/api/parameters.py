@@ -182,7 +182,7 @@ OnlyUnit = Annotated[
 
 
 def only(description: str, example: str, max_length: int | None = None) -> Any:
-    """Return the declaration of a query parameter that limits the answer to one `description`."""
+    """Return the declaration of a query parameter that selects entries by one property."""
     return Query(max_length=max_length, description=f"Only this {description}.", examples=[example])
 
 

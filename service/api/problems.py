@@ -147,7 +147,7 @@ def problem_responses(
 
 
 async def refuse_unknown_parameters(request: Request) -> None:
-    """Reject a body or query parameter that the route does not take, and FastAPI would ignore.
+    """Reject a request body or query parameter that the route does not have.
 
     Raises
     ------

@@ -31,7 +31,7 @@ class RequestMetrics:
 
     @property
     def text(self) -> bytes:
-        """The metrics in the Prometheus text format 0.0.4."""
+        """Metrics of requests and of this process in the Prometheus text format 0.0.4."""
         return generate_latest(self._registry)
 
 

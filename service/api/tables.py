@@ -103,7 +103,7 @@ Format = Annotated[FormatName, Depends(wanted_format)]
 
 
 def table_content(words: str) -> dict[int | str, dict[str, Any]]:
-    """Return the OpenAPI entry, described by `words`, of an answer also available as a table."""
+    """Return the OpenAPI entry of an answer that is also available as CSV and Parquet."""
     binary = {"schema": {"type": "string", "format": "binary"}}
     text = {"schema": {"type": "string"}, "example": CSV_EXAMPLE}
     content = {TYPE_OF["csv"]: text, TYPE_OF["parquet"]: binary}

@@ -227,7 +227,7 @@ LEVEL_NAMES = {level: cast("LevelName", level.name.lower()) for level in Level}
 
 
 def level_names(levels: Iterable[Level | None]) -> list[LevelName | None]:
-    """Return the names of quality levels in the API; None for None."""
+    """Return the API's names of quality levels; None, an unknown level, remains None."""
     return [None if level is None else LEVEL_NAMES[level] for level in levels]
 
 
@@ -307,7 +307,7 @@ def cell_model(cell: Cell, grid: CellGrid) -> CellModel:
 
 
 def bounds(number: int, width: float) -> tuple[float, float]:
-    """Return the bounds ``number * width`` and ``(number + 1) * width`` of a bin, to 9 decimals."""
+    """Return the bounds of a bin, ``number * width`` and the next, rounded to 9 decimals."""
     return round(number * width, 9), round((number + 1) * width, 9)
 
 

@@ -39,7 +39,7 @@ class AlarmCount:
 
 
 def count_of(alarms: Sequence[Alarm], is_judged: Callable[[Alarm], bool]) -> AlarmCount:
-    """Return the numbers of alarms by state; `is_judged` is whether a condition is known now."""
+    """Count alarms by state; `is_judged` returns whether the condition of an alarm is known now."""
     shown = [alarm for alarm in alarms if alarm.state not in HIDDEN]
     return AlarmCount(
         n_active=sum(alarm.level is not None for alarm in shown),
@@ -60,7 +60,7 @@ def is_shared(alarm: Alarm) -> bool:
 
 
 def reporting_unit(identity: AlarmIdentity) -> str:
-    """Return the unit whose process reports an alarm: for lost samples, the alarm's subject."""
+    """Return the unit whose process reports an alarm; for lost samples, the alarm's subject."""
     return identity.subject if identity.kind == SAMPLES_LOST else identity.unit
 
 
@@ -100,14 +100,14 @@ class LiveAlarms:
         return [alarm for shown in self._shown.values() for alarm, *_ in shown]
 
     def take(self, unit: str, state: UnitSnapshot) -> None:
-        """Apply the alarms of a reported unit state."""
+        """Update the alarms of a unit from its newest reported state."""
         self._judged[unit], self._chattering[unit] = state.judged, state.chattering
         # a process may still have alarms of units for which another process is now responsible
         self._keep(alarm for alarm in state.alarms if self._owner(alarm) == unit)
         self._show(unit)
 
     def take_stored(self, alarms: Iterable[Alarm]) -> None:
-        """Apply stored alarms that are at least as new as the alarms in memory."""
+        """Update the alarms from the database, except those that are newer in memory."""
         for unit in self._keep(alarms):
             self._show(unit)
 
@@ -134,7 +134,7 @@ class LiveAlarms:
 
     @property
     def alarms(self) -> Sequence[Alarm]:
-        """All alarms, in any state."""
+        """All alarms of the plant, active or not."""
         return [alarm for unit in list(self._alarms) for alarm in self._of(unit)]
 
     def alarm(self, id_: str) -> Alarm:
@@ -151,7 +151,7 @@ class LiveAlarms:
         return self._is_alive(unit) and alarm.identity.id in self._judged.get(unit, ())
 
     def is_chattering(self, alarm: Alarm) -> bool:
-        """Return whether an alarm is chattering according to the latest report."""
+        """Return whether an alarm is chattering (changes too often) by the latest report."""
         return alarm.identity.id in self._chattering.get(self._owner(alarm), ())
 
     def owner(self, id_: str) -> str:

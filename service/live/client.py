@@ -29,9 +29,9 @@ class LiveClient:
     Parameters
     ----------
     films
-        Store from which baselines in force are read.
+        Store from which the baselines in force are read.
     ask
-        Function that asks the measuring process, as in `LiveUnits`.
+        Function that asks the measuring process; None if it cannot be asked.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class LiveClient:
         return replace(self._plant, loops=dict.fromkeys(self._plant.loops, fault))
 
     async def take(self, report: Report, *, is_direct: bool = False) -> None:
-        """Apply a report; `is_direct` as in `LiveUnits.update`.
+        """Apply a report; `is_direct` means not by the database, so that its age is known.
 
         A baseline that has come into force and cannot be read is not shown; the next report with
         results of its unit tries again.
@@ -86,10 +86,10 @@ class SocketOperators(Operators):
     exchange: ServingEnd
 
     async def send(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
-        """Send a command and return its answer, as described in `Operators.send`."""
+        """Send a command; return its answer, or raise `CommandFailedError` without an answer."""
         try:
             answer: Answer = await self.exchange.ask(*encoded(command), actor, acting().peer)
         except MeasuringGoneError as error:
-            detail = f"unit {unit}: {error}; whether the command was carried out is not known"
+            detail = f"unit {unit}: {error}; check whether the command was carried out"
             raise CommandFailedError("No answer", detail) from error
         return answer

@@ -52,7 +52,7 @@ class Thaw:
 
 @dataclass(frozen=True)
 class Renew:
-    """Action that records a machine event at `from_ns`, ns UTC, and starts learning anew."""
+    """Action that starts learning anew after a machine event at `from_ns`, ns since 1970 UTC."""
 
     from_ns: int
 
@@ -69,7 +69,7 @@ def baseline_step(
     reason: str,
     now_ns: int,
 ) -> StoredStep:
-    """Return the entry of the baseline history to store for an action.
+    """Return the step of the baseline history that an action on a baseline adds.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def baseline_step(
     entries
         All baselines of the bearing.
     actor, reason
-        Author of the action and the stated reason, stored with the entry.
+        Author of the action and the reason given, stored with the step.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def baseline_step(
             if versions.is_frozen:
                 raise BaselineRefusedError(f"the baseline of {place.bearing} is already frozen")
             if version is None:
-                raise BaselineRefusedError(f"{place.bearing} has no baseline in force")
+                raise BaselineRefusedError(f"{place.bearing} has no baseline in force; accept one")
         case Thaw():
             step = BaselineStep.THAWED
             if not versions.is_frozen:
@@ -120,7 +120,7 @@ def _entry(version: int, entries: list[BaselineEntry]) -> BaselineEntry:
     for entry in entries:
         if entry.version == version:
             return entry
-    raise BaselineRefusedError(f"version {version} does not exist")
+    raise BaselineRefusedError(f"version {version} does not exist; choose a listed version")
 
 
 def _require_acceptable(
@@ -135,7 +135,9 @@ def _require_acceptable(
             f" the plant file selects {place.estimator}"
         )
     if versions.renewed_ns is not None and entry.learned_from_ns < versions.renewed_ns:
-        raise BaselineRefusedError(f"version {version} is older than the last machine event")
+        raise BaselineRefusedError(
+            f"version {version} is older than the last machine event; accept a later one"
+        )
 
 
 class UnreadableCommandError(Exception):
@@ -144,7 +146,7 @@ class UnreadableCommandError(Exception):
 
 @dataclass(frozen=True)
 class AlarmCommand:
-    """Command to apply an action to the alarm with an id."""
+    """Command to apply an operator's action to an alarm, given by its id."""
 
     alarm: str
     action: Action
@@ -152,7 +154,7 @@ class AlarmCommand:
 
 @dataclass(frozen=True)
 class BaselineCommand:
-    """Command to apply an action to the baselines of a bearing, with its author and reason.
+    """Command to apply an engineer's action to the baselines of a bearing, with author and reason.
 
     `actor` is the name that the audit trail and the history of baselines show.
     """
@@ -209,7 +211,7 @@ def encoded(command: OperatorCommand) -> tuple[str, str]:
 
 
 def decoded(kind: str, document: str) -> OperatorCommand:
-    """Return the command from kind and document, as returned by `encoded`.
+    """Decode a command from the kind and the document that `encoded` returned.
 
     Raises
     ------
@@ -223,7 +225,7 @@ def decoded(kind: str, document: str) -> OperatorCommand:
             " update all processes to one version"
         )
     if kind not in _KINDS:
-        raise UnreadableCommandError(f"unknown command {kind}")
+        raise UnreadableCommandError(f"unknown command {kind}; update all processes to one version")
     made, adapter = _KINDS[kind]
     try:
         return made(*adapter.validate_json(content))

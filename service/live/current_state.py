@@ -190,9 +190,9 @@ class LiveUnits:
     def past_revision(self, unit: str, end_ns: int) -> Hashable:
         """Return a value that changes with the stored results of a unit before a time.
 
-        Results are stored in order of time: what is older than the newest stored result changes
-        only by retention, which the hour of the request stands for. A process that takes over a
-        unit counts its writes from zero, and an ended process may have stored results without a
+        Results are stored in order of time: those older than the newest stored result change only
+        by retention, so the present hour is their revision. A process that takes over a unit
+        counts its writes from zero, and an ended process may have stored results without a
         report on them.
         """
         latest = self._latest[unit]
@@ -207,13 +207,13 @@ class LiveUnits:
         return None if sent_s is None else self._clock.monotonic_s() - sent_s
 
     def is_alive(self, unit: str) -> bool:
-        """Return whether a process has reported on the unit within `SILENT_AFTER_S`."""
+        """Return whether a process has reported on the unit in the last `SILENT_AFTER_S`, s."""
         silence_s = self.silence_s(unit)
         return silence_s is not None and silence_s <= SILENT_AFTER_S
 
     @property
     def store_error(self) -> str | None:
-        """Error of reading reports, or store error of a process that reports; None without one."""
+        """Error of reading reports, else store error of a reporting process; None without error."""
         errors = (self._latest[u].link.store_error for u in self._latest if self.is_alive(u))
         return self.read_error or next((error for error in errors if error), None)
 
@@ -364,7 +364,7 @@ class LiveFilms:
         return FilmPlace(unit, bearing, rules.estimators[bearing])
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
-        """Return the newest film reading of a bearing with its verdicts; None without one."""
+        """Return the newest film reading of a bearing with its verdicts; None before the first."""
         return self._newest.get((unit, bearing))
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
@@ -385,7 +385,7 @@ class LiveFilms:
         }
 
     def fetch(self, unit: str, state: UnitSnapshot) -> Mapping[str, BearingBaseline]:
-        """Return the baselines in force of a unit snapshot from the store, by bearing.
+        """Return the baselines in force of a unit snapshot from the store, by bearing id.
 
         Blocks while the store is read. Baselines that the store does not have are left out.
 
@@ -403,7 +403,7 @@ class LiveFilms:
     def take(
         self, unit: str, state: UnitSnapshot, fetched: Mapping[str, BearingBaseline] | None
     ) -> None:
-        """Apply a unit snapshot.
+        """Update the films of a unit from its snapshot.
 
         Parameters
         ----------

@@ -64,7 +64,7 @@ class Question:
 
 @dataclass(frozen=True)
 class Reply:
-    """Answer to the question `number`: a value, or None and the message of an error."""
+    """Answer to the question with a number: its value, or an error message and None as value."""
 
     number: int
     value: Any
@@ -206,12 +206,11 @@ class ServingEnd:
             future.set_exception(MeasuringGoneError(reply.error))
 
     async def ask(self, kind: str, document: str, actor: str = "", peer: str | None = None) -> Any:
-        """Return the answer of the measuring process to a question.
+        """Ask the measuring process, with `document` as arguments in JSON; return its answer.
 
-        Raises
-        ------
-        MeasuringGoneError
-            If the answer is an error, or does not arrive within `ANSWER_WITHIN_S`.
+        `actor` and `peer` are user and network address of the request; empty and None without.
+        Raises `MeasuringGoneError` if the answer is an error, or does not arrive within
+        `ANSWER_WITHIN_S` seconds.
         """
         self._n_asked += 1
         number = self._n_asked

@@ -53,7 +53,7 @@ UM_PER_M = 1e6
 def add_units(families: Families, newest: Newest, bearings: Bearings) -> None:
     """Add the metrics of all units to `families`.
 
-    They are the state of the link, age and quality of each result, and values that are not bad.
+    These are the state of the link, the age and quality of each result, and all usable values.
     """
     families.declare(UNITS)
     for unit, its in bearings.items():
@@ -141,7 +141,7 @@ ALARMS = {
 def add_alarms(
     families: Families, alarms: Iterable[Alarm], count: AlarmCount, units: Sequence[str]
 ) -> None:
-    """Add the numbers of alarms, as on the dashboard; alarms of unknown units count as `plant`."""
+    """Add the numbers of alarms by unit and level; alarms of unknown units count as `plant`."""
     families.declare(ALARMS)
     found = Counter(
         (alarm.identity.unit if alarm.identity.unit in units else PLANT, alarm.level)

@@ -48,7 +48,7 @@ class Operators(ABC):
         """
 
     async def operate(self, id_: str, action: Action) -> Alarm:
-        """Apply an operator's action to the alarm with an id; return the alarm as then stored.
+        """Apply an operator's action to the alarm with the id `id_`; return the stored alarm.
 
         Raises
         ------
@@ -101,7 +101,7 @@ class Operators(ABC):
         return (await asyncio.to_thread(history, command.unit, command.bearing))[0]
 
     async def add_note(self, note: Note) -> None:
-        """Store a note; raises `CommandFailedError` if it was not stored."""
+        """Store an operator's note; raise `CommandFailedError` if it was not stored."""
         await self._carried_out(note.unit, note, note.author)
 
     async def _carried_out(self, unit: str, command: OperatorCommand, actor: str) -> Answer:

@@ -26,11 +26,11 @@ class SenderStatus:
     n_failures
         Number of failed attempts since the last delivery.
     failing_since_ns
-        Time of the first of these failures, in ns since 1970 UTC; None without failures.
+        Time of the first failure since the last delivery, ns since 1970 UTC; None without.
     reason
-        Reason of the newest failure.
+        Reason of the newest failure; None without failures.
     next_attempt_ns
-        Time of the next attempt, in ns since 1970 UTC; None outside a retry delay.
+        Time of the next attempt, ns since 1970 UTC; None outside a retry delay.
     """
 
     state: SenderState = SenderState.IDLE
@@ -57,7 +57,7 @@ class ReceiverView:
     Parameters
     ----------
     receiver
-        None for a receiver that was removed from the plant file, whose messages remain queued.
+        Receiver in the plant file; None if it was removed, but has messages in the outbox.
     backlog
         Counts of the outbox messages of the receiver; None without messages.
     """

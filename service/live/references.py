@@ -51,7 +51,7 @@ class ReferencesInForce:
     units
         Descriptions of the units, with the gap references of the plant file.
     on_change
-        Function that receives the description of a unit with a new gap reference in force.
+        Function that receives the description of a unit whose gap reference has changed.
     """
 
     def __init__(
@@ -83,14 +83,14 @@ class ReferencesInForce:
         return described if reference is None else with_reference(described, reference)
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Read the stored references periodically until cancelled."""
+        """Read the stored references periodically, until cancelled; `pulse` gets heartbeats."""
         while True:
             pulse.beat(LOOK_EVERY_S)
             await self._clock.sleep(LOOK_EVERY_S)
             await self.look()
 
     async def look(self) -> None:
-        """Read the stored references once; after an error, references in force are unchanged."""
+        """Read the stored references once; an error leaves the references in force unchanged."""
         try:
             found = await asyncio.to_thread(self._store.gap_references.in_force)
         except StoreError as error:

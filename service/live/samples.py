@@ -18,7 +18,7 @@ class BlockHistory:
     Parameters
     ----------
     n_samples
-        Smallest number of samples per channel to hold, once received.
+        Minimum number of newest samples per channel to keep.
     """
 
     def __init__(self, n_samples: int) -> None:

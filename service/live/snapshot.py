@@ -275,7 +275,7 @@ def snapshot_document(snapshot: UnitSnapshot) -> bytes:
 
 
 def snapshot_of_document(document: bytes) -> UnitSnapshot:
-    """Return the snapshot from a document of `snapshot_document`.
+    """Return the snapshot in a document that `snapshot_document` returned.
 
     Raises
     ------

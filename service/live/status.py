@@ -93,7 +93,8 @@ class CurrentBearing:
     age_s
         Age of the newest result in seconds; None before the first result.
     received_ns
-        Arrival time of the samples of the newest result, as `UnitStatus.received_ns`.
+        Arrival time of the samples of the newest result by the clock of the serving host, ns since
+        1970 UTC; None if unknown.
     """
 
     assessment: Assessment | None
@@ -129,7 +130,7 @@ def current_bearing(
     why_not: Reason | None,
     received_ns: int | None = None,
 ) -> CurrentBearing:
-    """Return the newest result of a bearing; readings are missing if there is a `why_not`."""
+    """Return the newest result of a bearing; all readings are missing for the reason `why_not`."""
     if assessment is None or why_not is not None:
         nothing = missing(why_not or Reason.WAITING_FOR_DATA)
         readings = {quantity.name: nothing for quantity in CATALOGUE}

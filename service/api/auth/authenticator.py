@@ -32,7 +32,7 @@ class Credentials:
     Parameters
     ----------
     means
-        Session or API key; None without credentials.
+        Kind of credentials, session or API key; None without credentials.
     secret
         Session token or API key; empty if it is ambiguous, as with two cookies.
     """
@@ -203,9 +203,9 @@ class Authenticator:
             self._cache = {}
 
     async def offer_set_up(self) -> str | None:
-        """Return a new token for creating the first account, which invalidates earlier tokens.
+        """Return a new token for creating the first account; earlier tokens become invalid.
 
-        None if an account exists, or if callers on this computer are administrators.
+        Return None if an account exists, or if callers on this computer are administrators.
         """
         if self.local_role is Role.ADMIN:
             return None
@@ -217,7 +217,7 @@ class Authenticator:
         return bool(await self.work.run(self.store.accounts.all))
 
     async def close(self) -> None:
-        """Record the number of refusals without an audit entry, and shut down the threads."""
+        """Record the number of refused requests without an audit entry; shut down the threads."""
         await self.refusals.close()
         self.work.close()
 

@@ -100,7 +100,7 @@ class Backoff:
 
 
 class FailureCounts:
-    """Numbers of failures by account or by address; the least recently changed is evicted first."""
+    """Numbers of failed logins by account or address; the least recently changed is dropped."""
 
     def __init__(self, rule: WaitRule, max_remembered: int) -> None:
         self._rule, self._max_remembered = rule, max_remembered

@@ -47,7 +47,7 @@ class Needs:
 
 
 def needs(permission: Permission, reach: Reach = Reach.PLANT) -> Any:
-    """Return a FastAPI dependency that declares the requirements of a route or a whole router."""
+    """Return a FastAPI dependency that declares the requirements of a route or router."""
     return Depends(Needs(permission, reach))
 
 
@@ -58,7 +58,7 @@ OPEN: Any = Depends(Needs(None, Reach.NO_UNIT))
 def subject_router(
     path: str, tag: str, permission: Permission = Permission.READ, reach: Reach = Reach.PLANT
 ) -> APIRouter:
-    """Return a router for paths below ``/api/v1`` with a permission, which routes may override."""
+    """Return a router for paths below ``/api/v1`` that require a permission by default."""
     return APIRouter(prefix=f"/api/v1{path}", tags=[tag], dependencies=[needs(permission, reach)])
 
 
@@ -68,7 +68,7 @@ class UndeclaredRouteError(Exception):
 
 @dataclass(frozen=True)
 class Declared:
-    """Operation of the API: HTTP method, path template, route and requirements."""
+    """Operation of the API: HTTP method, path template, route and required permission."""
 
     method: str
     path: str
@@ -87,7 +87,7 @@ class Declared:
 
     @cached_property
     def query_parameters(self) -> Sequence[str]:
-        """Names of the query parameters, also of dependencies; empty without an `APIRoute`."""
+        """Names of the query parameters of the operation, including those of its dependencies."""
         if not isinstance(self.route, APIRoute):
             return ()
         return tuple(dict.fromkeys(_query_names(self.route.dependant)))

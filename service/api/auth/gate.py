@@ -192,12 +192,12 @@ def _unit_of(parameters: Mapping[str, str]) -> str | None:
 
 
 def actor_or(given: str | None) -> str:
-    """Return the name of the actor: authenticated name, else the name `given`, else `LOCAL`."""
+    """Return the name of the actor: the authenticated name, else `given`, else `LOCAL`."""
     return acting().actor or given or LOCAL
 
 
 async def name_caller(request: Request) -> None:
-    """Record the caller as the actor of the following audit entries, also without a login.
+    """Set the caller as the actor of the audit entries of this request, also without a login.
 
     This is a coroutine, since FastAPI runs plain functions in threads with separate contexts.
     """

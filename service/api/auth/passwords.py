@@ -148,7 +148,7 @@ class AccessThreads:
         Parameters
         ----------
         is_known
-            Whether the account has logged in from the same address, and may use further places.
+            Whether the account has logged in from this address; it then has more queue places.
 
         Raises
         ------

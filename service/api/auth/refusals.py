@@ -28,9 +28,9 @@ SECONDS_EACH = 30.0
 
 
 class Refusals:
-    """Writer of audit entries for refused requests; above a rate limit, refusals are only counted.
+    """Writer of audit entries for refused requests; above a rate limit, requests are only counted.
 
-    `n_more` is the number of refusals since the newest entry that have no entry of their own.
+    `n_more` is the number of refused requests since the newest entry, which have no entry.
     """
 
     def __init__(self, audit: AuditStore, clock: Clock) -> None:
@@ -48,7 +48,7 @@ class Refusals:
         operation
             Method and path of the request.
         reason, status
-            Detail and HTTP status of the answer.
+            Reason in the answer, and its HTTP status.
         """
         if not self._allowance.take(self._clock.monotonic_s()):
             self.n_more += 1
@@ -61,7 +61,7 @@ class Refusals:
             self.n_more += n_before + 1
 
     async def close(self) -> None:
-        """Record the number of refused requests without an entry, if any; log a StoreError."""
+        """Record the number of refused requests without an entry, if any; log a store error."""
         if self.n_more:
             now_ns, after = self._clock.now_ns(), {"n_refused_more": self.n_more}
             await self._record(AuditAction(now_ns, "padwatch", REQUEST_REFUSED, "", after=after))

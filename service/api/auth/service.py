@@ -110,7 +110,7 @@ class AccessService:
         Parameters
         ----------
         now_ns
-            Time of the logout, which is recorded; None for a session that a login replaces.
+            Time of the logout for the audit trail, ns since 1970 UTC; None records no logout.
         """
         if is_token(token):
             self.store.sessions.end(digest(token), now_ns)
@@ -127,7 +127,7 @@ class AccessService:
         password, new
             Current and new password.
         peer, now_ns, ticks_ns
-            As in `log_in`.
+            Address of the client, host time (ns since 1970 UTC), and monotonic time (ns).
 
         Raises
         ------
@@ -161,7 +161,7 @@ class AccessService:
     def machine(self, key: str, now_ns: int) -> Identity | None:
         """Return the identity of a machine by API key, and store the time of use.
 
-        None if the key is unknown, expired or revoked.
+        Return None if the key is unknown, expired or revoked.
         """
         id_ = key_id(key)
         stored = None if id_ is None else self.store.keys.get(id_)

@@ -150,7 +150,7 @@ class CheckedRequests:
         name = found[1].strip("[]").rstrip(".").lower() if found else ""
         address, _ = scope.get("server") or ("", None)
         if not name or (name not in self._hosts and name != address.removeprefix("::ffff:")):
-            detail = "the requested host is not a name of this service"
+            detail = "the requested host is not a name of this service; add it to service.hosts"
             raise ProblemError(421, "Wrong host", detail)
 
 

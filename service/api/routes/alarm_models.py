@@ -314,7 +314,7 @@ def is_raised_within(
     states: Sequence[OperatingStateName] | None,
     ranges: Mapping[str, ValueRange],
 ) -> bool:
-    """Return whether an alarm was raised in one of the states, and within ranges by quantity."""
+    """Return whether an alarm was raised in one of `states` (None: any) and within all `ranges`."""
     at = alarm.raised_at
     return (not states or (at is not None and at.operating_state in states)) and all(
         wanted == ValueRange() or (at is not None and wanted.includes(getattr(at, name)))

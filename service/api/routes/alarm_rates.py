@@ -108,7 +108,7 @@ def counted(
     Parameters
     ----------
     wanted
-        Query with unit, start and end.
+        Query with unit, start and end of the events.
     units
         Identifiers of the units to report, also of units without events.
     rule

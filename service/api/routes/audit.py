@@ -123,7 +123,7 @@ def read_page(
     query
         Query for the entries of each chain; its limit is that of the page.
     before
-        Number of each chain above which its entries were on earlier pages.
+        Entry number by chain; the page has only entries with smaller numbers.
     """
     found = {}
     for name, audit in chains.items():
@@ -199,7 +199,7 @@ async def audit_query(
 
 
 def numbers_of(cursor: str | None) -> dict[str, int]:
-    """Return the numbers in a cursor, by name of the chain; empty for None, the first page."""
+    """Return the entry numbers in a cursor by chain; empty for None, which is the first page."""
     pairs = (each.partition(":") for each in cursor.split(",")) if cursor else ()
     return {name: int(number) for name, _, number in pairs}
 

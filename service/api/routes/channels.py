@@ -221,7 +221,7 @@ async def channels_model(live: LiveUnits, settings: UnitSettings) -> ChannelsMod
 
 
 def rows_of(settings: UnitSettings, channel: str) -> list[int]:
-    """Return the rows of a channel in the sample arrays of a block.
+    """Return the indices of the rows of a channel in the sample arrays of a block.
 
     A device that sends amplitudes in place of samples has several rows per channel.
     """
@@ -375,9 +375,9 @@ def require_samples(settings: UnitSettings) -> None:
 
 
 async def held_blocks(live: LiveUnits, unit: str) -> tuple[Sequence[SampleBlock], int]:
-    """Return the buffered blocks of a unit, oldest first, and the arrival time of the newest, ns.
+    """Return the newest blocks of a unit, oldest first, and the arrival time of the newest.
 
-    Raises a problem of status 409 without a block.
+    The time is in ns since 1970 UTC. Raises a problem of status 409 before the first block.
     """
     blocks, received_ns = await live.blocks(unit), live.status(unit).received_ns
     if not blocks or received_ns is None:

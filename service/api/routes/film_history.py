@@ -145,7 +145,7 @@ Rows = npt.NDArray[np.int64]
 
 
 def rows_shown(n_found: int, max_points: int, is_thinned: bool) -> Rows:
-    """Return the numbers of at most `max_points` of `n_found` rows, ascending, with the newest row.
+    """Return the indices of at most `max_points` of `n_found` rows, ascending, with the newest row.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def film_readings_model(query: FilmQuery, found: FilmHistory, rows: Rows) -> Fil
     Parameters
     ----------
     rows
-        Numbers of the selected rows of the history, ascending; may be empty.
+        Indices of the selected rows of the history, ascending; may be empty.
     """
     history, first = found.history, int(rows[0]) if rows.size else 0
     x, y = (_series(found, direction, rows) for direction in range(2))
@@ -251,7 +251,7 @@ def film_table(model: FilmReadingsModel, found: FilmHistory, rows: list[int]) ->
     model
         API model of the readings.
     found, rows
-        History of the film, and the numbers of its rows that the model contains.
+        History of the film, and the indices of its rows that the model contains.
     """
     times = found.history.time_ns[rows].tolist()
     return [

@@ -40,7 +40,7 @@ LevelHeldName = Literal["alert", "danger"]
 
 
 class FilmChangeModel(ApiModel):
-    """Mean deviation from the baseline, at its most significant averaging time."""
+    """Mean deviation from the baseline over the averaging time at which it is most significant."""
 
     percent: Annotated[float, Field(examples=[-19.2])]
     """Mean change, % of the expected value; negative if softer. The alarm limits apply to it.
@@ -123,7 +123,7 @@ class FilmStiffnessModel(ApiModel):
 
 
 class FilmQuantityModel(FilmVerdictModel):
-    """Decision on a quantity of an oil film in one direction, x or y."""
+    """Verdict on a quantity of an oil film in one direction, x or y, with its change."""
 
     reason: Annotated[str, Field(examples=["condition_not_learned"])]
     """Reason why the film is not judged; "ok" if it is judged."""
@@ -157,7 +157,7 @@ class FilmDirectionModel(FilmQuantityModel, FilmStiffnessModel):
 
 
 class FilmLimitsModel(ApiModel):
-    """Alarm limits for a mean change, as increase and as decrease."""
+    """Alarm limits of the mean change of a film, separately for an increase and a decrease."""
 
     alert_percent: Annotated[float, Field(examples=[3.5])]
     """Limit for an alert, % of the expected value."""

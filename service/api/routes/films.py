@@ -55,7 +55,7 @@ class WatchedFilm:
     news
         Newest reading with its findings; None without a reading since the service started.
     baseline
-        Baseline in force; None without such a baseline.
+        Baseline in force; None if no baseline is in force.
     why_not_current
         Reason why the newest reading is not current; None if it is current.
     """

@@ -93,7 +93,7 @@ class CapturesModel(ApiModel):
 
 
 class TileModel(ResultModel):
-    """Newest result of a bearing as shown on a tile: some readings, in six digits, and the film.
+    """Newest result of a bearing as shown on a tile: main readings, with six digits, and the film.
 
     Only the readings of the preferred stiffness have an uncertainty.
     """

@@ -109,7 +109,7 @@ class SpectrumChannelModel(ApiModel):
 
 
 class FullSpectrumModel(ApiModel):
-    """Full spectrum of a pair of channels: the two circles whose sum is the path at a frequency."""
+    """Full spectrum of a pair of channels: forward and backward amplitude at each frequency."""
 
     unit: Literal["um_pk"]
     """Unit of the amplitudes: µm of displacement, radius of the circle."""
@@ -188,7 +188,7 @@ def _full(spectrum: CrossSpectrum, x: int, y: int, sense: int) -> FullSpectrumMo
 
 
 def spectrum_model(assessment: Assessment, rotation_sense: int) -> SpectrumModel:
-    """Return the API model of the averaged spectra of a result; +1 is rotation from x to y."""
+    """Return the API model of the spectra of a result; sense +1 is rotation from x to y."""
     spectrum, readings = assessment.spectrum, assessment.readings
     return SpectrumModel.of(
         time=assessment.time_ns,
@@ -282,7 +282,7 @@ async def newest_answer(
     bearing: str,
     make: Callable[[Assessment], ApiModel | None],
 ) -> Response:
-    """Return the answer that `make` builds from the newest result; a problem (409) for None."""
+    """Return the answer that `make` builds from the newest result, or raise a problem (409)."""
     context.bearing(unit, bearing)
 
     async def answer() -> ApiModel:
