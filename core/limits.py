@@ -124,13 +124,16 @@ class Limits:
         return too_high or (low is not None and value < low + deadband)
 
     def is_low(self, value: float) -> bool:
-        """Whether a value is nearer to the lower limits; always true without upper limits."""
+        """Whether a value is nearer to the lower than to the upper limits.
+
+        Without upper limits it is always true, without lower limits always false.
+        """
         if self._highest_low is None or self._lowest_high is None:
             return self._highest_low is not None
         return value < (self._highest_low + self._lowest_high) / 2.0
 
     def of(self, level: AlarmLevel | None, value: float = math.inf) -> float | None:
-        """Return the limit of a level, the lower one if `value` is low; None if it is unused.
+        """Return the limit of a level, the lower one if `is_low(value)`; None if it is unused.
 
         For the level None, return the alert limit or, if that is unused, the danger limit.
         """
@@ -172,7 +175,7 @@ ZONES = {AlarmLevel.ALERT: "zone_c", AlarmLevel.DANGER: "zone_d"}
 
 @dataclass(frozen=True)
 class ZoneLimits(Limits):
-    """Vibration zones as limits: C is alert, D is danger. Zone B begins above `zone_b`."""
+    """Limits of vibration zones: alert in zone C, danger in zone D; zone B is above `zone_b`."""
 
     zone_b: float = 0.0
 

@@ -155,7 +155,7 @@ def _quantile(freedoms: float, probability: float) -> float:
 
 
 def proportional(value: float, budget: Budget) -> Budget:
-    """Return the budget of a value proportional to the result of `budget`, which is not 0."""
+    """Return the budget of a value proportional to the non-zero result of `budget`."""
     factor = value / budget.value
     lines = (line._replace(sensitivity=factor * line.sensitivity) for line in budget.lines)
     return Budget(value, tuple(lines))

@@ -120,8 +120,7 @@ class FrameReader:
     async def next_batch(self, timeout_s: float) -> Batch | None:
         """Return the next batch of frames; None if no frames arrive before the timeout.
 
-        Raises LinkError if the bus is lost. Any other error that ended the thread is raised as it
-        is.
+        Raises LinkError if the bus is lost. Any other error that ended the thread is raised again.
         """
         with suppress(TimeoutError):
             async with asyncio.timeout(timeout_s):

@@ -29,9 +29,10 @@ precision, so a recording replayed over any protocol gives equal values."""
 class BlockJoiner:
     """Joiner of sample blocks, with cells that start at multiples of the cell length.
 
-    The cells do not depend on the block lengths of the protocol. A cell is shorter only where
-    samples are missing or the device restarted. A channel of a cell is OK if it is OK in all parts;
-    the slow values are those at the first sample.
+    The samples of a cell share one OK state per channel and one set of slow values. The cells do
+    not depend on the block lengths of the protocol. A cell is shorter only where samples are
+    missing or the device restarted. A channel of a cell is OK if it is OK in all parts; the slow
+    values are those at the first sample.
 
     Parameters
     ----------
@@ -137,7 +138,10 @@ class StampCheck:
         self.n_faults = 0
 
     def check(self, block: SampleBlock) -> tuple[SideValues, StampFault | None]:
-        """Return the side values with corrected stamps, and the fault of the first wrong stamp."""
+        """Return side values with corrected stamps, and the fault of the first wrong stamp or None.
+
+        A wrong stamp is replaced by the time that follows from the sample index.
+        """
         side, index = block.side, block.first_index + block.side.starts
         if block.epoch != self._epoch:  # the first stamp of an epoch has nothing to disagree with
             self._epoch, self._rate_hz = block.epoch, block.rate_hz

@@ -137,7 +137,7 @@ class Alarm:
 
     @property
     def state(self) -> AlarmState:
-        """Life-cycle state; out of service, then shelved, then suppressed take precedence."""
+        """Life-cycle state; for a hidden alarm, out of service before shelved before suppressed."""
         if self.outage is not None:
             return AlarmState.OUT_OF_SERVICE
         if self.shelf is not None:
@@ -151,7 +151,7 @@ class Alarm:
 
     @cached_property
     def is_settled_inactive(self) -> bool:
-        """Whether the alarm is inactive, and a further judgement within limits changes nothing."""
+        """Whether the alarm is inactive and a judgement within limits would not change it."""
         return (
             self.level is None
             and self.condition.is_known

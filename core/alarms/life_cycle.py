@@ -81,7 +81,7 @@ def interrupted(alarm: Alarm) -> Alarm:
 
 
 def shown_again(alarm: Alarm) -> Alarm:
-    """Return an alarm that is no longer hidden: unacknowledged if active (ISA-18.2, G/H/I to B)."""
+    """Return an alarm that is no longer hidden; if active, it is unacknowledged (state B)."""
     return replace(alarm, is_acknowledged=alarm.is_acknowledged and alarm.level is None)
 
 

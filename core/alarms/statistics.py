@@ -66,7 +66,10 @@ HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 
 @dataclass(frozen=True)
 class Frequent:
-    """Frequent alarm: its id, number of announcements, and fraction of all announcements."""
+    """Frequent alarm: its id, how often it was announced, and its share of all announcements.
+
+    An alarm is announced if it is raised or escalated, or is active when no longer hidden.
+    """
 
     alarm: str
     n_alarms: int

@@ -35,8 +35,8 @@ class OperatingLimits:
     oil_band_c
         Width of the temperature band in which the oil must stay to count as settled after a start.
     oil_settling_s
-        Time at speed within the band. Clearances close for hours after a start, later than the oil
-        warms up (Brito et al., Tables 8 and 9), and film stiffness is not comparable until then.
+        Time at speed with the oil within the band, after which it counts as settled. Clearances
+        close for hours after a start, longer than the oil warms up (Brito et al., Tables 8 and 9).
         With time constants of 1.2 h (clearance) and 0.8 h (oil), 1.7 % of the closing remains after
         a cold start, and less after a short stop.
     warm_up_s

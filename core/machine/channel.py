@@ -95,7 +95,7 @@ class Channel:
 
 
 def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexArray:
-    """Return the factors from phasors in the channel's unit to displacement in µm, (n_lines,).
+    """Return factors (n_lines,) that convert phasors in the channel's unit to µm displacement.
 
     The frequencies (n_lines,) are positive. Velocity is integrated once, acceleration twice; the
     transducer's response and the channel's delay are compensated. Key-phase channels give zero.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SlowQuantity:
-    """Kind of a slow quantity.
+    """Kind of slow quantity, such as pad temperature, with its names and units.
 
     Parameters
     ----------

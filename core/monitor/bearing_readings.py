@@ -51,7 +51,8 @@ from core.uncertainty import Budget, Budgeted, Found, with_budgets
 class BearingReadings:
     """Readings of one bearing, averaged over segments or polls.
 
-    Readings and budgets are by quantity; `estimators` are those of `stiffness`, by axes "xx", "yy".
+    Readings and budgets are by quantity. `estimators` are those from which `stiffness` was taken,
+    by axes "xx" and "yy"; None without a value.
     """
 
     readings: Mapping[str, Reading]

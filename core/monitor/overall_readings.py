@@ -34,9 +34,9 @@ def overall_readings(
 ) -> Found:
     """Return the broad-band vibration, averaged over at least one segment, and its budgets.
 
-    Peak-to-peak values and farthest excursions are averaged linearly, velocities as squares; all
-    are missing for polls. `rows` are the rows of the bearing's four channels, `number` is the
-    bearing's index in the unit.
+    Peak-to-peak and maximum displacements are averaged linearly, rms velocities as squares; polls
+    have none of them. `rows` are the rows of the bearing's four channels, `number` is the bearing's
+    index in the unit.
     """
     if segments[-1].overall is None:
         return dict.fromkeys(OVERALL_NAMES, missing(Reason.NOT_MEASURED)), {}

@@ -93,10 +93,9 @@ class SlowCalibration:
 class UnitCalibration:
     """Calibration of one unit's device, with the channels in the order of the device.
 
-    `rate_hz` is the sampling rate of the waveform channels, per channel.
-    A cell has `block_samples` samples, which share one OK state per channel and one set of slow
-    values. Cells begin at multiples of this number, so that quality does not depend on the
-    boundaries of the messages of the device.
+    `rate_hz` is the sampling rate of each waveform channel. Samples are divided into cells of
+    `block_samples` samples, which share one OK state per channel and one set of slow values. Cells
+    begin at multiples of this number, so that they do not depend on the messages of the device.
     """
 
     unit: str

@@ -44,7 +44,7 @@ class Overall:
         displacement.
     orbit_um_pk : (n_bearings,)
         Largest displacement of each shaft from its mean position, S_max of ISO 20816-1, annex B;
-        NaN unless both directions are displacements.
+        NaN unless displacement is measured in both directions.
     velocity_mm_s_rms : (n_channels,)
         Velocity in the band of `SegmentSettings`, with the transducer's response compensated; zero
         for a key-phase.

@@ -61,14 +61,14 @@ class Resolution:
         self._pairs = [(rows, matrix) for rows, matrix in found if matrix is not None]
 
     def phasors(self, phasors: ComplexArray) -> ComplexArray:
-        """Return displacement phasors (n_channels, …) along x and y."""
+        """Return displacement phasors (n_channels, …), resolved along x and y."""
         resolved = phasors.copy() if self._pairs else phasors
         for rows, matrix in self._pairs:
             resolved[rows] = np.tensordot(matrix, phasors[rows], axes=1)
         return resolved
 
     def floors(self, floors: FloatArray) -> FloatArray:
-        """Return independent noise amplitudes (n_channels,) along x and y."""
+        """Return amplitudes of independent noise (n_channels,), resolved along x and y."""
         resolved = floors.copy()
         for rows, matrix in self._pairs:
             resolved[rows] = np.sqrt(matrix**2 @ floors[rows] ** 2)

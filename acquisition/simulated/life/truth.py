@@ -142,7 +142,7 @@ def _is_out_of_order(random: np.random.Generator, n: int, step_s: float) -> npt.
 
 @dataclass(frozen=True, eq=False)
 class BearingMoments:
-    """True state of one bearing at each row.
+    """True state of one bearing at n times.
 
     Parameters
     ----------

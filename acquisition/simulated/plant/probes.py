@@ -21,7 +21,10 @@ from core.machine.unit import Unit
 
 
 def along(channel: Channel, axis: int) -> FloatArray:
-    """Return the weights (2,) of x and y in a channel; without an angle, it is along `axis`."""
+    """Return the weights (2,) of x and y in the reading of a channel.
+
+    A channel without an angle measures along `axis`, 0 for x or 1 for y.
+    """
     if channel.angle_deg is None:
         return np.array([1.0 - axis, axis])
     theta = np.deg2rad(channel.angle_deg)

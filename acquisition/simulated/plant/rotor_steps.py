@@ -97,9 +97,9 @@ class LiftedRotor:
     Parameters
     ----------
     transition
-        (n_states, n_states) over the whole block.
+        (n_states, n_states) map from the state before the block to the state after it.
     input_map
-        (n_states, n_forces * n_steps); time is the fastest index.
+        (n_states, n_forces * n_steps) map from forces to the state; time is the fastest index.
     output_map, feedthrough
         (n_outputs * n_steps, n_states) and (n_outputs * n_steps, n_forces * n_steps); time is the
         fastest index. `feedthrough` maps the forces of the block to the outputs of the block.
