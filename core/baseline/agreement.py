@@ -14,7 +14,7 @@ from core.baseline.history import QUANTITIES, StiffnessHistory
 
 
 def mean_difference(first: BearingBaseline, second: BearingBaseline) -> dict[str, float]:
-    """Return the mean difference of ln of each quantity, second minus first baseline.
+    """Return the mean difference of ln of the learned values, second minus first, by quantity.
 
     The mean is over cells with `Support.OWN` in both, weighted by the number of readings in the
     first. A quantity without such cells, or with different grids, is omitted.
@@ -50,7 +50,7 @@ OUTLIER_STDS = 4.0
 
 @dataclass(frozen=True)
 class Drift:
-    """Change of ln of a quantity over the whole learning period, with its standard uncertainty."""
+    """Change of ln of a quantity during its learning period, with its standard uncertainty."""
 
     change: float
     std: float
@@ -77,9 +77,10 @@ def learning_drift(
 def drift_within(
     day: npt.NDArray[np.int64], value: FloatArray, cell: npt.NDArray[np.int64]
 ) -> Drift | None:
-    """Return the drift of n ≥ 1 values over their days, compared within each cell; all are (n,).
+    """Return the drift of values (n,), n ≥ 1, whose `day` and condition cell are given, (n,).
 
-    None if fewer than `MIN_SPELLS` time blocks contain values that can be compared.
+    Values are compared within each cell. None if fewer than `MIN_SPELLS` time blocks contain values
+    that can be compared.
     """
     since = (day - day.min()) / max(int(np.ptp(day)), 1)
     time, value = _within(since, cell), _within(value, cell)

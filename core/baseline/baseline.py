@@ -67,7 +67,7 @@ class Deviations:
     is_known : (n,)
         Whether all conditions that the baseline depends on are known.
     place : (n,)
-        Row of the reading's cell in the table; -1 if the reading cannot be compared.
+        Index of the reading's cell in the cell table; -1 if the reading cannot be compared.
     deviation : (n,)
         ln of the measured stiffness over the learned stiffness; invalid where `place` is -1.
     weight : (n,)
@@ -134,7 +134,8 @@ class QuantityBaseline:
 
     def __post_init__(self) -> None:
         if self.quantity not in QUANTITIES:
-            raise ValueError(f"quantity must be of {', '.join(QUANTITIES)}, got {self.quantity}")
+            known = ", ".join(QUANTITIES)
+            raise ValueError(f"quantity must be one of {known}, got {self.quantity}")
         if not (self.scatter > 0.0 and self.u_random >= 0.0 and self.reading_h > 0.0):
             raise ValueError(
                 "scatter and reading_h must be above 0 and u_random not below 0, got"
@@ -181,7 +182,7 @@ class QuantityBaseline:
         return found
 
     def compare_history(self, history: StiffnessHistory) -> Deviations:
-        """Return the deviations of a history's readings of the quantity of this baseline."""
+        """Return the deviations from this baseline of all readings of its quantity in a history."""
         value, u_random, _ = history.of(self.quantity)
         return self.compare(history.conditions, value, u_random)
 

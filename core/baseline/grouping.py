@@ -60,7 +60,7 @@ def group_readings(
 
 
 def group_medians(x: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
-    """Return the median of x (n,) in each group; `group` (n,) numbers them from 0 without gaps."""
+    """Return the median of x (n,) in each group, (n_groups,); `group` (n,) is the group index."""
     x = x[np.lexsort((x, group))]
     count = np.bincount(group)
     start = np.cumsum(count) - count
@@ -96,9 +96,10 @@ def bisquare(standardised: FloatArray) -> FloatArray:
 
 
 def absolute_quantile_std(deviation: FloatArray) -> float:
-    """Return the standard deviation from the 50 % or the 75 % quantile of absolute deviations (n,).
+    """Return a standard deviation estimated from quantiles of absolute deviations (n,).
 
-    Both are scaled for a normal distribution, and the larger is returned; 0 if empty.
+    It is the larger of the estimates from the 50 % and 75 % quantiles, scaled for a normal
+    distribution; 0 if empty.
     """
     if deviation.size == 0:
         return 0.0
@@ -128,7 +129,7 @@ def ewma_weight(time_scale_h: float, reading_h: float) -> float:
 def ewma(x: FloatArray, alpha: float) -> FloatArray:
     """Return the moving averages y[i] = (1 - α) y[i-1] + α x[i] of x (n,), starting from y = 0.
 
-    Each is a weighted sum; divided by the same sum of ones, it is an exponentially weighted mean.
+    Divided by the moving average of ones, it is an exponentially weighted mean.
     """
     from scipy.signal import lfilter  # slow import, not needed at start-up
 

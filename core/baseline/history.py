@@ -22,8 +22,8 @@ DIRECTIONS = ("x", "y")
 class FilmQuantity:
     """Quantity of a film in one direction that is learned and judged.
 
-    `value` and `uncertainty` are the columns of `StiffnessHistory` with its natural logarithm and
-    the relative random standard uncertainty.
+    `value` and `uncertainty` name the columns of `StiffnessHistory` that contain the natural
+    logarithm of the quantity and its random standard uncertainty.
     """
 
     name: str
@@ -33,7 +33,7 @@ class FilmQuantity:
 
     @property
     def label(self) -> str:
-        """Words for the quantity: its direction, with "c/k" if it is not the stiffness."""
+        """Displayed name of the quantity: its direction, and "c/k" for damping over stiffness."""
         return self.direction if self.value == "ln_k" else f"c/k {self.direction}"
 
     @property
@@ -58,12 +58,12 @@ have 1e7 N/m and more, and films are less than a hundred times softer or stiffer
 
 
 def are_ratios(ln_k: FloatArray | float) -> npt.NDArray[np.bool_]:
-    """Return where values of `StiffnessHistory.ln_k` are of ratios to the bracket stiffness."""
+    """Return whether each value of ln k is of a ratio to the bracket stiffness, not of N/m."""
     return np.asarray(np.asarray(ln_k) < MIN_LN_K)
 
 
 def absolute_and_ratio(values: FloatArray, ln_k: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return values, with NaN where `ln_k` is of a ratio and where it is of a stiffness in N/m."""
+    """Return values of stiffness in N/m, and values of ratios to k_b, by `ln_k`; NaN elsewhere."""
     are = are_ratios(ln_k)
     return np.where(are, np.nan, values), np.where(are, values, np.nan)
 

@@ -28,10 +28,10 @@ def held_out_deviations(
     table: CellTable,
     settings: BaselineSettings,
 ) -> FloatArray:
-    """Return the deviation of each `value` (ln k) from a surface fitted without its fold (n,).
+    """Return the cross-validated deviation of each `value`, ln k, from the surface, (n,).
 
-    A fold of this cross-validation consists of blocks of consecutive days. NaN for readings in
-    cells without support or with too few days in other folds.
+    The surface is fitted without the fold of the reading, which consists of blocks of consecutive
+    days. NaN in cells that have no support, or too few days in other folds.
     """
     n_days = np.unique(groups.day).size
     spell_days = int(np.clip(n_days // (2 * FOLDS), 1, LONGEST_SPELL_DAYS))
@@ -81,10 +81,7 @@ def learn(
     Only the readings selected by `is_settled` (n,) are used. A quantity whose readings cover fewer
     than `min_learning_days` gets no baseline.
 
-    Raises
-    ------
-    ValueError
-        If the history is empty.
+    Raises ValueError if the history is empty.
     """
     if not len(history):
         raise ValueError("the history is empty; a baseline needs readings to learn from")

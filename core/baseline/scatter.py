@@ -41,7 +41,7 @@ def with_scatter(
     slope : (n_cells,)
         Slope of the surface with eccentricity, at the median condition of each cell.
     place : (n,)
-        Table row of each reading's cell.
+        Index of each reading's cell in the table.
     day : (n,)
         Day of each reading, counted from 1970.
     deviation : (n,)
@@ -99,7 +99,8 @@ def time_scatter(
 ) -> tuple[TimeScatter, ...]:
     """Return the scatter of means over each time scale for which there are enough readings.
 
-    The deviations (n,) are cross-validated, oldest first; `place` (n,) holds their table rows.
+    The deviations (n,) are cross-validated, oldest first; `place` (n,) are the indices of their
+    cells in the table.
     """
     smooth, weight = running_median(deviation), _weight(table.scatter[place])
     columns = (np.ones(weight.size), smooth, table.passing[place], table.lasting[place])

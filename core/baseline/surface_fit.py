@@ -106,13 +106,16 @@ class Fit:
         return tuple(tuple(row) for row in part.tolist())
 
     def std(self, design: FloatArray) -> FloatArray:
-        """Return the standard uncertainty (n,) of the surface for design (n, n_coefficients)."""
+        """Return the standard uncertainty (n,) of the surface; `design` is (n, n_coefficients)."""
         variance = np.einsum("ij,jk,ik->i", design, self.covariance, design)
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
 def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
-    """Return a surface fitted robustly to groups; `bend_std` is that of `BaselineSettings`."""
+    """Return a surface fitted robustly to groups.
+
+    `bend_std` is the prior standard deviation of the change of slope of ln k between knots.
+    """
     offset = float(np.median(groups.value))
     points = _Points.of(groups, shape, offset)
     prior = prior_precision(shape, bend_std)
@@ -181,7 +184,7 @@ def _std(
 
 
 def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Surface:
-    """Return the surface refitted to groups where `is_used` (n_groups,) is 1, weighted as `fit`."""
+    """Return the surface refitted, with the weights of `fit`, to groups where `is_used` is 1."""
     shape, offset = fit.surface.shape, fit.surface.offset
     points = _Points.of(groups, shape, offset)
     precision = is_used * fit.robust_weight / (fit.group_std**2 * fit.clustering)
@@ -192,7 +195,7 @@ def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Sur
 def prior_precision(shape: SurfaceShape, bend_std: float) -> FloatArray:
     """Return the inverse prior covariance of the coefficients (n_coefficients, n_coefficients).
 
-    `bend_std` is that of `BaselineSettings`.
+    `bend_std` is the prior standard deviation of the change of slope of ln k between knots.
     """
     n_e, n_t = shape.eccentricity.n_splines, shape.temperature.n_splines
     along_e, along_t = _differences(n_e, bend_std), _differences(n_t, bend_std)
@@ -225,7 +228,10 @@ def _clustering(
 def surface_shape(
     groups: Groups, knot_e: float, knot_t_c: float, has_attitude: bool
 ) -> SurfaceShape:
-    """Return the shape of a surface with knots that cover all groups, at the given spacings."""
+    """Return the shape of a surface whose knots cover all groups.
+
+    `knot_e` and `knot_t_c` are the knot spacings in eccentricity ratio and oil temperature, °C.
+    """
     return SurfaceShape(
         _axis(groups.conditions.eccentricity_ratio, knot_e),
         _axis(groups.conditions.oil_temperature_c, knot_t_c),

@@ -44,7 +44,7 @@ def tabulate(
     fit: Fit,
     settings: BaselineSettings,
 ) -> CellTable:
-    """Return the table of the cells with readings and between them; `value` (n,) is ln k."""
+    """Return the table of cells with readings, and of cells between them; `value` (n,) is ln k."""
     contents = _seen(conditions, value, groups, fit, settings.grid)
     enough = {
         cell

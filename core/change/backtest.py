@@ -43,8 +43,9 @@ def operation_history(
 ) -> OperationHistory:
     """Return the operating state at each reading and whether it was settled.
 
-    The states are computed from speed and power, unless `state` is given. Times increase; columns
-    are (n,) with NaN for missing values. Without an oil temperature, the full warm-up time applies.
+    The states are computed from speed and power, unless `state` is given. All arrays are (n,), in
+    order of time, with NaN for missing values. Without an oil temperature, the unit counts as warm
+    only after the full warm-up time.
     """
     columns = (speed_rpm, power_mw, oil_temperature_c, state)
     rows = [
@@ -93,8 +94,9 @@ def _operations(
 class DecisionHistory:
     """Decision on a quantity of a film after each reading, as columns (n,).
 
-    `verdict` contains values of `Verdict`, and `level` values of `AlarmLevel` or 0. The other
-    columns describe the most significant mean deviation, in ln; NaN as long as there is none.
+    `verdict` contains values of `Verdict`, and `level` values of `AlarmLevel`, or 0 for no alarm.
+    `change` is the mean deviation from the baseline, in ln, over the averaging time `time_scale_h`
+    for which its `significance` is largest; NaN before the first averaging time has elapsed.
     """
 
     verdict: CodeArray
@@ -104,7 +106,7 @@ class DecisionHistory:
     time_scale_h: FloatArray
 
     def raised(self) -> npt.NDArray[np.int64]:
-        """Return the rows (n_raised,) in which the level is higher than in the row before."""
+        """Return the indices (n_raised,) at which the level is higher than just before."""
         return np.flatnonzero(np.diff(self.level, prepend=np.int8(0)) > 0)
 
 
@@ -117,7 +119,8 @@ def decide_all(
 ) -> DecisionHistory:
     """Return the decision after each stored reading, from the initial decision on.
 
-    Readings that `is_settled` (n,) excludes are not judged; without a baseline, none is.
+    Readings that the mask `is_settled` (n,) excludes are not judged. Without a baseline, no reading
+    is judged.
     """
     nothing = (np.nan, np.nan, np.nan)
     rows = [
@@ -139,7 +142,8 @@ def last_decision(
 ) -> Decision:
     """Return the decision after the last stored reading as if `baseline` had always been active.
 
-    Readings that `is_settled` (n,) excludes are not judged. Without readings, the initial decision.
+    Readings that the mask `is_settled` (n,) excludes are not judged. If there are no readings, the
+    initial decision is returned.
     """
     watched = (history, is_settled, baseline.quantity, baseline)
     limits = rules.limits(baseline.quantity)

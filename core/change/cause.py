@@ -121,7 +121,7 @@ class UnitReadings:
 
     @classmethod
     def of(cls, rows: FloatArray) -> Self:
-        """Return the readings with fields as rows (9, n_films, n).
+        """Return readings from an array of their fields in order, (9, n_films, n).
 
         The last four rows are the real and imaginary part of the shaft's and the bearing's phasor.
         """
@@ -129,7 +129,7 @@ class UnitReadings:
         return cls(**columns, motion_um=rows[5::2] + 1j * rows[6::2])
 
     def columns(self, wanted: npt.NDArray[np.bool_ | np.int64] | slice) -> "UnitReadings":
-        """Return the readings at the times selected by a mask (n,), column numbers or a slice."""
+        """Return the readings at the times selected by a mask (n,), indices or a slice."""
         found = {f.name: getattr(self, f.name) for f in fields(self)}
         return UnitReadings(**{k: v[..., wanted] if v.size else v for k, v in found.items()})
 

@@ -143,7 +143,7 @@ def _mean(each: Sequence[_Bearing]) -> _Bearing:
 def line_finding(
     film: FilmDirection, response: ShaftResponse | None, readings: UnitReadings
 ) -> LineFinding:
-    """Return what the line of the shaft shows of the transducers of a film."""
+    """Return the finding on the transducers of a film, by the learned line of the shaft."""
     line = next((x for x in response.lines if x.direction == film[1]), None) if response else None
     if (
         line is None
@@ -170,16 +170,16 @@ def told_by_damping(
     evidence: Mapping[FilmDirection, FilmEvidence],
     lines: Mapping[str, LineFinding],
 ) -> Attribution:
-    """Return the cause of a change by c/k, or `found` if c/k does not tell it.
+    """Return the cause of a change that c/k indicates, or `found` if it indicates none.
 
     Parameters
     ----------
     found
-        Cause by the motion of the shaft.
+        Cause found from the shaft motion.
     evidence
         Mean deviations by bearing and direction. Bearings without c/k in x and y do not count.
     lines
-        What the line of the shaft shows of the transducers of the bearing, by direction.
+        Findings on the transducers of the bearing by the line of the shaft, by direction.
     """
     for direction, line in lines.items():
         if line.verdict in (LineVerdict.PROBE, LineVerdict.ACCELEROMETER):

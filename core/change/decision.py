@@ -89,7 +89,8 @@ class Decision:
     verdict
         Verdict on the newest reading.
     finding
-        Most significant mean deviation after the newest counted reading.
+        Mean deviation over the time scale for which it is most significant, after the newest
+        counted reading.
     deviation, deviation_std
         Deviation of the newest counted reading from its baseline, in ln, and its standard
         uncertainty.
@@ -113,7 +114,7 @@ class Decision:
 
     @property
     def level(self) -> AlarmLevel | None:
-        """Active level, also if the newest reading was not judged; None if no level is active."""
+        """Active alarm level, even if the newest reading was not judged; None if inactive."""
         if self.danger.is_on:
             return AlarmLevel.DANGER
         return AlarmLevel.ALERT if self.alert.is_on else None
@@ -135,14 +136,13 @@ def step(
     A reading does not count if it is less than half a reading interval after the previous counted
     reading, because both share most of their samples. Without a baseline, no reading is judged.
 
-    Raises
-    ------
-    ValueError
-        If the reading is not later than the previous reading, or the evidence so far is from a
-        baseline with another number of time scales.
+    Raises ValueError if the reading is not later than the previous reading, or the evidence so far
+    is from a baseline with another number of time scales.
     """
     if decision.last_ns is not None and time_ns <= decision.last_ns:
-        raise ValueError(f"reading at {time_ns} ns must be after {decision.last_ns} ns")
+        raise ValueError(
+            f"reading at {time_ns} ns must be after the previous reading at {decision.last_ns} ns"
+        )
     if baseline is None or isinstance(outcome, Verdict):
         verdict = outcome if isinstance(outcome, Verdict) else Verdict.NO_BASELINE
         return replace(decision, verdict=verdict, last_ns=time_ns)

@@ -29,7 +29,7 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class ScaleSums:
-    """Exponentially weighted sums over one time scale, as of `core.baseline.grouping.ewma`.
+    """Exponentially weighted sums (moving averages from 0) over one time scale.
 
     `fill` is the sum of ones, which approaches 1 as the time scale elapses; `weight` is the sum of
     the weights. The others are sums of weighted deviations and of their uncertainties.
@@ -42,7 +42,7 @@ class ScaleSums:
     offset: float = 0.0
 
     def step(self, compared: Comparison, middle: float, alpha: float) -> "ScaleSums":
-        """Return the sums with one more reading; `alpha` is the weight of `ewma_weight`.
+        """Return the sums with one more reading, to which they give the weight `alpha`.
 
         `middle`, the running median deviation, is added instead of the reading's own deviation.
         """
@@ -56,9 +56,10 @@ class ScaleSums:
         )
 
     def finding(self, time: TimeScatter) -> "Finding":
-        """Return the mean deviation of at least one reading over the time scale of `time`.
+        """Return the mean deviation over the time scale of `time`, after at least one reading.
 
-        `time.share` scales the scatter, which is larger before the time scale has fully elapsed.
+        `time.share` is the scatter of means relative to that of single readings; before the time
+        scale has fully elapsed, means have a larger scatter.
         """
         offset = self.offset / self.weight
         # means over a partly elapsed time scale have a larger scatter
@@ -98,10 +99,7 @@ class GatheredEvidence:
     def step(self, compared: Comparison, baseline: QuantityBaseline) -> "GatheredEvidence":
         """Return the evidence with one more reading.
 
-        Raises
-        ------
-        ValueError
-            If the baseline has a different number of time scales than the evidence.
+        Raises ValueError if the baseline has a different number of time scales than the evidence.
         """
         times = baseline.time_scatter
         scales = self.scales or (ScaleSums(),) * len(times)

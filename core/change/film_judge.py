@@ -25,15 +25,15 @@ NORMAL_95 = 1.96
 
 @dataclass(frozen=True)
 class FilmFinding:
-    """Verdict on a quantity of a film after a reading, with its numbers; None if missing.
+    """Verdict on a quantity of a film after a reading; fields are None if unknown.
 
     Parameters
     ----------
     level
         Active level, whether or not this reading was judged.
     change, change_std
-        Most significant mean deviation of the quantity from the baseline, in ln, and its standard
-        uncertainty.
+        Mean deviation of the quantity from the baseline, in ln, over the averaging time for which
+        it is most significant, and its standard uncertainty.
     time_scale_h
         Averaging time of `change` in running hours.
     deviation, deviation_std
@@ -61,12 +61,12 @@ class FilmFinding:
 
     @property
     def rank(self) -> tuple[int, float]:
-        """Level, and change relative to the limit, by which findings are ordered."""
+        """Sort key of findings: level (0 for none), then absolute change relative to the limit."""
         return self.level or 0, abs(math.expm1(self.change or 0.0)) / self.limit
 
     @property
     def deviation_95_percent(self) -> tuple[float, float] | None:
-        """95 % interval of the deviation, % of the expected value; None without deviation."""
+        """95 % interval of the deviation in percent of the expected value; None if unknown."""
         if self.deviation is None or self.deviation_std is None:
             return None
         half = NORMAL_95 * self.deviation_std
@@ -93,9 +93,9 @@ ALARM_REASONS = {
 def alarm_condition(findings: Sequence[FilmFinding], direction: str) -> Judgement:
     """Return the judgement of a film in one direction from the findings of all `QUANTITIES`.
 
-    The quantity with the highest level, then with the largest change relative to its limit, gives
-    value, limit and reason. Without a stiffness that is judged, the judgement is unknown. Damping
-    over stiffness is left out where it is not judged, unless its level is active.
+    Value, limit and reason are those of the quantity with the highest level or, at equal levels,
+    with the largest change relative to its limit. The judgement is unknown if the stiffness was not
+    judged. Damping over stiffness counts only if it was judged, or its level is active.
 
     Value and limit are changes in percent of the expected value, with the sign of the change.
     """
@@ -150,7 +150,7 @@ class FilmNews:
 
     @property
     def worst(self) -> int:
-        """Index of the finding with the highest level, then the largest change to its limit."""
+        """Index of the finding with the highest level; at equal levels, with the largest change."""
         ranks = [each.rank for each in self.findings]
         return ranks.index(max(ranks))
 
@@ -214,7 +214,7 @@ class FilmJudge:
         )
 
     def restore(self, decided: Sequence[FilmDecision]) -> None:
-        """Restore the decisions made with the active baseline versions; ignore the others."""
+        """Restore the decisions made with the active baselines; ignore those of other versions."""
         for found in decided:
             if found.version == self._version(found.bearing):
                 self._decisions[found.bearing, found.quantity] = found.decision
@@ -236,7 +236,8 @@ class FilmJudge:
 
         Returns
         -------
-        One item per reading: its findings, and the updated decisions on all `QUANTITIES`.
+        One item per reading, in the same order, with findings and updated decisions on all
+        `QUANTITIES`.
 
         Raises
         ------

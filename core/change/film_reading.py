@@ -55,7 +55,10 @@ class FilmValue:
         )
 
     def of(self, quantity: FilmQuantity) -> tuple[float, float, ReadingOutcome]:
-        """Return ln, random uncertainty and outcome of a quantity, as `StiffnessHistory.of`."""
+        """Return ln of a quantity, its random standard uncertainty, and the outcome.
+
+        A missing c/k has the outcome of the stiffness, or `BAD_QUALITY` if that was measured.
+        """
         value, outcome = getattr(self, quantity.value), self.outcome
         if not math.isnan(value):
             outcome = ReadingOutcome.MEASURED
@@ -118,7 +121,7 @@ def film_reading(
 
 
 def value_or_nan(reading: Reading) -> float:
-    """Return the value of a reading of any quality; NaN if missing."""
+    """Return the value of a reading of any quality; NaN if it has none."""
     return math.nan if reading.value is None else reading.value
 
 

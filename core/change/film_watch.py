@@ -54,8 +54,8 @@ class FilmWatch:
 
         Returns
         -------
-        The assessments with their operating conditions added, and the judged film readings, empty
-        if none was due.
+        The assessments with their operating conditions added, and the judged film readings; the
+        latter list is empty if no reading was due.
         """
         seen: list[Assessment] = []
         news: list[FilmNews] = []

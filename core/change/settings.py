@@ -106,7 +106,7 @@ class FilmRules:
     change_ck: ChangeLimits = CK_CHANGE
 
     def limits(self, quantity: str) -> ChangeLimits:
-        """Return the limits of one of the `QUANTITIES`."""
+        """Return the limits of a quantity, a key of `QUANTITIES`."""
         return self.change if QUANTITIES[quantity].value == "ln_k" else self.change_ck
 
     def lapsed_ns(self, time_ns: int) -> int:

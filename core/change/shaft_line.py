@@ -68,7 +68,10 @@ class LineVerdict(StrEnum):
 
 @dataclass(frozen=True)
 class LineFinding:
-    """Verdict of the line, with its distance from the learned line in µm; None if unknown."""
+    """Verdict on transducers, and distance of the motion from the line with its uncertainty.
+
+    The fields in µm are None if unknown.
+    """
 
     verdict: LineVerdict = LineVerdict.UNKNOWN
     distance_um: float | None = None
@@ -76,7 +79,7 @@ class LineFinding:
 
     @property
     def words(self) -> str:
-        """Numbers of the finding; empty if unknown."""
+        """Distance and standard uncertainty as text; empty if unknown."""
         if self.distance_um is None:
             return ""
         return f"{self.distance_um:.2f} ± {self.std_um:.2f} µm off the line of the shaft"
@@ -84,7 +87,7 @@ class LineFinding:
 
 @dataclass(frozen=True)
 class ShaftLine:
-    """Learned line of the shaft in one direction.
+    """Learned linear equation of the 1× motion of a stiff shaft at three bearings, by direction.
 
     Parameters
     ----------
@@ -157,8 +160,8 @@ def learn_lines(
 ) -> tuple[ShaftLine, ...]:
     """Learn the lines of a shaft from histories by bearing id, at common times.
 
-    Only the times selected by `is_settled` (n,) are used. There is no line with other than three
-    bearings, without phases, or in a direction in which the motion is on no line.
+    Only the times selected by `is_settled` (n,) are used. No line is learned without phases, if the
+    unit does not have three bearings, or in a direction whose motion does not fit a line.
     """
     if len(histories) != 3:
         return ()

@@ -128,10 +128,7 @@ def learn_response(
 def film_columns(histories: Mapping[str, StiffnessHistory]) -> tuple[FloatArray, FloatArray]:
     """Return ln k and ln of the 1× shaft amplitude of all films, (n_films, n) each; NaN if missing.
 
-    Raises
-    ------
-    ValueError
-        If the histories do not have the same times.
+    Raises ValueError if the histories do not have the same times.
     """
     first = next(iter(histories.values()))
     for bearing, history in histories.items():

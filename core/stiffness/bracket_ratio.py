@@ -20,15 +20,15 @@ def ratio_name(name: str) -> str | None:
 
 
 def absolute_name(name: str) -> str | None:
-    """Return the name of the quantity whose ratio to k_b is `name`; None for others."""
+    """Return the name of the quantity whose ratio to k_b is `name`; None if `name` is no ratio."""
     found = [(own, ratio) for own, ratio in SUFFIXES.items() if name.endswith(ratio)]
     return name.removesuffix(found[0][1]) + found[0][0] if found else None
 
 
 def as_ratios(readings: Mapping[str, Reading]) -> dict[str, Reading]:
-    """Return readings computed with k_b = 1 N/m, with the ratios under names of their own.
+    """Return readings computed with k_b = 1 N/m, with the names of ratios to k_b.
 
-    The absolute quantities, and the mass of the bracket, are missing.
+    The absolute quantities, and the mass of the bracket, are readings without a value.
     """
     unknown = missing(Reason.BRACKET_UNKNOWN)
     found = dict(readings)

@@ -82,7 +82,8 @@ class DynamicStiffness:
     model : (2, 4)
         Half-width of the error of the coefficients because the film depends on frequency.
     changes : (4, 2, 4)
-        Change of the coefficients per unit of `STIFFNESS`, `MASS`, `DAMPING` and `DELAY`.
+        Change of the coefficients per unit of relative stiffness, mass in kg and damping in N·s/m
+        of the bracket, and delay of the bearing channels in s.
     bracket_mass_kg
         Mass of the bracket, given or fitted together with the film.
     bracket_mass_std_kg
@@ -101,7 +102,7 @@ class DynamicStiffness:
     coherence_segments : (2,)
         Number of independent segments that would make a coherence at a single line equally certain.
     lack_of_fit : (2,)
-        About 1 if the film is as modelled over the lines; else larger.
+        About 1 if stiffness and damping are constant over the lines; otherwise larger.
     frequency_hz : (n_used,)
         Frequencies of the used lines.
     probe_noise_um2_per_hz : (2,)
@@ -134,7 +135,7 @@ class DynamicStiffness:
 
     @property
     def c_n_s_per_m(self) -> FloatArray:
-        """Damping coefficients, (2, 2); rows and columns as for `k_n_per_m`."""
+        """Damping coefficients, (2, 2); rows are force directions, columns motion directions."""
         return self.coefficients[:, 2:]
 
     @property

@@ -53,7 +53,10 @@ NAMES = (
 
 
 def dynamic_readings(bearing: Bearing, found: DynamicStiffness, quality: Quality) -> Found:
-    """Return the readings of `dynamic` for a fitted film, with budgets, from input of a quality."""
+    """Return the readings of `dynamic` for a fitted film, with budgets.
+
+    `quality` is the quality of the input, which limits that of the readings.
+    """
     damping = _damping_half_width(found, bearing.bracket, bearing.accuracy)
     quality = worst((quality, fit_quality(found, bearing.accuracy.delay_s, damping)))
     coefficients = dynamic_budgets(found, bearing.bracket, bearing.accuracy)

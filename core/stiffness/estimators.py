@@ -34,7 +34,7 @@ class EstimatorEntry:
     ck: str | None = None
 
     def names(self, axes: str) -> tuple[str, ...]:
-        """Return the reported names of stiffness, damping and their ratio for axes "xx" or "yy"."""
+        """Return the names of stiffness, damping and their ratio for `axes`, "xx" or "yy"."""
         return tuple(
             name.format(axes=axes) for name in (self.stiffness, self.damping, self.ck) if name
         )

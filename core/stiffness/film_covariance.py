@@ -77,7 +77,7 @@ class FilmFits(FittedFilms):
 
     @property
     def coherence_segments(self) -> FloatArray:
-        """Number of segments that makes a line's coherence as certain as `coherence`, (n, 2).
+        """Number of segments that would make the coherence at one line equally certain, (n, 2).
 
         The unexplained fraction is residual over total power. Its error comes from each line's
         residual and power, with relative errors of ``1 / √n`` that are correlated by their ratio.
@@ -95,7 +95,7 @@ class FilmFits(FittedFilms):
 
     @property
     def lack_of_fit(self) -> FloatArray:
-        """Ratio of the residual's coherence with the shaft's motion to that by chance, (n, 2).
+        """Coherence of residual and shaft motion divided by its expected chance value, (n, 2).
 
         The expected value is 1 if stiffness and damping are constant over the lines: the residual
         is then correlated with the shaft only by chance, according to `n_segments`.
@@ -181,10 +181,10 @@ class FilmFits(FittedFilms):
         return np.asarray((self._sensitivity @ left).sum(axis=1))
 
     def follow(self, change: int, fitted: Sequence[int]) -> FloatArray:
-        """Return how a wrong bracket property shifts those that are fitted, (n, n_fitted).
+        """Return the errors of fitted bracket properties per unit error of another, (n, n_fitted).
 
-        The properties are numbered as in `changes`: `change` is the wrong one, `fitted` are one or
-        two others. Shifts are per unit of the wrong property, and invalid where `estimate` is NaN.
+        `change` is the index of the wrong property on the axis of `FilmInputs.changes`, `fitted`
+        are those of one or two others. Errors are invalid where `estimate` is NaN.
         """
         inverse, _ = _inverse(self._information[:, fitted][..., fitted])
         return -(inverse @ self._information[:, fitted, change, np.newaxis])[..., 0]
@@ -207,16 +207,19 @@ class FilmFits(FittedFilms):
         return np.where(separate[:, np.newaxis], value, np.nan), influences
 
     def delay(self, fitted: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return `DELAY`, first of joint estimates, its uncertainty and per `DAMPING`, (n,)."""
+        """Return the delay, its standard uncertainty, and its change per bracket damping, (n,).
+
+        The delay is the first of the bracket properties `fitted`, which are estimated jointly.
+        """
         value, influences = self.estimate(fitted)
         std = np.sqrt(self.covariance(influences[:, :, :1])[:, 0, 0])
         return value[:, 0], std, self.follow(DAMPING, fitted)[:, 0]
 
     def parts_left(self, dropped: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return covariances of the unknowns from what of the parts is left, (n, 2, 4, 4) by row.
+        """Return two covariances of the unknowns due to errors of the parts, (n, 2, 4, 4) each.
 
-        The first is from the doubt whether there are any, which differs between averages; the
-        second from the error of the prior, and from a share `dropped` (n, 1) that is not estimated.
+        The first is due to the doubt whether the film has parts, which differs between averages;
+        the second to the error of the prior, and to a share `dropped` (n, 1) of the parts.
         """
         mean, covariance, _ = self.of_parts
         of_prior = covariance @ (self.prior[..., np.newaxis] * covariance)
@@ -227,7 +230,7 @@ class FilmFits(FittedFilms):
         return per @ doubt @ per.swapaxes(2, 3), per @ left @ per.swapaxes(2, 3)
 
     def per_change_with_parts(self) -> FloatArray:
-        """Return the derivatives of the unknowns if the kept parts follow, (n, 2, 4, 4)."""
+        """Return derivatives of the unknowns by bracket property, parts refitted, (n, 2, 4, 4)."""
         follow = np.empty((len(self.parts), 2, N_PARTS, N_CHANGES))
         for row, of_row in enumerate(OF_ROW):
             follow[:, row] = self._information[:, of_row[N_CHANGES:], :N_CHANGES]
@@ -236,7 +239,7 @@ class FilmFits(FittedFilms):
         return self.per_change + self.per_part @ (kept * self.of_parts[1] @ follow)
 
     def film_covariance(self) -> FloatArray:
-        """Return the covariance of the films' unknowns with the kept parts, (n, 2, 4, 4) by row."""
+        """Return the random covariance of the unknowns fitted with the parts, (n, 2, 4, 4)."""
         kept = (self.kept / self.inputs.size)[..., np.newaxis, np.newaxis]
         steps = kept * self.per_part @ self.of_parts[1]
         weights = self._inverse_normal - steps @ self._part_sensitivity
@@ -244,7 +247,10 @@ class FilmFits(FittedFilms):
         return covariance + slope @ slope.swapaxes(2, 3)
 
     def film_covariance_with(self, fitted: Sequence[int]) -> FloatArray:
-        """Return the covariance of the unknowns with bracket properties fitted, (n, 2, 4, 4)."""
+        """Return the random covariance of the unknowns if the properties `fitted` are fitted too.
+
+        It is (n, 2, 4, 4).
+        """
         influences, own = self.estimate(fitted)[1], self._inverse_normal
         found = []
         for row in (0, 1):

@@ -149,7 +149,7 @@ class FilmLines:
 
     @cached_property
     def smooth_shaft_root(self) -> ComplexArray:
-        """`shaft_root` with the smoothed powers of the shaft's motion, (n, 2, 2, n_used)."""
+        """Hermitian square roots of the smoothed shaft motion's spectra, (n, 2, 2, n_used)."""
         power = own_power(self.shaft)
         scale = np.sqrt(self.smoothed(power) / power)
         return np.asarray(scale[:, :, np.newaxis] * self.shaft_root)
@@ -192,9 +192,9 @@ class FilmTerms:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the normal equations of both rows, (n, 2, p, p), and the least share of motion.
 
-        The share, (n,), is the smallest fraction of motion in the weighted shaft spectra of any
-        direction of motion, for the worse row. Where it is below `MIN_SHARE` the equations may be
-        singular and are replaced by the identity. The weights are (n, 2, n_used).
+        The share, (n,), is the smallest fraction of motion, as opposed to noise, in the weighted
+        shaft spectra of any direction, for the worse row. Below `MIN_SHARE` the equations may be
+        singular and are replaced by the identity. `weight` is (n, 2, n_used).
         """
         n_products = N_PRODUCTS * n_functions * (n_functions + 1) // 2
         summed = (self._products[:, :, :n_products] @ weight[..., np.newaxis])[..., 0]
@@ -214,9 +214,9 @@ class FilmTerms:
         return summed[..., 0]
 
     def residual(self, power: FloatArray, coefficients: FloatArray) -> FloatArray:
-        """Return the power of the residual force, (n, 2, n_used), of films with coefficients.
+        """Return the power of the residual force of films, (n, 2, n_used).
 
-        The brackets' forces have the `power`, (n, 2, n_used); `coefficients` are (n, 2, p).
+        `power`, (n, 2, n_used), is that of the brackets' forces; `coefficients` are (n, 2, p).
         """
         n_functions = coefficients.shape[-1] // 2
         n_products = N_PRODUCTS * n_functions * (n_functions + 1) // 2
@@ -246,7 +246,7 @@ class WeightedTerms:
 
     @property
     def signal_share(self) -> FloatArray:
-        """Smallest fraction of motion in the weighted shaft spectra of any direction, (n,)."""
+        """Smallest fraction of motion (not noise) in the weighted shaft spectra, (n,)."""
         return self._normal[1]
 
     @cached_property

@@ -124,16 +124,16 @@ class FilmInputs:
 
     @cached_property
     def relative(self) -> ComplexArray:
-        """Changes relative to the bracket's dynamic stiffness, (n, 4, n_used)."""
+        """The `changes` divided by the bracket's dynamic stiffness, (n, 4, n_used)."""
         return self.changes / self.bracket_n_per_m[:, np.newaxis]
 
     @property
     def size(self) -> FloatArray:
-        """Scale of the covariance of estimates, (n, 1)."""
+        """Factor from the inverse of normal equations to the covariance of estimates, (n, 1)."""
         return CORRELATED_LINES / (2.0 * self.n_segments)
 
     def terms(self, deviation: FloatArray) -> FilmTerms:
-        """Return the terms of films whose lags deviate, (n, 1) or (n, 2), from the prior mean."""
+        """Return the terms of films; `deviation` is that of the lag, (n, 1) or (n, 2) by row."""
         lines = self.lines
         shape, slope = tilt_lag(lines.omega, self.turn_rad_s, deviation)
         functions = np.empty((*shape.shape[:2], 4, shape.shape[2]), dtype=np.complex128)
@@ -188,7 +188,7 @@ class FittedFilms:
 
     @cached_property
     def solved(self) -> FloatArray:
-        """Unknowns of constant coefficients, and per unit of the parts' force, (n, 2, 4, 4)."""
+        """Unknowns without parts, and minus their derivatives by each part, (n, 2, 4, 1 + 3)."""
         normal, moments = self.weighted.normal, self.weighted.moments
         right = np.empty((len(normal), 2, N_UNKNOWNS, 1 + N_PARTS))
         right[..., 0] = moments[..., :N_UNKNOWNS]
@@ -232,12 +232,12 @@ class FittedFilms:
 
     @cached_property
     def common(self) -> ComplexArray:
-        """Residual times the shaft's conjugated motion without noise, (n, 2, 2, n_used)."""
+        """Cross-spectra of residual force and shaft motion without noise, (n, 2, 2, n_used)."""
         return self.inputs.force - self.moved
 
     @cached_property
     def left(self) -> FloatArray:
-        """Moments of the residual with the terms of each row, (n, 2, 7)."""
+        """Weighted sums over lines of residual force times each term of a row, (n, 2, 7)."""
         modelled = self.weighted.normal[..., :6] @ self.coefficients[..., np.newaxis]
         rest = self.weighted.moments[..., np.newaxis] - modelled
         return np.asarray((self._of_terms.swapaxes(2, 3) @ rest)[..., 0])
@@ -251,7 +251,7 @@ class FittedFilms:
 
     @cached_property
     def prior(self) -> FloatArray:
-        """Information of the prior on the parts, which is normal about zero, (n, 2, 3)."""
+        """Reciprocal prior variance of each part, normal with zero mean, (n, 2, 3)."""
         direct = np.hypot(
             np.einsum("nrr->nr", self.solved[:, :, :2, 0]),
             np.einsum("nrr->nr", self.solved[:, :, 2:, 0]),
@@ -262,16 +262,16 @@ class FittedFilms:
 
     @cached_property
     def of_lags(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Mean, covariance and significance of the lagging parts by spectra and prior."""
+        """Posterior mean (n, 2, 2), covariance and squared significance (n,) of lagging parts."""
         return self._posterior(N_LAGS)
 
     @cached_property
     def of_parts(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Mean, covariance and significance of all parts by spectra and prior."""
+        """Posterior mean (n, 2, 3), covariance and squared significance (n,) of parts and lag."""
         return self._posterior(N_PARTS)
 
     def constant_odds(self) -> FloatArray:
-        """Return the ratio of the marginal likelihoods of no lagging parts and of any, (n,)."""
+        """Return the likelihood of films without lagging parts over that of films with, (n,)."""
         _, covariance, significance = self.of_lags
         shrinkage = np.linalg.slogdet(covariance * self.prior[..., np.newaxis, :N_LAGS])[1]
         return np.asarray(np.exp(-0.5 * (significance + shrinkage.sum(axis=1))))
@@ -295,7 +295,10 @@ class FittedFilms:
         return mean[..., 0], covariance, significance
 
     def with_parts(self, kept: FloatArray, n_parts: int) -> Self:
-        """Return fits with a share (n, 1) of the first parts of each row, and their weights."""
+        """Return fits that have the first `n_parts` parts with the probability `kept` (n, 1).
+
+        Their lines are weighted by their own residuals.
+        """
         fits, inputs = self, self.inputs
         any_kept = kept[..., np.newaxis] > 0.0
         for iteration in range(N_REWEIGHTED + 1 if kept.any() else 0):

@@ -115,7 +115,7 @@ class OrderLine:
         return float(self.orders.frequency_hz[self.at])
 
     def n_segments(self, first: int, last: int) -> int:
-        """Return the number of segments, or changed polls, with channels `first`, `last` usable."""
+        """Return the number of segments or changed polls in which two channels are usable."""
         if self.bins is not None:
             return int(self.orders.n_segments[first, last])
         both = self.usable[:, first] & self.usable[:, last]
@@ -145,7 +145,7 @@ class OrderLine:
     def axes_quality(self, rotation_sense: int) -> Quality:
         """Return the quality of the channels' axes: not good if the whirl contradicts the rotation.
 
-        Only motion above the noise floor is checked. `rotation_sense` is that of `Unit`.
+        Only motion above the noise floor is checked. `rotation_sense` is +1 from x to y, else -1.
         """
         return worst(
             self._pair_quality(x, y, rotation_sense)
@@ -355,7 +355,7 @@ NOT_MEASURED: Budgeted = (missing(Reason.NOT_MEASURED), None)
 
 
 def marked_hz(readings: Mapping[str, Reading], line: str) -> float | None:
-    """Return the frequency in Hz of the line "order1" or "vortex"; None if its band has none."""
+    """Return the frequency in Hz of the line "order1" or "vortex"; None without such a line."""
     reading = readings[f"{line}_frequency_hz"]
     return None if reading.quality.reason is Reason.OUTSIDE_BAND else reading.value
 

@@ -139,7 +139,7 @@ def polls_ratio_budget(
     n_effective
         Effective number of independent polls.
     runout_um_pk
-        Largest shaft runout contained in this line, as in `ratio_budget`.
+        Largest shaft runout contained in this line; zero off the harmonics of the running speed.
     across
         Ratio of the transverse shaft amplitude to the amplitude in this direction.
 
@@ -197,7 +197,7 @@ def changed_polls(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> npt.NDA
 
 
 def mass_half_width_kg(bracket: BracketDynamics, accuracy: BearingAccuracy) -> float:
-    """Return the half-width of the error of the bracket's mass; its largest value if unknown."""
+    """Return the half-width of the error of the bracket's mass; the largest mass if unknown."""
     share = 1.0 if bracket.mass_kg is None else accuracy.bracket_mass
     return share * bracket.max_mass_kg
 
@@ -229,8 +229,12 @@ def transfer_budgets(
 
     Parameters
     ----------
-    line, shaft, bearing, n_segments, runout_um_pk
-        As in `ratio_budget`. The phase of runout is unknown, so it also contributes to damping.
+    line, shaft, bearing
+        Indices of the line and of the compared channels in the spectrum.
+    n_segments
+        Number of independent segments; by default the number of averaged segments.
+    runout_um_pk
+        Largest shaft runout in this line. Its phase is unknown, so it also contributes to damping.
 
     Returns
     -------

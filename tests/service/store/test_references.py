@@ -230,7 +230,7 @@ FIRST = ["content", "quantities", 0]
         (["content", "origin", "auther"], "Ada", "content.origin.auther: Unexpected"),
         (["content", "origin", "version"], "3", "content.origin.version: .* '3'"),
         (["content", "origin", "version"], True, "content.origin.version: .* True"),
-        ([*FIRST, "quantity"], "colour", "quantities.0: quantity must be of k_x"),
+        ([*FIRST, "quantity"], "colour", "quantities.0: quantity must be one of k_x"),
         ([*FIRST, "scatter"], -1.0, "quantities.0: scatter and reading_h must be"),
         ([*FIRST, "surface", "coefficients"], [1.0], "coefficients, got 1"),
         ([*FIRST, "surface", "coefficients", 0], None, "coefficients.0: .* None"),
