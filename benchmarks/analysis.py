@@ -36,9 +36,9 @@ from core.spectra.cross_spectrum import (
     SHAFT_Y,
     CrossSpectrum,
     average,
+    roundness,
 )
 from core.spectra.segments import ORDER1, VORTEX, SegmentTransform
-from core.spectra.vortex import roundness
 from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, films
 from core.stiffness.dynamic_lines import DynamicSettings
 from core.stiffness.dynamic_readings import dynamic_budgets

@@ -18,7 +18,6 @@ from acquisition.modbus.connection import (
     reason_of,
 )
 from acquisition.modbus.framing import PendingRequest
-from acquisition.modbus.identity import ExpectedIdentification, Identification, Identity
 from acquisition.modbus.requests import (
     BUSY,
     EXCEPTION_BIT,
@@ -32,7 +31,14 @@ from acquisition.modbus.requests import (
     identification_request,
     span_requests,
 )
-from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
+from acquisition.modbus.transport import (
+    ExpectedIdentification,
+    Identification,
+    Identity,
+    LinkSettings,
+    SerialTransport,
+    TcpTransport,
+)
 
 _N_TRANSACTIONS = 65_000
 """Largest transaction id; id 0 is not used, because some devices treat it as a wildcard."""

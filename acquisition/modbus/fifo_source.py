@@ -14,11 +14,13 @@ from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.fifo_assembly import (
     ChannelAssembly,
     CountedSamples,
+    FifoKind,
+    FifoLayout,
+    FifoPiece,
     PlacedSamples,
     UncountedSamples,
     place_records,
 )
-from acquisition.modbus.fifo_layout import FifoKind, FifoLayout, FifoPiece
 from acquisition.modbus.transport import LinkSettings
 from core.samples.axis import Epochs
 from core.samples.blocks import SampleBlock, SideValues

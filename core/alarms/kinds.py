@@ -9,7 +9,7 @@ from core.alarms.alarm import AlarmIdentity, AlarmRule
 from core.alarms.rules import BearingRules, LimitRule, UnitRules
 from core.condition.cells import OperatingPoint
 from core.limits import AlarmLevel, Judgement
-from core.machine.slow_channel import SLOW_QUANTITIES
+from core.machine.channel import SLOW_QUANTITIES
 from core.machine.unit import Unit
 from core.quality import Reading
 

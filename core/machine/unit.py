@@ -7,8 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from core.arrays import ComplexArray, FloatArray
-from core.machine.channel import Channel
-from core.machine.slow_channel import SlowChannel
+from core.machine.channel import Channel, SlowChannel
 
 
 class Estimator(StrEnum):

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from core.machine.slow_channel import SLOW_QUANTITIES
+from core.machine.channel import SLOW_QUANTITIES
 from core.quality import AXES
 from core.stiffness.bracket_ratio import absolute_name
 

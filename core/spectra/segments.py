@@ -24,7 +24,7 @@ from core.machine.channel import Channel, displacement_factor
 from core.machine.unit import Unit
 from core.quality import GOOD, Level, Quality, Reading, Reason, bad, missing, uncertain, worst
 from core.samples.ring import Window
-from core.spectra.cross_spectrum import average
+from core.spectra.cross_spectrum import average, vortex_frequency_hz
 from core.spectra.lines import (
     SegmentSettings,
     bin_phasors,
@@ -37,7 +37,6 @@ from core.spectra.overall import Overall, OverallTransform, RecentVibration, par
 from core.spectra.resolution import Resolution
 from core.spectra.runout import RunoutVerdict, shaft_angle_rad, without_runout
 from core.spectra.speed import KeyPhase, Speed, read_key_phase, running_speed
-from core.spectra.vortex import vortex_frequency_hz
 from core.units import hz_from_rpm
 
 OUTSIDE = uncertain(Reason.SENSOR_FAILURE)

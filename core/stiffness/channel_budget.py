@@ -94,7 +94,7 @@ def coherence_budget(coherence: float, n_segments: float) -> Budget | None:
 def roundness_budget(
     bearing: Bearing, roundness: float, phasors_um_pk: ComplexArray, runout_um_pk: tuple[float, ...]
 ) -> Budget | None:
-    """Return the uncertainty budget of the roundness of an orbit (`core.spectra.vortex.roundness`).
+    """Return the uncertainty budget of the roundness of an orbit (`cross_spectrum.roundness`).
 
     The random part is a first-order jackknife: the influence of each segment on the roundness. The
     interval is limited to -1 to 1. Return None if the shaft does not move or has no scatter.

@@ -21,9 +21,10 @@ from core.spectra.cross_spectrum import (
     CrossSpectrum,
     average,
     independent_segments,
+    roundness,
+    vortex_frequency_hz,
 )
 from core.spectra.segments import ORDER1, VORTEX
-from core.spectra.vortex import roundness, vortex_frequency_hz
 from core.stiffness.channel_budget import (
     amplitude_budget,
     amplitude_lines,

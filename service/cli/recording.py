@@ -10,8 +10,7 @@ import typer
 from acquisition.clock import SystemClock
 from acquisition.delivery.units import UNIT_OF
 from acquisition.recordings.export import ExportFormat, export_recording
-from acquisition.recordings.reader import Recording, open_recording
-from acquisition.recordings.summary import RecordingSummary, summary_of
+from acquisition.recordings.reader import Recording, RecordingSummary, open_recording, summary_of
 from service.app.kept_files import retention_rules
 from service.app.storage import has_store
 from service.cli.offline.importing import import_recording

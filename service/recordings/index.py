@@ -12,8 +12,7 @@ from pathlib import Path
 from acquisition.clock import Clock
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import MANIFEST
-from acquisition.recordings.reader import open_recording
-from acquisition.recordings.summary import summary_of
+from acquisition.recordings.reader import open_recording, summary_of
 from service.recordings.folders import DAMAGED, UNFINISHED, finished, is_recording, n_bytes_of
 from service.store.waveforms import WaveformFile, WaveformKind, WaveformState, WaveformStore
 

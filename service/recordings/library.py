@@ -12,8 +12,7 @@ import numpy as np
 from acquisition.errors import ConfigError
 from acquisition.recordings.export import ExportFormat, write_rows
 from acquisition.recordings.manifest import Manifest, checksum_of, read_manifest
-from acquisition.recordings.reader import Recording, open_recording
-from acquisition.recordings.summary import RecordingSummary, summary_of
+from acquisition.recordings.reader import Recording, RecordingSummary, open_recording, summary_of
 from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S, ns_from_s
 from service.recordings.folders import ALARM, CONTINUOUS, FILES, finished, n_bytes_of, unit_of

@@ -2,8 +2,15 @@
 
 from typing import TypeVar
 
-from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters, Identity
-from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport, Transport
+from acquisition.modbus.transport import (
+    ExpectedIdentification,
+    ExpectedRegisters,
+    Identity,
+    LinkSettings,
+    SerialTransport,
+    TcpTransport,
+    Transport,
+)
 from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
 from service.settings.sources.devices import MappedDeviceSettings, ModbusRingSettings
 from service.settings.sources.modbus import (

@@ -8,8 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 from pydantic import AwareDatetime, Field, StringConstraints, model_validator
 
 from core.checks.channels import COUNTS_FULL_SCALE
-from core.machine.channel import Measurand, SlowRollVector
-from core.machine.slow_channel import PAD_TEMPERATURE, SLOW_QUANTITIES, SlowChannel
+from core.machine.channel import (
+    PAD_TEMPERATURE,
+    SLOW_QUANTITIES,
+    Measurand,
+    SlowChannel,
+    SlowRollVector,
+)
 from core.monitor.catalogue import BY_NAME
 from core.units import NS_PER_S, STANDARD_GRAVITY_M_S2
 from service.settings.base import Identifier, MisfitError, MissingError, Settings

@@ -16,8 +16,7 @@ from harness.everything import Rows, fill, fill_access, served
 from rigs.recording import recorded
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.reader import open_recording
-from acquisition.recordings.summary import summary_of
+from acquisition.recordings.reader import open_recording, summary_of
 from acquisition.recordings.writer import RecordingWriter
 from service.store.access.tables import AccessStore
 from service.store.port import StoreError

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from acquisition.errors import ConfigError
-from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
+from acquisition.modbus.fifo_assembly import FifoKind, FifoLayout
 from acquisition.simulated.devices.modbus_device import ModbusDevice
 from acquisition.simulated.feed import Ledger, SampleFeed
 from core.arrays import CountArray

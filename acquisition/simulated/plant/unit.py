@@ -14,7 +14,7 @@ from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.plant import CHUNK_SAMPLES, SimulatedPlant
 from acquisition.simulated.plant.probes import probes
 from acquisition.simulated.plant.scenario import Course, Scenario
-from core.machine.slow_channel import PAD_TEMPERATURE
+from core.machine.channel import PAD_TEMPERATURE
 from core.machine.unit import Unit
 from core.samples.blocks import SampleBlock, SideValues
 from core.samples.calibration import UnitCalibration

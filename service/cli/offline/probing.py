@@ -12,13 +12,12 @@ from acquisition.errors import AcquisitionError
 from acquisition.modbus.cells import N_BYTES, ByteOrder, Cell, NumberType
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.decoding import MapDecoder, byte_permutation
-from acquisition.modbus.identity import Identification
 from acquisition.modbus.polled_source import MapReader
 from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.requests import Span
 from acquisition.modbus.ring_follower import RingReader
 from acquisition.modbus.ring_profile import RingHeader, Slot, decode_slots
-from acquisition.modbus.transport import LinkSettings
+from acquisition.modbus.transport import Identification, LinkSettings
 from service.settings.adapter_values import link_settings
 from service.settings.sources.modbus import ModbusLinkSettings
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
-from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
+from acquisition.modbus.fifo_assembly import FifoKind, FifoLayout
 from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.requests import MAX_FIFO_REGISTERS
 from core.spectra.polls import PollSettings, VectorPart, VectorRow

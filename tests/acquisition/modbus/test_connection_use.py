@@ -16,11 +16,10 @@ from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.cells import Cell
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.connection import ReplyProtocol
-from acquisition.modbus.identity import ExpectedIdentification
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
 from acquisition.modbus.register_map import Signature
 from acquisition.modbus.requests import Span
-from acquisition.modbus.transport import LinkSettings, TcpTransport
+from acquisition.modbus.transport import ExpectedIdentification, LinkSettings, TcpTransport
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice
 

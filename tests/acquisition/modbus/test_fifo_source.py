@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import ConfigError, LinkError
-from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
+from acquisition.modbus.fifo_assembly import FifoKind, FifoLayout
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
 from acquisition.modbus.transport import TcpTransport
 from acquisition.simulated.devices.fifo_device import FifoDevice

@@ -6,9 +6,14 @@ import pytest
 
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.client import ModbusClient
-from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters, Identification
 from acquisition.modbus.requests import Span
-from acquisition.modbus.transport import LinkSettings, TcpTransport
+from acquisition.modbus.transport import (
+    ExpectedIdentification,
+    ExpectedRegisters,
+    Identification,
+    LinkSettings,
+    TcpTransport,
+)
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 
 

@@ -12,11 +12,11 @@ from acquisition.modbus.fifo_assembly import (
     WRAP,
     ChannelAssembly,
     CountedSamples,
+    FifoPiece,
     SamplePlace,
     UncountedSamples,
     place_records,
 )
-from acquisition.modbus.fifo_layout import FifoPiece
 from acquisition.modbus.ring_profile import U32, RingLayout, Slot
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
 from core.samples.axis import Epochs

@@ -7,7 +7,7 @@ import numpy as np
 
 from acquisition.clock import SystemClock
 from acquisition.modbus.cells import ByteOrder, Cell, NumberType
-from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
+from acquisition.modbus.fifo_assembly import FifoKind, FifoLayout
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
 from acquisition.modbus.polled_source import PolledSettings, PolledSource, vector_calibration
 from acquisition.modbus.register_map import FlagCheck, MapValue, Meaning, RegisterMap, Together

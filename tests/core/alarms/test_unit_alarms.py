@@ -11,7 +11,7 @@ from core.alarms.alarm import AlarmState
 from core.alarms.rules import LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import AlarmLevel, Limits
-from core.machine.slow_channel import SlowChannel
+from core.machine.channel import SlowChannel
 from core.machine.unit import Unit
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
 from core.samples.blocks import StampFault

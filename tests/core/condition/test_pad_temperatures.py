@@ -2,7 +2,7 @@
 
 import pytest
 
-from core.condition.pad_temperatures import DIRECTION, EXCESS, MEAN, VECTOR, pad_pattern
+from core.condition.shaft_readings import DIRECTION, EXCESS, MEAN, VECTOR, pad_pattern
 from core.quality import Level, Reading, Reason, missing
 
 ANGLES_DEG = (0.0, 60.0, 120.0, 180.0, 240.0, 300.0)

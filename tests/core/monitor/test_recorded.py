@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.machine.slow_channel import SlowChannel
+from core.machine.channel import SlowChannel
 from core.monitor.catalogue import quantity_of
 from core.quality import Level, Reason, missing
 

@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core.arrays import ComplexArray, FloatArray
-from core.spectra.cross_spectrum import CrossSpectrum, average
+from core.spectra.cross_spectrum import CrossSpectrum, average, roundness, vortex_frequency_hz
 from core.spectra.orbit import ellipse_of, marks_of, order_phasors, trace_of
-from core.spectra.vortex import roundness, vortex_frequency_hz
 
 RATE_HZ, TURN_HZ = 600.0, 92.3 / 60.0
 T = np.arange(round(20.0 * RATE_HZ)) / RATE_HZ

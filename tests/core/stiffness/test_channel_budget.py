@@ -5,8 +5,7 @@ import pytest
 from rigs.shaken_shaft import found, shaken
 
 from core.machine.unit import Bearing, BearingAccuracy
-from core.spectra.cross_spectrum import average
-from core.spectra.vortex import roundness
+from core.spectra.cross_spectrum import average, roundness
 from core.stiffness.channel_budget import (
     amplitude_budget,
     coherence_budget,

@@ -14,10 +14,14 @@ from acquisition.can.settings import CanSettings as CanAdapterSettings
 from acquisition.can.source import CanSource
 from acquisition.delivery.blocks import BlockAssembler
 from acquisition.modbus.fifo_source import FifoSettings
-from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters
 from acquisition.modbus.polled_source import PolledSettings
 from acquisition.modbus.ring_source import RingSettings
-from acquisition.modbus.transport import LinkSettings, SerialTransport
+from acquisition.modbus.transport import (
+    ExpectedIdentification,
+    ExpectedRegisters,
+    LinkSettings,
+    SerialTransport,
+)
 from acquisition.simulated.devices.can_shape import daq_dbc
 from core.machine.unit import Unit
 from core.monitor.assessment import AnalysisSettings, Assessment

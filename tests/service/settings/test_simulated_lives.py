@@ -12,7 +12,7 @@ from acquisition.errors import ConfigError
 from core.change.film_reading import film_reading
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
-from core.condition.pad_temperatures import DIRECTION, VECTOR, pad_pattern
+from core.condition.shaft_readings import DIRECTION, VECTOR, pad_pattern
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters
+from acquisition.modbus.transport import ExpectedIdentification, ExpectedRegisters
 from core.spectra.polls import VectorPart, VectorRow
 from service.settings.adapter_values import identity_of
 from service.settings.base import MisfitError

@@ -12,8 +12,7 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.reader import Recording, open_recording
-from acquisition.recordings.summary import summary_of
+from acquisition.recordings.reader import Recording, open_recording, summary_of
 from harness.ledger_daq import Offered
 from harness.ledger_plant import LedgerPlant
 from harness.truth import Truth

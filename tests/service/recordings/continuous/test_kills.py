@@ -9,8 +9,7 @@ import pytest
 from rigs.capturing import BLOCK, counted_block, numbers, samples
 
 from acquisition.recordings.manifest import RecordedUnit
-from acquisition.recordings.reader import Recording, open_recording
-from acquisition.recordings.summary import summary_of
+from acquisition.recordings.reader import Recording, open_recording, summary_of
 from core.samples.blocks import SampleBlock
 from service.recordings.continuous_recorder import UnitRecorder, last_end
 from service.recordings.folders import remove_incomplete

@@ -4,8 +4,7 @@ import pytest
 from rigs.capturing import counted_block, numbers, samples
 from rigs.standing_clock import StandingClock
 
-from acquisition.recordings.reader import open_recording
-from acquisition.recordings.summary import summary_of
+from acquisition.recordings.reader import open_recording, summary_of
 from service.app import service_health as pressure
 from service.app.service_health import Pressure
 from service.measuring.acquirer import Bus
