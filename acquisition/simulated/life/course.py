@@ -16,7 +16,6 @@ from acquisition.simulated.life.moment import (
     TRANSDUCER_NOISE,
     bearing_at,
     channels_at,
-    growing,
     hydraulic_noise,
     vortex_rope,
 )
@@ -42,7 +41,8 @@ class LifeCourse:
     damage
         Damage, which begins at its exact onset, not at the next reading.
     machine
-        Unit to be sampled; its bearings must be in the life.
+        Unit to be sampled; its bearings must be in the life. With clearances equal to
+        `LifeBearing.configured_clearance_um` the eccentricity equals that of the readings.
     start_ns
         Time of the first sample, ns since 1970 UTC.
 
@@ -70,7 +70,9 @@ class LifeCourse:
         self._usual_um = {
             one.bearing.id: _usual_clearance_um(one, turns) for one in inputs.bearings
         }
-        self._growing = growing(machine)
+        # gaps of four probes include thermal growth, which two probes cannot separate
+        opposite = {b.id: b.opposite_reference_um for b in machine.bearings}
+        self._growing = frozenset(id_ for id_, um in opposite.items() if um is not None)
         self._n_rows = len(inputs.operation)
         self._rotor = rotor_of(tuple(self._bearings))
         self.at(0.0)

@@ -1,4 +1,4 @@
-"""Scenario of a simulated unit at one time of its life, for the simulation of samples."""
+"""Parts of the scenario of a simulated unit at one time of its life, to simulate samples."""
 
 from collections.abc import Iterator
 
@@ -8,85 +8,23 @@ from acquisition.simulated.life.excitation import (
     VORTEX_FORCE_N,
     has_vortex,
     hydraulic_force_n,
-    rotor_of,
 )
-from acquisition.simulated.life.truth import BearingMoments, UnitLife
+from acquisition.simulated.life.truth import BearingMoments
 from acquisition.simulated.plant.scenario import (
     BearingScenario,
     ChannelScenario,
     HydraulicNoise,
-    Scenario,
     TransducerNoise,
     VortexRope,
 )
 from core.arrays import FloatArray
-from core.machine.unit import Bearing, Unit
+from core.machine.unit import Bearing
 
 TRANSDUCER_NOISE = TransducerNoise(gap_um_rms=1.2, accelerometer_g_per_sqrt_hz=5e-6)
 """Realistic transducer noise of the accuracy benchmark."""
 
 HYDRAULIC_CUTOFF_HZ = 20.0
 """Cutoff of the hydraulic force, well above the harmonics near which stiffness is measured."""
-
-
-def scenario_at(
-    life: UnitLife, time_ns: int, machine: Unit, noise: TransducerNoise = TRANSDUCER_NOISE
-) -> Scenario:
-    """Return the scenario of steady operation at the newest reading not later than `time_ns`.
-
-    The transducer errors are those of the readings. At bearings with four probes, which separate
-    thermal growth from shaft displacement, the gaps include thermal growth. At bearings with two
-    probes, the gaps show the displacement that four probes would measure.
-
-    Parameters
-    ----------
-    machine
-        Unit to be sampled; its bearings must be in the life. With clearances equal to
-        `LifeBearing.configured_clearance_um` the eccentricity equals that of the readings.
-
-    Raises
-    ------
-    ValueError
-        If the time is before the first reading, or the unit is not at rated speed.
-    KeyError
-        If a bearing of the machine is missing from the life.
-    """
-    row, grow = row_at(life, time_ns), growing(machine)
-    operation = life.operation
-    load = float(operation.load[row])
-    return Scenario(
-        bearings={id_: bearing_at(truth, row, id_ in grow) for id_, truth in life.truth.items()},
-        speed_rpm=float(operation.speed_rpm[row]),
-        active_power_mw=float(operation.power_mw[row]),
-        unbalance_grade_mm_s=float(life.grade_mm_s[row]),
-        hydraulic=hydraulic_noise(load),
-        rope=vortex_rope(load),
-        noise=noise,
-        channels={
-            channel: one
-            for bearing in machine.bearings
-            for channel, one in channels_at(life.truth[bearing.id], row, bearing)
-        },
-        rotor=rotor_of(tuple(life.truth)),
-    )
-
-
-def growing(machine: Unit) -> frozenset[str]:
-    """Return the ids of the bearings with four probes, whose gaps include thermal growth."""
-    return frozenset(b.id for b in machine.bearings if b.opposite_reference_um is not None)
-
-
-def row_at(life: UnitLife, time_ns: int) -> int:
-    """Return the row of the newest reading not later than `time_ns`.
-
-    Raises ValueError if the time is before the first reading, or the unit is not at rated speed.
-    """
-    row = int(np.searchsorted(life.operation.time_ns, time_ns, side="right")) - 1
-    if row < 0:
-        raise ValueError(f"the life of unit {life.unit_seed} begins after {time_ns} ns")
-    if not life.operation.is_at_speed[row]:
-        raise ValueError(f"unit {life.unit_seed} is not at rated speed at {time_ns} ns")
-    return row
 
 
 def hydraulic_noise(load: float) -> HydraulicNoise:
@@ -103,7 +41,7 @@ def vortex_rope(load: float) -> VortexRope:
 
 
 def bearing_at(
-    truth: BearingMoments, row: int, grows: bool, usual_clearance_um: float | None = None
+    truth: BearingMoments, row: int, grows: bool, usual_clearance_um: float
 ) -> BearingScenario:
     """Return the scenario of one bearing at one row.
 
@@ -112,9 +50,8 @@ def bearing_at(
     grows
         Whether the gaps include thermal growth.
     usual_clearance_um
-        Clearance at zero gap growth; the median over all rows by default.
+        Clearance at zero gap growth.
     """
-    usual_um = usual_clearance_um or float(np.median(truth.clearance_um))
     x_um, y_um = (float(x) for x in truth.centre_um[:, row])
     error_x_um, error_y_um = _position_error_um(truth, row).tolist()
     return BearingScenario(
@@ -122,7 +59,7 @@ def bearing_at(
         centre_x_um=x_um,
         centre_y_um=y_um,
         oil_temperature_c=float(truth.oil_temperature_c[row]),
-        gap_growth_um=float(truth.clearance_um[row]) - usual_um if grows else 0.0,
+        gap_growth_um=float(truth.clearance_um[row]) - usual_clearance_um if grows else 0.0,
         bracket_stiffness_factor=float(truth.altered.bracket[row]),
         position_error_um=(error_x_um, error_y_um),
         oil_temperature_error_c=float(truth.chain.oil_error_c[row]),

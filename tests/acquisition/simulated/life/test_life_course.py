@@ -10,11 +10,10 @@ from acquisition.simulated.life.course import LifeCourse, LifePlan, history_unti
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.inputs import LifeInputs, draw_inputs
 from acquisition.simulated.life.life import live
-from acquisition.simulated.life.moment import scenario_at
 from acquisition.simulated.life.operation import HeldLoad
 from acquisition.simulated.plant.unit import SimulatedUnit
 from benchmarks.chain_unit import CALIBRATION, UNIT
-from core.units import NS_PER_S
+from core.units import NS_PER_S, rad_s_from_rpm
 
 START_NS = 1_735_689_600 * NS_PER_S
 STEP_NS = 600 * NS_PER_S
@@ -38,23 +37,44 @@ def running_ns(inputs: LifeInputs) -> int:
 
 def test_at_a_reading_the_course_is_what_the_reading_was_made_of(inputs):
     now_ns = running_ns(inputs)
-    damage = (Damage(DamageKind.PIVOT_WEAR, "LJB", now_ns - 10 * STEP_NS, 0.1),)
+    onset_ns = now_ns - 10 * STEP_NS
+    damage = (
+        Damage(DamageKind.PIVOT_WEAR, "LJB", onset_ns, 0.1),
+        Damage(DamageKind.BRACKET_LOOSENING, "LJB", onset_ns, 0.2),
+        Damage(DamageKind.ACCELEROMETER_GAIN, "UJB", onset_ns, -0.2, directions=("y",)),
+    )
     found = LifeCourse(inputs, damage, UNIT, now_ns).at(0.0)
-    wanted = scenario_at(live(SEED, START_NS, YEARS, damage), now_ns, UNIT)
+    life = live(SEED, START_NS, YEARS, damage)
+    row = int(np.searchsorted(life.operation.time_ns, now_ns))
 
-    assert found.speed_rpm == wanted.speed_rpm
-    assert found.channels == wanted.channels
-    assert found.unbalance_grade_mm_s == wanted.unbalance_grade_mm_s
-    for name, bearing in wanted.bearings.items():
-        here = found.bearings[name]
-        assert here.film.k_xx_n_per_m == pytest.approx(bearing.film.k_xx_n_per_m)
-        assert here.position_error_um == pytest.approx(bearing.position_error_um)
-        assert (here.centre_x_um, here.centre_y_um) == pytest.approx(
-            (bearing.centre_x_um, bearing.centre_y_um)
-        )
-        assert here.gap_growth_um == pytest.approx(
-            bearing.gap_growth_um, abs=4.0
-        )  # its median has the damage in it
+    assert found.speed_rpm == life.operation.speed_rpm[row]
+    assert found.active_power_mw == life.operation.power_mw[row]
+    assert found.unbalance_grade_mm_s == life.grade_mm_s[row]
+    for name, here in found.bearings.items():
+        truth, film = life.truth[name], here.film.at(rad_s_from_rpm(found.speed_rpm))
+        assert math.log(film.k_yy_n_per_m) == pytest.approx(truth.ln_k[1, row])
+        assert (here.centre_x_um, here.centre_y_um) == pytest.approx(truth.centre_um[:, row])
+        assert here.oil_temperature_c == pytest.approx(truth.oil_temperature_c[row])
+        growth_um = truth.clearance_um[row] - np.median(truth.clearance_um)
+        # the median has the damage in it
+        assert here.gap_growth_um == pytest.approx(growth_um, abs=4.0)
+    assert found.bearings["LJB"].bracket_stiffness_factor == pytest.approx(0.8)
+    chain, strays = life.truth["UJB"].chain, math.exp(life.truth["UJB"].chain.ln_k_error[1, row])
+    assert found.channels["UJB_ay"].gain == pytest.approx(
+        0.8 * chain.accelerometer_gain[1] * strays
+    )
+    assert found.channels["UJB_ux"].gain == chain.probe_gain[0]
+
+
+def test_the_vortex_is_there_at_part_load_only(inputs):
+    part, full = (
+        LifeCourse(inputs, (), UNIT, int(inputs.operation.time_ns[np.flatnonzero(near)[0]])).at(0.0)
+        for near in (np.abs(inputs.operation.load - load) < 0.02 for load in (0.57, 0.97))
+    )
+
+    assert part.rope.force_n > 0.0
+    assert full.rope.force_n == 0.0
+    assert part.hydraulic.rms_n > 0.0
 
 
 def test_between_readings_everything_runs_in_straight_lines(inputs):

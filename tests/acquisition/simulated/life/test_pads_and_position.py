@@ -1,16 +1,13 @@
 """Where pads and shaft are: what load, warmth and chance do to them."""
 
-import math
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from acquisition.simulated.life.bearing import LIFE_UJB, ThermalCourse
-from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.excitation import order1_um_pk
 from acquisition.simulated.life.films import PadSetting, film_course
-from acquisition.simulated.life.moment import row_at, scenario_at
 from acquisition.simulated.life.operation import lagged, wander
 from acquisition.simulated.life.truth import UnitLife
 from acquisition.simulated.plant.films import FilmColumns
@@ -24,7 +21,6 @@ from acquisition.simulated.plant.rotor import (
 )
 from benchmarks.accuracy_plant import machine
 from core.machine.channel import Measurand
-from core.units import rad_s_from_rpm
 
 Life = Callable[..., UnitLife]
 
@@ -110,56 +106,3 @@ def test_a_lag_comes_63_percent_of_the_way_in_its_time_and_slower_when_it_is_slo
 
 
 MACHINE = machine(Measurand.ACCELERATION_M_S2)
-
-
-def running_ns(life: UnitLife, from_ns: int) -> int:
-    """First reading under load from then on."""
-    operation = life.operation
-    return int(operation.time_ns[(operation.time_ns >= from_ns) & (operation.load > 0.5)][0])
-
-
-def test_a_scenario_holds_what_was_so_at_that_moment(two_years, day_ns):
-    damage = (
-        Damage(DamageKind.BRACKET_LOOSENING, "LJB", day_ns(100), 0.2),
-        Damage(DamageKind.ACCELEROMETER_GAIN, "UJB", day_ns(100), -0.2, directions=("y",)),
-    )
-    life = two_years(1, *damage)
-    moment_ns = running_ns(life, day_ns(200))
-    row, scenario = row_at(life, moment_ns), scenario_at(life, moment_ns, MACHINE)
-    truth, bearing = life.truth["UJB"], scenario.bearings["UJB"]
-
-    film = bearing.film.at(rad_s_from_rpm(scenario.speed_rpm))
-    assert math.log(film.k_yy_n_per_m) == pytest.approx(truth.ln_k[1, row])
-    assert bearing.centre_x_um == truth.centre_um[0, row]
-    assert bearing.oil_temperature_c == truth.oil_temperature_c[row]
-    assert scenario.active_power_mw == life.operation.power_mw[row]
-    assert scenario.bearings["LJB"].bracket_stiffness_factor == pytest.approx(0.8)
-    assert np.max(np.abs(life.truth["LJB"].film_loss)) == 0.0
-    chain = truth.chain
-    strays = math.exp(chain.ln_k_error[1, row])
-    assert scenario.channels["UJB_vy"].gain == pytest.approx(
-        0.8 * chain.accelerometer_gain[1] * strays
-    )
-    assert scenario.channels["UJB_ux"].gain == chain.probe_gain[0]
-
-
-def test_the_vortex_is_there_at_part_load_only(two_years):
-    life = two_years(0)
-    loads, times = life.operation.load, life.operation.time_ns
-    part, full = (
-        scenario_at(life, int(times[np.flatnonzero(np.abs(loads - load) < 0.02)[0]]), MACHINE)
-        for load in (0.57, 0.97)
-    )
-
-    assert part.rope.force_n > 0.0
-    assert full.rope.force_n == 0.0
-    assert part.hydraulic.rms_n > 0.0
-
-
-def test_there_is_no_scenario_before_birth_nor_during_a_run_up(two_years):
-    life = two_years(0)
-    with pytest.raises(ValueError, match="begins after 5 ns"):
-        scenario_at(life, 5, MACHINE)
-    run_up = np.flatnonzero(~life.operation.is_at_speed)[0]
-    with pytest.raises(ValueError, match="not at rated speed"):
-        scenario_at(life, int(life.operation.time_ns[run_up]), MACHINE)
