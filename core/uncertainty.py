@@ -54,16 +54,10 @@ class BudgetLine(NamedTuple):
     freedoms: float = math.inf
 
     @property
-    def standard(self) -> float:
-        """Standard uncertainty of the input quantity (GUM, 4.3.7)."""
-        return (
-            self.width / math.sqrt(3.0) if self.distribution is Distribution.UNIFORM else self.width
-        )
-
-    @property
     def contribution(self) -> float:
         """Standard uncertainty of the result due to this input quantity, in the result's unit."""
-        return abs(self.sensitivity) * self.standard
+        random, systematic, _ = _variances([self])
+        return math.sqrt(random + systematic)
 
 
 @dataclass(frozen=True)
@@ -80,17 +74,17 @@ class Budget:
     @property
     def random(self) -> float:
         """Standard uncertainty due to the random contributions."""
-        return _root_sum(line for line in self.lines if line.kind is Kind.RANDOM)
+        return math.sqrt(_variances(self.lines)[0])
 
     @property
     def systematic(self) -> float:
         """Standard uncertainty due to the systematic contributions."""
-        return _root_sum(line for line in self.lines if line.kind is Kind.SYSTEMATIC)
+        return math.sqrt(_variances(self.lines)[1])
 
     @property
     def combined(self) -> float:
         """Combined standard uncertainty (GUM, equation 10)."""
-        return _root_sum(self.lines)
+        return math.hypot(self.random, self.systematic)
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -100,16 +94,7 @@ class Budget:
 
     def reading(self, quality: Quality) -> Reading:
         """Return the result as a reading with its standard uncertainties and interval."""
-        random = systematic = fourth = 0.0
-        for _, kind, distribution, width, sensitivity, freedoms in self.lines:
-            square = (width * sensitivity) ** 2
-            if distribution is Distribution.UNIFORM:
-                square /= 3.0
-            if kind is Kind.RANDOM:
-                random += square
-            else:
-                systematic += square
-            fourth += square * square / freedoms
+        random, systematic, fourth = _variances(self.lines)
         combined = random + systematic
         half = _coverage_factor(combined, fourth, CONFIDENCE) * math.sqrt(combined)
         interval = self.bounded_interval or (self.value - half, self.value + half)
@@ -135,9 +120,23 @@ def coverage_factor(lines: Sequence[BudgetLine], confidence: float = CONFIDENCE)
     It is the quantile of Student's distribution with the effective degrees of freedom of Welch and
     Satterthwaite (GUM, G.4.1); 1.96 for 95 % if all widths are stated.
     """
-    squares = [line.contribution**2 for line in lines]
-    fourth = sum(s**2 / line.freedoms for s, line in zip(squares, lines, strict=True))
-    return _coverage_factor(sum(squares), fourth, confidence)
+    random, systematic, fourth = _variances(lines)
+    return _coverage_factor(random + systematic, fourth, confidence)
+
+
+def _variances(lines: Iterable[BudgetLine]) -> tuple[float, float, float]:
+    """Return the random and the systematic variance, and the sum of squares over freedoms."""
+    random = systematic = fourth = 0.0
+    for _, kind, distribution, width, sensitivity, freedoms in lines:
+        square = (width * sensitivity) ** 2
+        if distribution is Distribution.UNIFORM:
+            square /= 3.0  # GUM, 4.3.7
+        if kind is Kind.RANDOM:
+            random += square
+        else:
+            systematic += square
+        fourth += square * square / freedoms
+    return random, systematic, fourth
 
 
 def _coverage_factor(combined: float, fourth: float, confidence: float) -> float:
@@ -159,10 +158,6 @@ def proportional(value: float, budget: Budget) -> Budget:
     factor = value / budget.value
     lines = (line._replace(sensitivity=factor * line.sensitivity) for line in budget.lines)
     return Budget(value, tuple(lines))
-
-
-def _root_sum(lines: Iterable[BudgetLine]) -> float:
-    return math.sqrt(sum(line.contribution**2 for line in lines))
 
 
 SCATTER = "scatter"
