@@ -142,7 +142,7 @@ OUTAGE = [needs(Permission.CHANGE_MEASURING)]
 """Permission to take an alarm out of service; the alarm then sends no messages."""
 
 UNKNOWN = {404: "Unknown alarm"}
-ACTION_PROBLEMS = problem_responses(403, 409, 422, 503, own=UNKNOWN)
+ACTION_PROBLEMS = problem_responses(409, own=UNKNOWN)
 COMMENT_LIMIT = problem_responses(
     own={429: "Too many comments; Retry-After gives the time to wait"}
 )
@@ -222,7 +222,7 @@ def alarm_router(context: Context) -> APIRouter:
         "/events",
         summary="History of all alarms",
         response_model=AlarmEventsModel,
-        responses={**problem_responses(422, 503), **table_content("History of all alarms")},
+        responses=table_content("History of all alarms"),
         dependencies=[needs(Permission.READ, Reach.ASKED)],
     )
     async def events(

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
-from core.monitor.assessment import Assessment
 from core.monitor.catalogue import quantity_named, quantity_of
 from core.stiffness.bracket_ratio import reported_name
 from core.stiffness.estimators import ESTIMATORS
@@ -207,7 +206,7 @@ def result_model(
         bearing=bearing,
         time=newest and newest.time_ns,
         speed_source=newest and newest.speed_source,
-        estimators=estimator_names(shown) if shown else {"xx": None, "yy": None},
+        estimators=shown.estimators if shown else {"xx": None, "yy": None},
         readings=readings,
     )
 
@@ -221,43 +220,26 @@ def latest_model(live: LiveUnits, unit: str, bearing: str) -> LatestModel:
         result_model(current, bearing, {n: reading_model(r) for n, r in current.readings.items()}),
         unit=unit,
         window=newest and window_model(newest.window),
-        runout=runout_names(shown) if shown else {"shaft_x": None, "shaft_y": None},
+        runout=shown.runout if shown else {"shaft_x": None, "shaft_y": None},
         clipped_share=shown.clipped_share if shown else {},
     )
-
-
-def estimator_names(assessment: Assessment) -> dict[str, EstimatorName | None]:
-    """Return the names of the estimators that give the preferred stiffness, by axes."""
-    chosen = assessment.estimators
-    return {axes: estimator.value if estimator else None for axes, estimator in chosen.items()}
-
-
-def runout_names(assessment: Assessment) -> dict[str, RunoutName | None]:
-    """Return the state of the runout compensation of each shaft channel, by channel."""
-    return {place: verdict.value for place, verdict in assessment.runout.items()}
 
 
 def bearing_router(context: Context) -> APIRouter:
     """Return the router for bearings."""
     router = subject_router("/units/{unit}/bearings", "bearing")
-    unknown, no_result = problem_responses(404), problem_responses(404, 409)
 
-    @router.get("", summary="All bearings of a unit", responses=unknown)
+    @router.get("", summary="All bearings of a unit")
     async def bearings(unit: UnitId) -> list[BearingModel]:
         """List the guide bearings of a unit with their configuration and gap reference in force."""
         return [_bearing(context, unit, bearing.id) for bearing in context.unit(unit).bearing]
 
-    @router.get("/{bearing}", summary="One bearing as configured", responses=unknown)
+    @router.get("/{bearing}", summary="One bearing as configured")
     async def one_bearing(unit: UnitId, bearing: BearingId) -> BearingModel:
         """Return bracket stiffness, clearance, channels and gap reference of a bearing."""
         return _bearing(context, unit, bearing)
 
-    @router.get(
-        "/{bearing}/latest",
-        summary="One bearing now",
-        response_model=LatestModel,
-        responses=unknown,
-    )
+    @router.get("/{bearing}/latest", summary="One bearing now", response_model=LatestModel)
     async def latest(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the newest result of a bearing; readings are null if the result is not current."""
         context.bearing(unit, bearing)
@@ -270,7 +252,7 @@ def bearing_router(context: Context) -> APIRouter:
         "/{bearing}/budgets/{quantity}",
         summary="Uncertainty budget",
         response_model=BudgetModel,
-        responses=no_result,
+        responses=problem_responses(409),
     )
     async def budget(
         request: Request, unit: UnitId, bearing: BearingId, quantity: QuantityName
@@ -330,7 +312,7 @@ def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
         quantity=quantity,
         time=assessment.time_ns,
         uncertainty=UncertaintyModel.of(budget, low_95=low, high_95=high),
-        lines=[BudgetLineModel.of(line) for line in lines],
+        lines=lines,
     )
 
 

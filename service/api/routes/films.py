@@ -17,7 +17,7 @@ from core.change.settings import ChangeLimits, FilmRules, percent_of
 from core.limits import AlarmLevel
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
-from service.api.problems import ProblemError, problem_responses
+from service.api.problems import ProblemError
 from service.api.routes.film_models import (
     FilmBriefModel,
     FilmChangeModel,
@@ -271,9 +271,7 @@ def film_router(context: Context) -> APIRouter:
     """Return the router for the current state of a film."""
     router = subject_router("/units/{unit}/bearings/{bearing}/film", "film")
 
-    @router.get(
-        "", summary="A film now", response_model=FilmModel, responses=problem_responses(404)
-    )
+    @router.get("", summary="A film now", response_model=FilmModel)
     async def film(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return verdict, change of stiffness and cause in x and y, and the operating condition.
 

@@ -10,7 +10,6 @@ from service.api.auth.declared import needs, subject_router
 from service.api.auth.gate import actor_or
 from service.api.context import Context, UnitId
 from service.api.parameters import Moment, OptionalTimeRange, ns_from_datetime
-from service.api.problems import problem_responses
 from service.api.routes.alarms import COMMENT_LIMIT, Allowances
 from service.api.values import ActorModel, ApiModel, ReasonText, Time
 from service.store.access.identities import Permission
@@ -51,7 +50,7 @@ def note_router(context: Context) -> APIRouter:
     router = subject_router("/units/{unit}/notes", "plant")
     allowances = Allowances()
 
-    @router.get("", summary="Notes", responses=problem_responses(404, 422, 503))
+    @router.get("", summary="Notes")
     async def notes(unit: UnitId, times: OptionalTimeRange) -> list[NoteModel]:
         """List the notes about a unit and its bearings that refer to a time range.
 
@@ -65,7 +64,7 @@ def note_router(context: Context) -> APIRouter:
     @router.post(
         "",
         summary="Add a note",
-        responses=problem_responses(403, 404, 422, 503) | COMMENT_LIMIT,
+        responses=COMMENT_LIMIT,
         dependencies=[needs(Permission.ACT_ON_ALARMS)],
     )
     async def add_note(request: Request, unit: UnitId, asked: AddNoteModel) -> NoteModel:

@@ -14,7 +14,7 @@ from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange
-from service.api.problems import ProblemError, problem_responses
+from service.api.problems import ProblemError
 from service.api.routes.trend_groups import GroupName, TooManyGroupsError, TrendGroup, trend_groups
 from service.api.tables import Column, Format, table_content, table_response
 from service.api.values import (
@@ -244,13 +244,12 @@ Cursor = Annotated[
 def trend_router(context: Context) -> APIRouter:
     """Return the router for trends."""
     router = subject_router("/units/{unit}/bearings", "bearing")
-    reading = problem_responses(404, 422, 503)
 
     @router.get(
         "/{bearing}/trends",
         summary="Trends",
         response_model=TrendModel,
-        responses={**reading, **table_content("Trends, by column")},
+        responses=table_content("Trends, by column"),
     )
     async def trends(
         request: Request,

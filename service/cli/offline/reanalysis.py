@@ -10,7 +10,6 @@ from core.monitor.refresh import Refresh
 from core.quality import Level, Reason
 from core.samples.calibration import UnitCalibration
 from core.stiffness.bracket_ratio import reported_name
-from service.api.routes.bearings import estimator_names, runout_names
 from service.api.values import QualityModel, reading_model, window_model
 from service.runtime.times import rfc3339
 
@@ -23,9 +22,9 @@ def assessment_document(assessment: Assessment) -> dict[str, Any]:
         "time": rfc3339(assessment.time_ns),
         "quality": QualityModel.of(assessment.quality),
         "speed_source": assessment.speed_source.value,
-        "runout": runout_names(assessment),
+        "runout": dict(assessment.runout),
         "window": window_model(assessment.window),
-        "estimators": estimator_names(assessment),
+        "estimators": dict(assessment.estimators),
         "readings": {name: reading_model(r) for name, r in assessment.readings.items()},
     }
 
