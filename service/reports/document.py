@@ -15,14 +15,13 @@ from service.reports.parts import (
     ComparisonPart,
     Direction,
     EvidencePart,
-    LevelWord,
     Sha256,
 )
 from service.reports.snapshot import Snapshot
 from service.runtime.files import CHUNK
 from service.runtime.models import ByName, Finite, Time
 from service.runtime.times import rfc3339
-from service.settings.alarm_kinds import value_unit
+from service.settings.alarm_kinds import AlarmLevelName, value_unit
 from service.settings.configuration import Configuration, canonical, without_secrets
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
@@ -55,7 +54,7 @@ class AlarmPart(EvidencePart):
     change: Annotated[str, Field(examples=["raised"])]
     """Change of the alarm: raised or escalated."""
 
-    level: Annotated[LevelWord, ByName] | None
+    level: Annotated[AlarmLevelName, ByName] | None
     """Alarm level after the event; null without a level."""
 
     state: Annotated[str, Field(examples=["unacknowledged"])]

@@ -5,7 +5,9 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
 
+from service.live.models import BaselineOriginModel, BudgetLineModel, FilmCauseModel
 from service.runtime.models import ByName, Finite, Time, ValueModel
+from service.settings.alarm_kinds import AlarmLevelName
 
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", examples=["9f86d081884c7d65" * 4])]
 
@@ -25,8 +27,6 @@ def rounded(number: float | None) -> float | None:
 
 
 Direction = Literal["x", "y"]
-
-LevelWord = Literal["alert", "danger"]
 
 QualityWord = Literal["good", "uncertain", "bad"]
 
@@ -81,28 +81,6 @@ class EstimatorPart(EvidencePart):
     """Whether film monitoring uses this estimator."""
 
 
-class BudgetLinePart(EvidencePart):
-    """Contribution to the uncertainty of a result."""
-
-    name: Annotated[str, Field(examples=["bracket stiffness"])]
-    """Name of the contribution."""
-
-    kind: Literal["random", "systematic"]
-    """Kind of the contribution: random between results, or systematic (constant)."""
-
-    distribution: Literal["normal", "uniform"]
-    """Probability distribution of the contribution."""
-
-    width: float
-    """Standard uncertainty if normal, half-width if uniform, in the unit of the contribution."""
-
-    sensitivity: float
-    """Change of the result per unit of the contribution."""
-
-    contribution: float
-    """Standard uncertainty of the result due to this alone, in the unit of the result."""
-
-
 class WindowPart(EvidencePart):
     """Window of samples that the results were computed from."""
 
@@ -144,20 +122,8 @@ class ConditionPart(EvidencePart):
     """Limits of the cell along each of these axes, [low, high]; null if `cell` is null."""
 
 
-class CausePart(EvidencePart):
-    """Cause of a stiffness change, as attributed by comparing shaft and bearing motion."""
-
-    cause: Annotated[str, Field(examples=["film"])]
-    """Cause: film, oil, clearance, bracket, transducer, bracket_or_transducer or unknown."""
-
-    reason: Annotated[str, Field(examples=["shaft motion agrees with no single cause"])]
-    """Reason for the attribution."""
-
-    film_share: Finite
-    """Fraction of the change due to the film if the rest is a transducer's; null if unknown."""
-
-    film_share_std: Finite
-    """Standard uncertainty of `film_share`; null if that is null."""
+class CausePart(FilmCauseModel):
+    """Cause of a stiffness change, with the motion of shaft and bearing that it agrees with."""
 
     shaft_change: Finite
     """Change of the shaft motion against the expected motion, ln of the ratio; null if unknown."""
@@ -178,7 +144,7 @@ class FindingPart(EvidencePart):
     verdict: Annotated[str, ByName, Field(examples=["alert"])]
     """Verdict: normal, alert, danger, or the reason why the film was not judged."""
 
-    level: Annotated[LevelWord, ByName] | None
+    level: Annotated[AlarmLevelName, ByName] | None
     """Alarm level of the film; null without an alarm."""
 
     change_percent: Finite
@@ -246,33 +212,15 @@ class BearingPart(EvidencePart):
     estimators: list[EstimatorPart]
     """Stiffness estimates of all estimators."""
 
-    budgets: dict[str, list[BudgetLinePart]]
+    budgets: dict[str, list[BudgetLineModel]]
     """Uncertainty budgets by quantity."""
 
     film: FilmReadingPart | None
     """Findings about the films of the bearing; null if not monitored or not judged yet."""
 
 
-class BaselinePart(EvidencePart):
+class BaselinePart(BaselineOriginModel):
     """Baseline of a bearing."""
-
-    version: int
-    """Version number of the baseline."""
-
-    author: Annotated[str, Field(examples=["padwatch"])]
-    """Person or program that created the baseline."""
-
-    created: Time
-    """Time of creation of the baseline."""
-
-    event: str
-    """Event on the machine that required a new baseline; may be empty."""
-
-    learned_from: Time
-    """Time of the first learned reading."""
-
-    learned_until: Time
-    """Time of the last learned reading."""
 
     scatter: float
     """Scatter of single readings about the expected stiffness, over all cells, in ln."""

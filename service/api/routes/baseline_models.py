@@ -14,6 +14,7 @@ from service.api.values import (
     ReasonText,
     Time,
 )
+from service.live.models import BaselineOriginModel
 
 BaselineStatusName = Literal["in_force", "rejected", "superseded", "learned"]
 
@@ -24,11 +25,8 @@ BaselineStepName = Literal[
 SupportName = Literal["own", "borrowed", "none"]
 
 
-class BaselineVersionModel(ApiModel):
+class BaselineVersionModel(BaselineOriginModel):
     """Version of the learned baseline of a bearing, without its cells."""
-
-    version: Annotated[int, Field(examples=[3])]
-    """Number of the version, from 1."""
 
     estimator: EstimatorName
     """Estimator of the learned stiffness."""
@@ -36,21 +34,6 @@ class BaselineVersionModel(ApiModel):
     status: BaselineStatusName
     """Status: in force; rejected by an engineer; superseded by another version or by a machine
     event; or learned and not yet accepted by an engineer."""
-
-    author: str
-    """Person or program that started the learning."""
-
-    created: Time
-    """Time when the baseline was learned, by the host clock."""
-
-    learned_from: Time
-    """Time of the first reading of the learning period."""
-
-    learned_until: Time
-    """Time of the last reading of the learning period."""
-
-    event: str
-    """Machine event that made this version necessary; empty without an event."""
 
     remark: Annotated[str, Field(examples=["-5.1 % from version 1 under like conditions"])]
     """Reason why this version was not accepted automatically, remark on its readings, or empty."""

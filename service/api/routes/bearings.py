@@ -29,6 +29,7 @@ from service.api.values import (
     window_model,
 )
 from service.live.current_state import LiveUnits
+from service.live.models import BudgetLineModel
 from service.live.status import CurrentBearing
 from service.store.references import GapReference
 
@@ -139,28 +140,6 @@ class LatestModel(ResultModel, BearingAnswer):
 
     window: WindowModel | None
     """Averaging window of the newest result; null without a result."""
-
-
-class BudgetLineModel(ApiModel):
-    """Contribution of one source of uncertainty to the uncertainty of a result."""
-
-    name: Annotated[str, Field(examples=["bracket stiffness"])]
-    """Name of the source of uncertainty."""
-
-    kind: Literal["random", "systematic"]
-    """Kind of error: random if it differs between results, systematic if it is constant."""
-
-    distribution: Literal["normal", "uniform"]
-    """Assumed distribution of the error."""
-
-    width: float
-    """Standard uncertainty (normal) or half-width (uniform) of the source, in its own unit."""
-
-    sensitivity: float
-    """Sensitivity coefficient: change of the result divided by the change of the source."""
-
-    contribution: float
-    """Standard uncertainty of the result due to this source alone, in the unit of the result."""
 
 
 class BudgetModel(ApiModel):

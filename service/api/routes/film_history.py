@@ -16,7 +16,7 @@ from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange
 from service.api.problems import problem_responses
-from service.api.routes.film_models import LevelHeldName, VerdictName
+from service.api.routes.film_models import VerdictName
 from service.api.routes.films import watched_place
 from service.api.tables import Column, Format, kind_of, table_content, table_response
 from service.api.values import (
@@ -29,6 +29,7 @@ from service.api.values import (
     listed,
     states_named,
 )
+from service.settings.alarm_kinds import AlarmLevelName
 from service.store.film_readings import FilmHistory, FilmQuery
 from service.store.port import QueryTooLargeError
 
@@ -64,7 +65,7 @@ class FilmSeriesModel(ApiModel):
     verdict: list[Annotated[VerdictName, ByName]]
     """Verdict on the film when the reading was made."""
 
-    level: list[Annotated[LevelHeldName, ByName] | None]
+    level: list[Annotated[AlarmLevelName, ByName] | None]
     """Alarm level in force when the reading was made; null without a level."""
 
     change_percent: list[float | None]
@@ -82,7 +83,7 @@ class FilmSeriesModel(ApiModel):
     ck_verdict: list[Annotated[VerdictName, ByName]]
     """Verdict on damping over stiffness when the reading was made."""
 
-    ck_level: list[Annotated[LevelHeldName, ByName] | None]
+    ck_level: list[Annotated[AlarmLevelName, ByName] | None]
     """Alarm level of damping over stiffness; null without a level."""
 
     ck_change_percent: list[float | None]

@@ -12,6 +12,8 @@ from service.api.values import (
     FilmConditionModel,
     Time,
 )
+from service.live.models import FilmCauseModel
+from service.settings.alarm_kinds import AlarmLevelName
 
 VerdictName = Literal[
     "normal",
@@ -24,19 +26,6 @@ VerdictName = Literal[
     "transient",
     "no_reading",
 ]
-
-CauseName = Literal[
-    "film",
-    "oil",
-    "clearance",
-    "bracket",
-    "transducer",
-    "bracket_or_transducer",
-    "unknown",
-]
-
-
-LevelHeldName = Literal["alert", "danger"]
 
 
 class FilmChangeModel(ApiModel):
@@ -73,24 +62,6 @@ class FilmDeviationModel(ApiModel):
     """Upper end of the 95 % interval of the deviation, %."""
 
 
-class FilmCauseModel(ApiModel):
-    """Cause of a change, inferred from damping over stiffness and the motion of the shaft."""
-
-    cause: CauseName
-    """Cause: film of this bearing, oil, clearance or wear, bracket, transducer, bracket or
-    transducer, or unknown."""
-
-    reason: str
-    """Reason why this cause was inferred, with its numbers."""
-
-    film_share: float | None
-    """Fraction of the change that is due to the film if a transducer error causes the rest, 0 to 1
-    within its uncertainty; null if unknown, or if no such combination explains the motion."""
-
-    film_share_std: float | None
-    """Standard uncertainty of `film_share`; null if `film_share` is null."""
-
-
 class FilmVerdictModel(ApiModel):
     """Verdict and alarm level of a film in one direction, x or y."""
 
@@ -101,7 +72,7 @@ class FilmVerdictModel(ApiModel):
     value ("bad_quality"), a unit that has not settled ("transient"), or no current reading
     ("no_reading")."""
 
-    level: Annotated[LevelHeldName, ByName] | None
+    level: Annotated[AlarmLevelName, ByName] | None
     """Alarm level in force, also while the newest reading cannot be judged; null if none."""
 
 
@@ -217,7 +188,7 @@ class FilmWordModel(FilmVerdictModel, FilmStiffnessModel):
     """Deviation of the newest reading alone, % of the expected stiffness; null if this reading was
     not compared."""
 
-    ck_level: LevelHeldName | None
+    ck_level: AlarmLevelName | None
     """Alarm level of damping over stiffness in force; null without a level."""
 
     ck_change_percent: float | None
