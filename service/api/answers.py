@@ -166,7 +166,8 @@ class Answers:
 
     async def _of(self, scope: Scope, revision: Revision, make: Make) -> Response:
         headers = Headers(scope=scope)
-        tag = self._tag(scope, revision())
+        url = scope["path"].encode() + b"?" + scope["query_string"]
+        tag = tag_of(self.started.encode(), url, repr(revision()).encode())
         if is_known(tag, headers.get("if-none-match")):
             return Response(status_code=304, headers={"ETag": tag})
         key = (tag, encoding_of(headers))
@@ -174,10 +175,6 @@ class Answers:
             self._kept.move_to_end(key)
             return kept
         return await self._made(key, make)
-
-    def _tag(self, scope: Scope, revision: Hashable) -> str:
-        url = scope["path"].encode() + b"?" + scope["query_string"]
-        return tag_of(self.started.encode(), url, repr(revision).encode())
 
     async def _made(self, key: tuple[str, str], make: Make) -> Response:
         making = self._making.get(key)

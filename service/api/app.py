@@ -62,16 +62,6 @@ class GuardedApi(FastAPI):
         if self.openapi_url:
             self.add_route(self.openapi_url, self._published, include_in_schema=False)
 
-    def require_declarations(self) -> None:
-        """Collect the declared permissions of all routes; call it after adding the last route.
-
-        Raises
-        ------
-        UndeclaredRouteError
-            If a route has no declaration.
-        """
-        self.declared = declared(self)
-
     def openapi(self) -> dict[str, Any]:
         """Return the OpenAPI document, built at the first call, after all routes were added.
 
@@ -146,5 +136,5 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
         *others,
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
-    app.require_declarations()
+    app.declared = declared(app)  # raises an error for a route without a declaration
     return app

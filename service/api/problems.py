@@ -155,7 +155,9 @@ async def refuse_unknown_parameters(request: Request) -> None:
         For a body, or for the first unknown parameter; the message lists the known parameters.
     """
     route = request.scope["route"]
-    if route.body_field is None and _has_body(request):
+    length = request.headers.get("content-length", "0")
+    has_body = length != "0" or "transfer-encoding" in request.headers
+    if route.body_field is None and has_body:
         raise ProblemError(400, "Unexpected body", "this request takes no body")
     operation = f"{request.method} {route.path}"
     known = request.app.declared[operation].query_parameters
@@ -163,11 +165,6 @@ async def refuse_unknown_parameters(request: Request) -> None:
         if name not in known:
             detail = f"unknown parameter {name!r}; known parameters: {', '.join(known) or 'none'}"
             raise ProblemError(422, "Wrong parameter", detail, name)
-
-
-def _has_body(request: Request) -> bool:
-    headers = request.headers
-    return headers.get("content-length", "0") != "0" or "transfer-encoding" in headers
 
 
 def problem_schemas() -> dict[str, Any]:

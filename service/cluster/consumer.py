@@ -203,9 +203,6 @@ def _sequence(message: Msg) -> int:
     return message.metadata.sequence.stream
 
 
-UNIT = ("unit",)
-
-
 CONSUMER = {
     "stream_connected": "This is 1 while blocks are read from the stream.",
     "stream_pending": "This is the number of messages of the unit on the stream that were not"

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from pydantic import ConfigDict
 
 from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmState
-from core.alarms.statistics import ChatterRule
+from core.alarms.statistics import HIDDEN, ChatterRule
 from core.limits import AlarmLevel
 from service.live.snapshot import UnitSnapshot
 from service.settings.alarm_kinds import ANALYSIS_GONE, SAMPLES_LOST
-
-HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol
 
 from core.alarms.alarm import PLANT, Alarm
+from core.alarms.statistics import HIDDEN
 from core.change.decision import JUDGED, Verdict
 from core.change.film_judge import FilmNews
 from core.limits import AlarmLevel
 from core.quality import Level
-from service.live.alarm_list import HIDDEN, AlarmCount
+from service.live.alarm_list import AlarmCount
 from service.live.status import CurrentBearing, LinkState, UnitStatus
 from service.runtime.metrics import Families
 

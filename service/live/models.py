@@ -30,13 +30,22 @@ class BudgetLineModel(ValueModel):
 
 
 class FilmCauseModel(ValueModel):
-    """Cause of a change of stiffness, inferred from the motion of shaft and bearing."""
+    """Cause of a change, inferred from damping over stiffness and the motion of the shaft."""
 
-    cause: Literal["film", "oil", "bracket_or_transducer", "unknown"]
-    """Cause: film of this bearing, oil of all bearings, bracket or transducer, or unknown."""
+    cause: Literal[
+        "film",
+        "oil",
+        "clearance",
+        "bracket",
+        "transducer",
+        "bracket_or_transducer",
+        "unknown",
+    ]
+    """Cause: film of this bearing, oil, clearance or wear, bracket, transducer, bracket or
+    transducer, or unknown."""
 
     reason: str
-    """Reason why this cause was inferred."""
+    """Reason why this cause was inferred, with its numbers."""
 
     film_share: Finite
     """Fraction of the change that is due to the film if a transducer error causes the rest, 0 to 1

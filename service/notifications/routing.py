@@ -4,13 +4,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmState
+from core.alarms.statistics import HIDDEN
 from core.limits import AlarmLevel
 from service.notifications.message import Composer, dumps
 from service.settings.notifications import ReceiverSettings
 from service.store.outbox import OutboxMessage
 
 ACTIVE = (AlarmState.UNACKNOWLEDGED, AlarmState.ACKNOWLEDGED)
-HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 
 HIDING = (AlarmChange.SHELVED, AlarmChange.SUPPRESSED, AlarmChange.TAKEN_OUT_OF_SERVICE)
 SHOWING = (AlarmChange.UNSHELVED, AlarmChange.UNSUPPRESSED, AlarmChange.RETURNED_TO_SERVICE)

@@ -29,8 +29,6 @@ NAME = re.compile(
     r"(\d{8}T\d{6}\.\d{3}Z)-([A-Za-z0-9][A-Za-z0-9_.-]{0,31})-([a-z0-9_]+)-(\d{1,12})"
 )
 
-UNIT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
-
 
 @dataclass(frozen=True)
 class Place:

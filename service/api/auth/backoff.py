@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from ipaddress import IPv6Address, ip_address
 from threading import Lock
 
-NS_PER_S = 1_000_000_000
+from core.units import NS_PER_S
+
 MAX_REMEMBERED = 4096
 """Maximum number of accounts, and of addresses, whose failures are stored."""
 

@@ -175,7 +175,10 @@ def trend_answer(
         "simulated_until": simulated_until(query, past_end_ns),
         "coarse_until": None if trend.coarse_until_ns is None else rfc3339(trend.coarse_until_ns),
         "next_cursor": None if trend.next_ns is None else str(trend.next_ns),
-        "groups": None if groups is None else [_group(each) for each in groups],
+        "groups": groups
+        and [
+            {"name": g.name, "low": g.low, "high": g.high, **_columns_of(g.trend)} for g in groups
+        ],
     }
 
 
@@ -184,11 +187,6 @@ def simulated_until(query: TrendQuery, past_end_ns: int | None) -> str | None:
     if past_end_ns is None or past_end_ns < query.start_ns:
         return None
     return rfc3339(past_end_ns)
-
-
-def _group(group: TrendGroup) -> dict[str, object]:
-    own = {"name": group.name, "low": group.low, "high": group.high}
-    return {**own, **_columns_of(group.trend)}
 
 
 def _columns_of(trend: Trend) -> dict[str, object]:

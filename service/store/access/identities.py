@@ -8,6 +8,8 @@ from enum import StrEnum
 from hashlib import sha256
 from types import MappingProxyType
 
+from core.units import NS_PER_S
+
 
 class Permission(StrEnum):
     """Permission for a group of operations of the service, granted by a role."""
@@ -117,9 +119,6 @@ LOCAL = "local"
 """Name in the identity of an unauthenticated program or browser on this computer."""
 
 
-NS_PER_S = 1_000_000_000
-
-
 @dataclass(frozen=True)
 class Session:
     """Login session of an account, as stored; times are in ns since 1970 UTC.
@@ -178,7 +177,7 @@ class SessionLimits:
 
 
 MAX_DAYS = 3650
-SEEN_STEP_NS = 60 * 1_000_000_000
+SEEN_STEP_NS = 60 * NS_PER_S
 """Resolution of an API key's stored time of last use; each update is a write to the disk."""
 
 

@@ -292,7 +292,7 @@ def test_a_route_without_a_declaration_is_refused_by_its_name():
     app.include_router(router)
 
     with pytest.raises(UndeclaredRouteError, match=r"^PUT /things/\{thing\}: "):
-        app.require_declarations()
+        declared(app)
 
 
 def test_what_is_no_operation_or_two_of_one_name_is_refused():

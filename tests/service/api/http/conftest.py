@@ -13,7 +13,7 @@ from pydantic import BaseModel
 
 from service.api.answers import Answers
 from service.api.app import GuardedApi
-from service.api.auth.declared import OPEN
+from service.api.auth.declared import OPEN, declared
 from service.api.http.server import HttpServer, http_server
 from service.api.problems import install_problem_handlers, refuse_unknown_parameters
 from service.runtime.asker import ASKER, Asker
@@ -49,7 +49,7 @@ class Application:
         app.add_api_route("/", self.post, methods=["POST"], dependencies=checks)
         app.add_api_route("/slow", self.slow, dependencies=checks)
         app.add_api_route("/large", self.large, dependencies=checks)
-        app.require_declarations()
+        app.declared = declared(app)
         return app
 
     async def hello(self, request: Request) -> Response:
