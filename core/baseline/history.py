@@ -169,7 +169,7 @@ class StiffnessHistory:
         return value, getattr(self, quantity.uncertainty)[quantity.row], outcome
 
     def rows(self, start: int, stop: int) -> "StiffnessHistory":
-        """Return the readings from row `start` up to, but not including, row `stop`."""
+        """Return the readings with the indices `start` to `stop - 1`."""
         return self.where(slice(start, stop))
 
     def where(self, wanted: npt.NDArray[np.bool_] | slice) -> "StiffnessHistory":

@@ -56,9 +56,9 @@ def outcomes(
 ) -> Iterator[Outcome]:
     """Yield, for each reading of a film in one direction, its comparison with the baseline.
 
-    Readings that cannot be compared yield a verdict, as do all readings without a baseline. Columns
-    are (n,): `value` is ln of the stiffness, NaN if missing, with the random standard uncertainty
-    `u_random`; `codes` are of `ReadingOutcome`.
+    A verdict is yielded instead if a reading cannot be compared, or if there is no baseline. All
+    arrays are (n,): `value` is ln of the stiffness (NaN if it was not measured), `u_random` its
+    random standard uncertainty, and `codes` are values of `ReadingOutcome`.
     """
     unusable = np.full(value.size, -1)
     columns: tuple[FloatArray, ...] = (np.zeros(value.size),) * 4

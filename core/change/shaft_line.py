@@ -57,7 +57,7 @@ FITS = 3.0
 
 
 class LineVerdict(StrEnum):
-    """Verdict of the line on the transducers of one bearing in one direction."""
+    """Verdict of the shaft line on the transducers of one bearing in one direction."""
 
     UNKNOWN = "unknown"
     HOLDS = "holds"

@@ -72,10 +72,7 @@ def used_lines(
 ) -> list[npt.NDArray[np.int64]]:
     """Return for each spectrum the indices of the lines that have motion and little leakage.
 
-    Parameters
-    ----------
-    between : (n_lines,)
-        Mask from `between_harmonics`.
+    `between` (n_lines,) is the mask of the lines between the harmonics of the running speed.
     """
     inside = np.flatnonzero(between & _in_band(settings.band_hz, spectra[0]))
     if inside.size == 0:
@@ -106,6 +103,8 @@ def between_harmonics(
     turn_hz
         Lowest and highest 1× frequency measured in the averaging window; the guard of the n-th
         harmonic spans n times this range.
+    guard_bins
+        Smallest distance of a line from the harmonics, in bins.
     """
     lowest, highest = turn_hz
     guard_hz = guard_bins * (frequency_hz[1] - frequency_hz[0])
@@ -165,7 +164,7 @@ def conditional_power(matrix: ComplexArray, given: ComplexArray, cross: ComplexA
 
 
 def own_power(matrix: ComplexArray) -> FloatArray:
-    """Return the power of the channels of cross-spectra (..., n, n, n_lines), (..., n, n_lines)."""
+    """Return the power of each channel (..., n, n_lines) of cross-spectra (..., n, n, n_lines)."""
     power: FloatArray = np.einsum("...iil->...il", matrix).real
     return power
 
@@ -185,7 +184,7 @@ def probe_noise_power(
     Parameters
     ----------
     between : (n_lines,)
-        Mask from `between_harmonics`.
+        Mask of the lines between the harmonics of the running speed.
     n_segments : (n, 1)
         Number of independent segments of each average; at least 3.
 

@@ -249,7 +249,7 @@ class FilmFits(FittedFilms):
     def film_covariance_with(self, fitted: Sequence[int]) -> FloatArray:
         """Return the random covariance of the unknowns if the properties `fitted` are fitted too.
 
-        It is (n, 2, 4, 4).
+        The result is (n, 2, 4, 4); `fitted` are the indices of the bracket properties.
         """
         influences, own = self.estimate(fitted)[1], self._inverse_normal
         found = []

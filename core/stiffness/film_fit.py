@@ -161,7 +161,7 @@ class FilmLines:
 
 
 class FilmTerms:
-    """Products, at each line, of the terms of films, for the normal equations of the fits.
+    """Products of the terms of films at each line, for the normal equations of the fits.
 
     The force of a row is a sum of terms ``θ φ(ω) u`` with real coefficients θ, functions φ, and the
     shaft's motion u in x and y. Coefficients are ordered by function, then by motion.
@@ -209,7 +209,7 @@ class FilmTerms:
         return normal, share
 
     def moments(self, weight: FloatArray, n_functions: int = N_FUNCTIONS) -> FloatArray:
-        """Return the moments of the terms with the brackets' forces, (n, 2, p)."""
+        """Return the weighted sums over lines of each term times the bracket's force, (n, 2, p)."""
         summed: FloatArray = self._moments[:, :, : 2 * n_functions] @ weight[..., np.newaxis]
         return summed[..., 0]
 
@@ -251,7 +251,7 @@ class WeightedTerms:
 
     @cached_property
     def moments(self) -> FloatArray:
-        """Moments of the terms with the brackets' forces, (n, 2, 8)."""
+        """Weighted sums over lines of each term times the bracket's force, (n, 2, 8)."""
         return self.terms.moments(self.weight)
 
 
