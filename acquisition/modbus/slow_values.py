@@ -71,7 +71,7 @@ class PolledSlowValues:
     def current(self) -> Mapping[str, Reading]:
         """Return the newest reading (value and quality) of each slow channel, by channel id.
 
-        If the newest poll is too old, or none has succeeded, readings are missing, with a reason.
+        If the newest poll is too old, or none has succeeded, readings have a reason but no value.
         """
         self._raise_bug()
         if self._newest is None:
@@ -128,7 +128,7 @@ class PolledSlowValues:
 class JoinedSource:
     """Source that adds the current slow values of a second device to each waveform block.
 
-    If the slow device is lost or faulty, its values are missing with a reason, and the waveforms
+    If the slow device is lost or faulty, its readings have a reason but no value, and the waveforms
     continue. The slow device is polled only while the waveform source is connected, so that retries
     of the waveform link do not reconnect it.
     """

@@ -200,9 +200,10 @@ class AlarmEvent:
     time_ns
         Time of the samples that caused the event, or host time of an action or link event.
     occurrence, raised_at
-        Number and operating point of the newest occurrence, as in `Alarm`.
+        Number of the newest occurrence, and operating point at its start; None if unknown.
     value, limit, directions
-        Numbers and directions of the judgement at the time of the event, as in `Judgement`.
+        Judged value and its limit (None for a judgement without numbers), and directions in which
+        the limit was exceeded, at the time of the event.
     actor
         Person who performed the action; empty for automatic events.
     reason

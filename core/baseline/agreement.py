@@ -118,8 +118,8 @@ def far_readings(
 ) -> str | None:
     """Return a warning text if settled readings are at least twice or at most half the baseline.
 
-    None if there are no such readings. `is_settled` (n,) selects the readings. The robust fit
-    rejects such readings, so the baseline itself does not show them.
+    None if no reading is that far from the baseline. `is_settled` (n,) selects the readings. The
+    robust fit rejects far readings, so the baseline itself does not show them.
     """
     counts = []
     for learned in baseline.quantities:

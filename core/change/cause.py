@@ -109,7 +109,7 @@ class UnitReadings:
     attitude_deg
         Attitude angle of the shaft centre.
     motion_um : (2, n_films, n)
-        1× phasors of shaft and bearing; empty if there are none.
+        1× phasors of shaft and bearing; empty if the phases are unknown.
     """
 
     ln_k: FloatArray

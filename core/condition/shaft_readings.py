@@ -83,8 +83,8 @@ def slow_channels(unit: Unit, bearing: Bearing) -> dict[str, str | None]:
 def slow_results(segments: Sequence[Segment], channels: Mapping[str, str | None]) -> Found:
     """Return the means of slow channels over the segments, with their budgets, by quantity.
 
-    `channels` is from `slow_channels`; the reading of an absent channel is missing. The uncertainty
-    is that of the scatter, without the unknown calibration of the transmitters.
+    `channels` is from `slow_channels`; the reading of an absent channel has no value. Uncertainties
+    are due to the scatter, without the unknown calibration of the transmitters.
     """
     found: dict[str, Budgeted] = {}
     for name, channel in channels.items():

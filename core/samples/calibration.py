@@ -63,7 +63,7 @@ class SlowCalibration:
     maximum: float
 
     def reading(self, value: float) -> Reading:
-        """Return a value of the channel as a reading; missing if not finite or out of range."""
+        """Return a value of the channel as a reading; bad if not finite or out of range."""
         if not np.isfinite(value):
             return missing(Reason.NOT_MEASURED)
         if not self.minimum <= value <= self.maximum:

@@ -28,7 +28,10 @@ class RunoutVerdict(StrEnum):
 def runout_verdict(
     vector: SlowRollVector | None, probe: str, rated_speed_rpm: float, has_key_phase: bool
 ) -> RunoutVerdict:
-    """Return `APPLIED` if a slow-roll vector (None without one) fits a probe, else the reason."""
+    """Return `APPLIED` if a slow-roll vector is valid for the installed `probe`, else the reason.
+
+    `vector` is None if it was not measured.
+    """
     if vector is None:
         return RunoutVerdict.NO_VECTOR
     if vector.probe != probe:

@@ -134,7 +134,7 @@ class Segment:
 
     @cached_property
     def spans_um_pp(self) -> tuple[Reading, ...]:
-        """Broad-band peak-to-peak displacement, in µm, of each channel; missing if not measured."""
+        """Broad-band peak-to-peak displacement, in µm, of each channel; bad if not measured."""
         return self._of_channels(None if self.overall is None else self.overall.peak_to_peak_um)
 
     @cached_property
@@ -150,7 +150,7 @@ class Segment:
         return tuple(self.reading((row,), value) for row, value in enumerate(each))
 
     def reading(self, rows: Sequence[int], value: float) -> Reading:
-        """Return a value with the channels' worst quality; missing for a bad channel or a NaN."""
+        """Return a reading with the channels' worst quality; without a value if `value` is NaN."""
         qualities = [self.channel_quality[row] for row in rows]
         if any(quality.level is Level.BAD for quality in qualities):
             return missing(worst(qualities).reason)

@@ -96,7 +96,7 @@ class Speed:
     Parameters
     ----------
     rpm
-        Speed in r/min; missing at standstill.
+        Speed in r/min; a bad reading at standstill.
     budget
         Uncertainty budget; None for the rated speed and for a speed contradicted by another source.
     """

@@ -20,11 +20,11 @@ class EstimatorEntry:
     stiffness
         Name with a placeholder ``{axes}`` for "xx" or "yy".
     damping
-        Name as for `stiffness`; None for equation (5), which includes damping in stiffness.
+        Name with the same placeholder; None for equation (5), whose stiffness includes damping.
     coherence
         Name with a placeholder ``{axis}`` for "x" or "y".
     ck
-        Damping over stiffness, with a name as for `stiffness`; None if not reported.
+        Name of damping over stiffness, with the same placeholder; None if not reported.
     """
 
     label: str
@@ -99,8 +99,8 @@ def preferred_stiffness(
 
     Returns
     -------
-    The reading and its estimator. Without any value, a missing reading with the reason of the first
-    measured estimator, and None.
+    The reading and its estimator. If no estimator has a value, a reading without a value, with the
+    reason of the first measured estimator, and None.
     """
     found = [(readings[ESTIMATORS[e].stiffness.format(axes=axes)], e) for e in preference]
     measured = [(r, e) for r, e in found if r.quality.reason is not Reason.NOT_MEASURED]
@@ -121,7 +121,7 @@ def preferred_stiffness(
 
 
 def signs_checked(readings: Mapping[str, Reading]) -> dict[str, Reading]:
-    """Return the readings by quantity; those of wrong sign are missing, with reason `polarity`.
+    """Return the readings, without the values of wrong sign, whose reason is then `polarity`.
 
     Direct stiffness and damping of a film are positive. If one transducer of a direction is
     reversed, the ratio of bearing to shaft motion changes its sign, and both become negative.

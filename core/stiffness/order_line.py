@@ -134,7 +134,7 @@ class OrderLine:
         return found
 
     def phases(self, quality_of: QualityOf) -> dict[str, Budgeted]:
-        """Return the phases of the mean 1× vectors, 0° to 360°; missing without a key-phase.
+        """Return the phases of the mean 1× vectors, 0° to 360°; bad readings without a key-phase.
 
         A phase is the lead of the reading over the shaft's mark.
         """

@@ -134,7 +134,7 @@ class CanBusServer(CanDaqServer):
     interface, channel
         Arguments of the same names of `can.Bus` of python-can.
     options
-        Further keyword arguments of `can.Bus`; None for none.
+        Further keyword arguments of `can.Bus`.
     """
 
     def __init__(

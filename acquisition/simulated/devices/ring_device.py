@@ -56,7 +56,7 @@ class RingDevice(ModbusDevice):
     feed
         Source of the samples; defines the number of channels and the sampling rate.
     settings
-        Layout and start values; by default those of `RingDeviceSettings`.
+        Layout and start values; None for the default `RingDeviceSettings`.
 
     Attributes
     ----------
