@@ -96,11 +96,10 @@ class StiffnessHistory:
     outcome
         Values of `ReadingOutcome`; by default, a missing `ln_k` is `BAD_QUALITY`.
     ln_ck, u_ck
-        Natural logarithm of damping over stiffness in s, and its random standard uncertainty.
+        Natural logarithm of damping over stiffness in s, and its random standard uncertainty; NaN
+        by default.
     shaft_phase_deg, bearing_phase_deg
-        Phases of the 1× motion.
-
-    The columns of the last two items are missing by default.
+        Phases of the 1× motion of shaft and bearing; NaN by default.
 
     Raises
     ------

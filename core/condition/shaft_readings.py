@@ -163,8 +163,8 @@ def pad_pattern(pads: Sequence[tuple[Reading, float | None]]) -> dict[str, Readi
 
     The pattern is the mean, the difference of the hottest pad from the mean, and amplitude and
     direction of the first harmonic ``T(θ) = mean + a cos(θ - direction)``, by least squares. It is
-    uncertain if a pad has no reading, and missing with fewer than two pads. The harmonic also needs
-    the angles of all pads, and three pads with readings that lie around the shaft.
+    uncertain if a pad has no reading, and bad with fewer than two pads. The harmonic also needs the
+    angles of all pads, and three pads with readings that lie around the shaft.
 
     Parameters
     ----------
