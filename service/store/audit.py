@@ -51,7 +51,7 @@ class AuditQuery:
     limit
         Maximum number of entries.
     start_ns, end_ns
-        Half-open time range, ns.
+        Half-open time range, ns since 1970 UTC.
     """
 
     before: int = 2**63 - 1
@@ -86,9 +86,10 @@ class AuditChain:
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
-        """Open a write transaction and yield its connection; then update the head file if due.
+        """Open a write transaction and yield its connection; then update the head file.
 
-        Raises `StoreError` if the transaction fails, but not if the head file cannot be written.
+        The head file stays if there are no new entries and its last update succeeded. Raises
+        `StoreError` if the transaction fails, but not if the head file cannot be written.
         """
         with self._lock:
             self._is_due = False
@@ -172,10 +173,7 @@ class AuditStore(AuditedTables):
     def record(self, actions: Sequence[AuditAction]) -> None:
         """Write audit entries about actions that do not change the store; durable on return.
 
-        Raises
-        ------
-        StoreError
-            If the entries were not written.
+        Raises `StoreError` if the entries were not written.
         """
         with self._writing() as writer:
             self._audit.add(writer, actions)
@@ -189,10 +187,10 @@ class AuditStore(AuditedTables):
 def by_time(
     chains: Iterable[tuple[str, Iterable[AuditEntry]]], *, newest_first: bool = False
 ) -> Iterator[tuple[str, AuditEntry]]:
-    """Merge the entries of several chains by time; yield each with the name of its chain.
+    """Merge the entries of several chains by time; yield pairs of chain name and entry.
 
-    Each chain begins with its oldest entry, or with `newest_first` with its newest. Its entries
-    keep their order, also if the clock was set back between them.
+    `chains` are pairs of a name and entries, oldest first, or newest first with `newest_first`.
+    Entries of one chain keep their order, even if the clock was set back between them.
     """
     named = [zip(repeat(name), entries) for name, entries in chains]
     return merge(*named, key=lambda pair: pair[1].time_ns, reverse=newest_first)
@@ -218,10 +216,7 @@ class Trail:
     def verify(self) -> Verdict:
         """Verify the number and hash of each entry and the head file; return the result.
 
-        Raises
-        ------
-        StoreError
-            If the trail does not exist or cannot be read.
+        Raises `StoreError` if the trail does not exist or cannot be read.
         """
         head = self._read_head()  # first: the head may lag behind the trail, but not lead
         with self._reading() as reader:
@@ -240,10 +235,7 @@ class Trail:
     def entries(self) -> Iterator[Iterator[AuditEntry]]:
         """Return a context manager that provides an iterator over all entries, oldest first.
 
-        Raises
-        ------
-        StoreError
-            If the trail does not exist or cannot be read.
+        Raises `StoreError` if the trail does not exist or cannot be read.
         """
         with self._reading() as reader:
             yield _all(reader)
@@ -273,10 +265,7 @@ def newest_of(reader: Connection) -> AuditHead:
 def begin_head(path: Path) -> None:
     """Write the head file of an empty trail; an existing file is kept.
 
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
+    Raises `OSError` if the file cannot be written.
     """
     if not path.exists():
         write_head(path, AuditHead())
@@ -284,7 +273,10 @@ def begin_head(path: Path) -> None:
 
 @contextmanager
 def closed_after_error(database: Database, head: Path) -> Iterator[None]:
-    """Close a database after an error in the block; `OSError` concerns its head file."""
+    """Return a context manager that closes a database after an error in its block.
+
+    An `OSError` must be about the head file `head`; it is converted to `StoreError`.
+    """
     try:
         yield
     except OSError as error:

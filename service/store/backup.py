@@ -107,10 +107,7 @@ def _number(connection: sqlite3.Connection, pragma: str) -> int:
 def alone_in(folder: Path) -> Iterator[None]:
     """Return a context manager that locks a folder against other backups within its block.
 
-    Raises
-    ------
-    BackupError
-        If another backup is being written to the folder.
+    Raises `BackupError` if another backup is being written to the folder.
     """
     descriptor = os.open(folder, os.O_RDONLY)
     try:
@@ -143,9 +140,9 @@ class Backup:
 def back_up(
     database: Path, folder: Path, now_ns: int, n_kept: int, origin: Origin | None = Origin.LIVE
 ) -> Backup:
-    """Back up a database by SQLite's online backup, verify the copy, and remove the oldest copies.
+    """Back up a database by SQLite's online backup, verify the backup, and remove old backups.
 
-    Older copies are removed only after the new copy is verified and on the disk.
+    Old backups are removed only after the new backup, named after `now_ns`, is verified.
 
     Parameters
     ----------
@@ -218,12 +215,10 @@ def _make_room(newest: Path, stem: str, n_kept: int) -> tuple[Path, ...]:
 
 
 def backup_beside(copy: Path, stem: str) -> Path | None:
-    """Return the backup of another file of the same moment; None if there is none.
+    """Return the path of the backup of another database that was made at the same time as `copy`.
 
-    Parameters
-    ----------
-    stem
-        Name of the other file without its suffix.
+    `stem` is the file name of the other database without its suffix. None if the backup does not
+    exist.
     """
     name = NAME.fullmatch(copy.name)
     if name is None:
@@ -265,12 +260,12 @@ def restore(
     Raises
     ------
     BackupError
-        If the backup is damaged or has a newer schema, or the database is in use, and nothing was
-        changed; or if a file cannot be written.
+        If the backup is damaged or has a newer schema, if the database is in use, or if a file
+        cannot be written.
     """
     content = checked(copy, origin)
     if database.exists() and copy.samefile(database):
-        raise BackupError(f"{copy} is the database itself; name a copy")
+        raise BackupError(f"{copy} is the database itself; choose a backup")
     try:
         database.parent.mkdir(parents=True, exist_ok=True)
         return Restored(database, _replace(copy, database, now_ns, origin), content)
@@ -377,9 +372,10 @@ def access_before(database: Path) -> AccessBefore | None:
 
 
 def revoke_again(access: AccessStore, before: AccessBefore | None, now_ns: int) -> AccessAfter:
-    """End all sessions of a restored database, and revoke again the API keys revoked before.
+    """End all sessions of a restored database, and revoke the keys that `before` lists as revoked.
 
-    No key is revoked if `before` is None, since the previous database was missing or unreadable.
+    `before` is the content of the replaced database; None if it was missing or unreadable, in
+    which case no key is revoked.
 
     Raises
     ------

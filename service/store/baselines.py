@@ -140,7 +140,7 @@ class BaselineTables(AuditedTables):
     """Store of baselines, their steps and shaft responses; changes are on the disk on return."""
 
     def add_baseline(self, baseline: BearingBaseline, steps: Sequence[StoredStep]) -> None:
-        """Write a learned baseline with its first steps; a second call has no effect."""
+        """Write a learned baseline with its first steps; writing it again has no effect."""
         origin, document = baseline.origin, to_json(baseline)
         key = (origin.unit, origin.bearing, origin.version)
         learned = (baseline.learned_from_ns, baseline.learned_until_ns)
@@ -163,10 +163,7 @@ class BaselineTables(AuditedTables):
     def baseline(self, unit: str, bearing: str, version: int) -> BearingBaseline | None:
         """Return a baseline; None if the version is unknown.
 
-        Raises
-        ------
-        StoreError
-            If the document of the baseline is invalid.
+        Raises `StoreError` if the document of the baseline is invalid.
         """
         with self._reading() as reader:
             found = reader.execute(SELECT_DOCUMENT, (unit, bearing, version)).fetchone()
@@ -188,18 +185,12 @@ class BaselineTables(AuditedTables):
             return _select_steps(reader, unit, bearing)
 
     def set_response(self, unit: str, response: ShaftResponse, now_ns: int) -> None:
-        """Write the shaft response of a unit; it replaces the previous response."""
+        """Write the shaft response of a unit at `now_ns`; it replaces the previous response."""
         with self._writing() as writer:
             writer.execute(SET_RESPONSE, (unit, now_ns, to_json(response)))
 
     def responses(self) -> dict[str, ShaftResponse]:
-        """Return the shaft responses by unit.
-
-        Raises
-        ------
-        StoreError
-            If the document of a response is invalid.
-        """
+        """Return the shaft responses by unit id; raise `StoreError` if one is invalid."""
         with self._reading() as reader:
             rows = reader.execute("SELECT unit, document FROM shaft_response").fetchall()
         try:

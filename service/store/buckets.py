@@ -49,7 +49,10 @@ class Summaries:
     def of(
         cls, names: tuple[str, ...], time_ns: IntArray, value: FloatArray, level: LevelArray
     ) -> "Summaries":
-        """Return summaries of n readings: (n, n_names) `value`, NaN if unusable, and `level`."""
+        """Return the summaries of single readings.
+
+        `value` (NaN if unusable) and `level` have the shape (n, n_names).
+        """
         count = np.isfinite(value).astype(np.int64)
         return cls(names, time_ns, count, value, value, value, level)
 
@@ -66,7 +69,7 @@ class Summaries:
         return found.at(np.argsort(found.time_ns, kind="stable"))
 
     def at(self, rows: IntArray | npt.NDArray[np.bool_]) -> "Summaries":
-        """Return the rows selected by a mask (n,), or by indices (m,) in the order of these."""
+        """Return the rows selected by a mask (n,), or by indices (m,) in the order of indices."""
         return Summaries(self.names, **{name: getattr(self, name)[rows] for name in ROWS})
 
     def only(self, names: tuple[str, ...]) -> "Summaries":
@@ -76,7 +79,7 @@ class Summaries:
         return Summaries(names, self.time_ns, **chosen)
 
     def in_spans(self, width_ns: int) -> "Summaries":
-        """Return the rows, which are sorted by time, aggregated by multiples of `width_ns`."""
+        """Return the rows, which must be sorted by time, aggregated into spans of `width_ns`."""
         if self.time_ns.size == 0:
             return self
         number = self.time_ns // width_ns
@@ -132,12 +135,10 @@ MAX_DAYS = (2**63 - 1) // DAY_NS
 
 
 def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int = 1) -> int:
-    """Return the narrowest round width, in ns, with at most ``max_points`` buckets in a range.
+    """Return the smallest bucket width, in ns, with at most ``max_points`` buckets in a range.
 
-    Parameters
-    ----------
-    finest_ns
-        Width of the finest available roll-ups, a divisor of a day; the result is a multiple of it.
+    The width is one of `NICE_WIDTHS_NS`, or whole days. It is a multiple of `finest_ns`, the width
+    of the finest available roll-ups, which is a divisor of a day.
     """
     # a range that is not aligned with the buckets may overlap one more bucket
     needed = -(-(end_ns - start_ns) // max(max_points - 1, 1))
@@ -148,9 +149,9 @@ def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int 
 
 
 def single_points(readings: Summaries, hole_ns: int) -> Trend:
-    """Return the trend of single readings, which are sorted by time and may be none.
+    """Return the trend of single readings, which are sorted by time; empty without readings.
 
-    If the next reading is more than `hole_ns` later, a point without values is inserted between.
+    A point without values is inserted between readings that are more than `hole_ns` apart.
     """
     holes = np.flatnonzero(np.diff(readings.time_ns) > hole_ns) + 1
     time_ns = np.insert(readings.time_ns, holes, readings.time_ns[holes - 1] + hole_ns // 2)
@@ -164,8 +165,9 @@ def single_points(readings: Summaries, hole_ns: int) -> Trend:
 
 
 def page(readings: Summaries, max_points: int, hole_ns: int) -> Trend:
-    """Return the trend of the first ``max_points`` readings, with holes as in `single_points`.
+    """Return the trend of the first ``max_points`` readings, which are sorted by time.
 
+    A point without values is inserted between readings that are more than `hole_ns` apart.
     `Trend.next_ns` is the time of the first omitted reading; None if no reading is omitted.
     """
     if readings.time_ns.size <= max_points:

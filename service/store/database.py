@@ -46,7 +46,7 @@ class Connection(Protocol):
     """Database connection within a transaction; used by one thread at a time."""
 
     def execute(self, statement: str, parameters: Parameters = ..., /) -> Rows:
-        """Run a statement and return its rows, which may be in memory: queries must be bounded."""
+        """Run a statement and return its rows; all rows may be kept in memory, so limit them."""
         ...
 
     def executemany(self, statement: str, parameters: Iterable[Parameters], /) -> Rows:
@@ -133,12 +133,15 @@ class Tables:
 
 
 def insert(table: str, columns: Sequence[str]) -> str:
-    """Return the SQL statement that inserts a row into a table."""
+    """Return the SQL statement that inserts a row, with ``?`` for the value of each column."""
     marks = ", ".join("?" * len(columns))
     return f"INSERT INTO {table} ({', '.join(columns)}) VALUES ({marks})"  # noqa: S608
 
 
 def upsert(table: str, columns: Sequence[str], key: Sequence[str]) -> str:
-    """Return the SQL statement that inserts a row, or replaces the row with the same key."""
+    """Return the SQL statement that inserts a row, or updates the row with the same key.
+
+    Each column has a ``?`` for its value; `key` are the columns of the primary key.
+    """
     changes = ", ".join(f"{name} = excluded.{name}" for name in columns if name not in key)
     return f"{insert(table, columns)} ON CONFLICT ({', '.join(key)}) DO UPDATE SET {changes}"

@@ -34,10 +34,7 @@ class _Document(BaseModel, Generic[T]):
 def to_json(value: BearingBaseline | ShaftResponse | Decision) -> str:
     """Return a value as a JSON document.
 
-    Raises
-    ------
-    ValueError
-        If a number in the value is not finite.
+    Raises `ValueError` if a number in the value is not finite.
     """
     whole = {"format": FORMATS[type(value)], "format_version": FORMAT_VERSION}
     return json.dumps(whole | {"content": asdict(value)}, allow_nan=False)

@@ -66,7 +66,8 @@ class FilmHistory:
     is_settled, is_simulated : (n,)
         Whether the operating condition was settled, and whether the reading is simulated.
     verdict, level : (4, n)
-        By rows of `QUANTITIES`: numbers of `Verdict`; numbers of `AlarmLevel`, 0 for no alarm.
+        Numbers of `Verdict`, and of `AlarmLevel` (0 for no alarm); one row per quantity in the
+        order of `QUANTITIES`.
     change, change_std : (4, n)
         Mean deviation from the baseline, in ln, over the averaging time for which it is most
         significant, and its standard uncertainty; NaN if unknown.
@@ -97,7 +98,8 @@ class FilmHistory:
 class StoredDecision:
     """Decision on one of the `QUANTITIES` of a film, from the readings of one estimator.
 
-    `baseline_version` is the version compared with; None without a baseline.
+    `baseline_version` is the version of the baseline with which the readings were compared; None
+    if there was no baseline.
     """
 
     quantity: str
@@ -207,10 +209,7 @@ def _or_null(value: float) -> float | None:
 def select_decisions(reader: Connection, unit: str, bearing: str) -> list[StoredDecision]:
     """Return the stored decisions on the film of a bearing, in the order of `QUANTITIES`.
 
-    Raises
-    ------
-    StoreError
-        If the document of a decision is invalid.
+    Raises `StoreError` if the document of a decision is invalid.
     """
     rows = reader.execute(
         "SELECT quantity, estimator, baseline_version, document FROM film_decision"

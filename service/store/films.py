@@ -84,7 +84,7 @@ class FilmStore(BaselineTables):
             writer.execute(MARK_PAST, span)
 
     def past_end_ns(self, unit: str, bearing: str) -> int | None:
-        """Return the end time, in ns, of the simulated past of a bearing; None without a past."""
+        """Return the end, ns since 1970 UTC, of a bearing's simulated past; None without a past."""
         with self._reading() as reader:
             row = reader.execute(
                 "SELECT end_ns FROM simulated_past JOIN series ON series.id = simulated_past.series"
@@ -99,7 +99,7 @@ class FilmStore(BaselineTables):
             return select_film_history(reader, query)
 
     def first_ns(self, unit: str, bearing: str, estimator: Estimator) -> int | None:
-        """Return the time, in ns, of the first reading of a film; None if it has no readings."""
+        """Return the time, ns since 1970 UTC, of a film's first reading; None without readings."""
         with self._reading() as reader:
             found = reader.execute(
                 "SELECT min(time_ns) FROM film_reading WHERE estimator = ? AND series ="
@@ -109,7 +109,10 @@ class FilmStore(BaselineTables):
         return None if found[0] is None else int(found[0])
 
     def decisions(self, unit: str, bearing: str) -> list[StoredDecision]:
-        """Return the decisions on the film of a bearing; see `select_decisions` for its errors."""
+        """Return the stored decisions on the film of a bearing, in the order of `QUANTITIES`.
+
+        Raises `StoreError` if a stored decision is invalid.
+        """
         with self._reading() as reader:
             return select_decisions(reader, unit, bearing)
 

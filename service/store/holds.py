@@ -164,7 +164,7 @@ _PID_BYTES = 20
 
 
 class AlreadyRunningError(StoreError):
-    """Error raised if another service uses the database; the message states its process id."""
+    """Error raised if another service, whose process id is in the message, uses the database."""
 
 
 @contextmanager

@@ -55,7 +55,9 @@ class Integrity:
         return self._damage.places
 
     def adopt(self, now_ns: int) -> Sequence[MarkFinding]:
-        """Accept the database as the newest copy, add an audit entry, and return `found`.
+        """Accept the database as the newest copy; return the differences that were found.
+
+        Differences are recorded in the audit trail with the time `now_ns`.
 
         Raises
         ------

@@ -34,15 +34,15 @@ class RetentionLoop:
         )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Delete old data periodically; never returns."""
+        """Delete old data periodically until cancelled; send heartbeats to `pulse`."""
         while True:
             if not await self.round(pulse):
                 await rest(RETENTION_PERIOD_S, self._clock, pulse)
 
     async def round(self, pulse: Pulse = UNHEARD) -> bool:
-        """Delete some old data of each bearing; return whether any were found, False on an error.
+        """Delete a limited part of the old data of each bearing; return whether any were deleted.
 
-        Errors of the store are logged.
+        `pulse` receives heartbeats. Errors of the store are logged; the result is then False.
         """
         found = False
         try:
@@ -83,7 +83,7 @@ class RollupLoop:
         )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Aggregate readings periodically; never returns."""
+        """Aggregate readings periodically until cancelled; send heartbeats to `pulse`."""
         while True:
             pulse.beat(ROLLUP_PERIOD_S)
             if not await self._round(pulse):
@@ -123,7 +123,7 @@ class ScrubLoop:
         )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Check rows periodically; never returns."""
+        """Check all rows periodically until cancelled; send heartbeats to `pulse`."""
         while True:
             pulse.beat(LOOK_S)
             if await self.look(pulse):
@@ -132,7 +132,7 @@ class ScrubLoop:
     async def look(self, pulse: Pulse = UNHEARD) -> bool:
         """Check the next rows and pause; return True when a check of all rows is complete.
 
-        An error of the store is logged; the result is then False.
+        `pulse` receives heartbeats. Errors of the store are logged; the result is then False.
         """
         try:
             async with paced(SCRUB_REST_SHARE, self._clock, pulse, MIN_REST_S):

@@ -194,19 +194,22 @@ class Outbox(Tables):
             return bool(reader.execute(SELECT_URGENT, (receiver,)).fetchone()[0])
 
     def finish(self, message: int, state: MessageState, answer: str, now_ns: int) -> None:
-        """Count an attempt and set the final state of a message; no effect unless it is waiting."""
+        """Count an attempt and set the final state of a waiting message, with the reply `answer`.
+
+        A message that is not waiting stays unchanged.
+        """
         with self._writing() as writer:
             writer.execute(FINISH, (state.value, answer[:MAX_ANSWER], now_ns, message))
 
     def fail(self, message: int, answer: str) -> None:
-        """Count a failed attempt to deliver a waiting message, which stays in the queue."""
+        """Count a failed attempt to deliver a waiting message; `answer` is the reply or error."""
         with self._writing() as writer:
             writer.execute(FAIL, (answer[:MAX_ANSWER], message))
 
     def expire(self, receiver: str, before_ns: int, answer: str, now_ns: int) -> int:
-        """Expire the waiting messages whose queueing and whose alarm event precede `before_ns`.
+        """Expire waiting messages that were queued before `before_ns`, about earlier events.
 
-        Returns the number of expired messages.
+        `answer` is stored as the reason. Returns the number of expired messages.
         """
         given = (answer[:MAX_ANSWER], now_ns, receiver, before_ns, before_ns)
         with self._writing() as writer:

@@ -23,7 +23,7 @@ class Pool(Generic[Connection]):
         self.is_closed = False
 
     def take(self) -> Connection | None:
-        """Remove and return an idle connection; None if there is none."""
+        """Remove an idle connection from the pool and return it; None if the pool is empty."""
         with self._lock:
             return self._idle.pop() if self._idle else None
 

@@ -119,12 +119,9 @@ class _References(AuditedTables, ABC, Generic[_Reference]):
     """Columns by which `in_force` sorts the references, as an SQL expression."""
 
     def add(self, reference: _Reference) -> None:
-        """Write a reference, which is then in force; writing it a second time has no effect.
+        """Write a reference and put it in force; a reference that is stored already is ignored.
 
-        Raises
-        ------
-        StoreError
-            If the reference was not written, or the outcome is unknown.
+        Raises `StoreError` if the reference was not written, or the outcome is unknown.
         """
         row = self._row(reference)
         key = " AND ".join(f"{name} = ?" for name in self.key)
@@ -138,7 +135,10 @@ class _References(AuditedTables, ABC, Generic[_Reference]):
                 writer.execute(insert(self.table, self.columns), row)
 
     def in_force(self) -> list[_Reference]:
-        """Return the reference in force of each key: the last written, regardless of `set_ns`."""
+        """Return the references in force: the last written per bearing, and operating state if any.
+
+        The time `set_ns` at which a reference was set has no influence.
+        """
         newest = f"SELECT max(id) FROM {self.table} GROUP BY {', '.join(self.key)}"  # noqa: S608
         return self._read(f"WHERE id IN ({newest}) ORDER BY {self.order}")
 

@@ -149,7 +149,7 @@ Ages = Mapping[str, int]
 
 
 def ages_of(settings: RetentionSettings) -> Ages:
-    """Return the maximum ages of the settings, without settings of 0 days (no deletion)."""
+    """Return the maximum age of data by setting; data with a setting of 0 days have none."""
     return {name: round(days * DAY_NS) for name, days in settings if days > 0.0}
 
 
@@ -177,7 +177,7 @@ class RetentionStore(Tables):
         setting, series = min(self._blocked)
         return (
             f"roll-ups with series id {series} are damaged or disagree with wider ones, so they are"
-            f" kept beyond {setting} ({len(self._blocked)} such cases)"
+            f" kept beyond {setting} (number of such cases: {len(self._blocked)})"
         )
 
     def series(self) -> list[int]:
@@ -186,9 +186,10 @@ class RetentionStore(Tables):
             return [int(row[0]) for row in reader.execute("SELECT id FROM series ORDER BY id")]
 
     def believed_ns(self) -> int | None:
-        """Return the start, ns, of the 24th newest hour with results, the latest of all bearings.
+        """Return the start of the 24th newest hour with results, in ns since 1970 UTC.
 
-        Returns None if no bearing has results of 24 hours.
+        Hours are counted per bearing; the latest start of all bearings is returned. None if no
+        bearing has 24 hours with results.
         """
         with self._reading() as reader:
             found: int | None = reader.execute(BELIEVED, BELIEVED_HOURS).fetchone()[0]
@@ -217,7 +218,10 @@ class RetentionStore(Tables):
         return found
 
     def prune(self, ages: Ages, now_ns: int) -> bool:
-        """Delete a limited part of the old messages of the plant; otherwise as `delete`."""
+        """Delete a limited part of the messages that exceed their maximum age at `now_ns`.
+
+        Returns whether more old messages may be left.
+        """
         if "messages_days" not in ages:
             return False
         before_ns = now_ns - ages["messages_days"]

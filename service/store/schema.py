@@ -163,6 +163,9 @@ MIGRATIONS = (
 
 
 def migration_of(number: int, *, is_access: bool) -> str:
-    """Return the script of a migration for one of the two SQLite files; empty if it has none."""
+    """Return the SQL script of a migration for the access file or the results file.
+
+    The script is empty if the migration does not change the tables of the file.
+    """
     script = MIGRATIONS[number]
     return script if script == AUDIT_TABLES or (script == ACCESS_TABLES) == is_access else ""

@@ -31,7 +31,7 @@ class Place:
 
 
 class DamageLog:
-    """Log of the damaged and missing rows found since the start, `most` at most; thread-safe."""
+    """Thread-safe list of up to `most` damaged and missing rows found since the start."""
 
     def __init__(self, most: int = MAX_PLACES) -> None:
         self._most = most
@@ -41,7 +41,7 @@ class DamageLog:
 
     @property
     def n_damaged(self) -> int:
-        """Number of damaged or missing rows since the start; unlisted ones may count repeatedly."""
+        """Number of damaged or missing rows; rows that are not listed may count several times."""
         return len(self._places) + self._n_more
 
     @property
@@ -156,12 +156,18 @@ class SealedTable:
         )
 
     def is_whole(self, of: str) -> str:
-        """Return the SQL condition that a row, with the prefix `of`, matches its checksum."""
+        """Return the SQL condition that a row matches its checksum.
+
+        `of` is the prefix of the row's columns in the query, such as ``r.``.
+        """
         seal = f"SELECT s.seal FROM main.{self.seals} AS s WHERE {self.matched(of, 's.')}"  # noqa: S608
         return f"{IS_WHOLE}{self.name}(({seal}), {self._cells(of)})"
 
     def matched(self, of: str, ours: str = "") -> str:
-        """Return the SQL condition that a row (`of`) and a checksum (`ours`) have equal keys."""
+        """Return the SQL condition that a row and a checksum have equal keys.
+
+        `of` and `ours` are the prefixes of their columns in the query, such as ``r.`` and ``s.``.
+        """
         return " AND ".join(f"{ours}{column} = {of}{column}" for column in self.key)
 
     def _seal(self, of: str) -> str:
@@ -271,16 +277,13 @@ def unchecked(reader: Connection, table: str) -> str:
 def select_whole(
     reader: Connection, table: str, where: str, parameters: Mapping[str, object]
 ) -> list[tuple[Any, ...]]:
-    """Return all columns of the intact rows of a table.
-
-    The rows are checked together, which takes half the time of the view of the intact rows. If one
-    of them is damaged, they are read from the view, which logs its key.
+    """Return all columns of the intact rows of a table; the keys of damaged rows are logged.
 
     Parameters
     ----------
     where
-        Condition on columns of the primary key and the order, which the checksums have as well:
-        SQL from ``WHERE`` on, never text from outside.
+        SQL from ``WHERE`` on, including the order; only columns of the primary key may occur, and
+        no text from users.
     parameters
         Values of the placeholders in `where`, by name.
     """
@@ -351,8 +354,7 @@ class Walk:
     ) -> Key | None:
         """Check up to `n_rows` rows after a key; return the last key, None if no row is left.
 
-        Missing rows are added to the log by this method, altered rows by the SQL function of the
-        query.
+        Altered and missing rows are added to the log; `after` is None to begin.
         """
         marks = ", ".join("?" * len(self.table.key))
         beyond = "" if after is None else f"WHERE ({self.keys}) > ({marks})"
@@ -366,7 +368,7 @@ class Walk:
 
 
 def walks(table: SealedTable) -> tuple[Walk, Walk]:
-    """Return the check of the rows, for altered rows, and of the checksums, for missing rows."""
+    """Return two checks: of the rows, which finds altered rows; of the checksums, missing rows."""
     keys, of_seals = _keys(table, "r."), _keys(table, "s.")
     row = f"SELECT 1 FROM main.{table.name} AS r WHERE {table.matched('s.', 'r.')}"  # noqa: S608
     rows = f"SELECT {keys}, {table.is_whole('r.')} FROM main.{table.name} AS r"  # noqa: S608

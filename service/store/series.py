@@ -78,7 +78,7 @@ FIXED_COLUMNS = columns_of(CATALOGUE)
 
 
 def other_columns(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the columns of the quantities among `names` that not every bearing has, in order."""
+    """Return the sorted columns of those quantities in `names` that not every bearing has."""
     found = {name: quantity_named(name) for name in names if name not in BY_NAME}
     return columns_of(quantity for _, quantity in sorted(found.items()) if quantity is not None)
 

@@ -50,8 +50,13 @@ class UnitBeat:
     Parameters
     ----------
     process
-        Identifier of the reporting process, which changes with each start. The other fields are
-        those of `UnitRow`.
+        Identifier of the reporting process, which changes with each start.
+    n_beats, beat_ns
+        Number of the report, and its time by the clock of its host in ns since 1970 UTC.
+    signs
+        JSON document with the arrival of samples and the age of all data.
+    revision
+        Revision number of the state document.
     """
 
     unit: str
@@ -257,7 +262,7 @@ class Commands(Tables):
     def take(self, id_: str, process: str) -> bool:
         """Record the process that executes a command; return False if answered or unknown.
 
-        It replaces a process that took the command before, so the caller checks `taken_by` first.
+        A process that was recorded before is replaced; check `OpenCommand.taken_by` before.
         """
         with self._writing() as writer:
             return bool(writer.execute(TAKE, (process, id_)).rowcount == 1)
@@ -280,7 +285,7 @@ class Commands(Tables):
 
 
 def answer_command(writer: Connection, id_: str, answer: Answer, now_ns: int) -> None:
-    """Write the answer to a command within an open transaction; see `Commands.answer`."""
+    """Write the answer to a command in an open transaction; only the first answer counts."""
     writer.execute(ANSWER, (answer.state.value, answer.words[:MAX_WORDS], now_ns, id_))
 
 

@@ -128,7 +128,7 @@ CHECKSUM_BYTES = 8
 def encode(amplitude_um_pk: FloatArray) -> bytes:
     """Return amplitudes (N_CHANNELS, n_lines) in µm, NaN if unusable, as logarithmic 16-bit codes.
 
-    Values below `LOWEST_UM` become 0, those above `HIGHEST_UM` that maximum.
+    Values below `LOWEST_UM` become 0; values above `HIGHEST_UM` become `HIGHEST_UM`.
     """
     usable = np.nan_to_num(amplitude_um_pk, nan=LOWEST_UM)
     steps = np.log(np.clip(usable, LOWEST_UM, HIGHEST_UM) / LOWEST_UM) / STEP

@@ -135,7 +135,7 @@ class Store:
         return self.database.kind
 
     def hold(self, name: str) -> AbstractContextManager[Hold]:
-        """Return a lock on a name, exclusive among all processes; see `Database.hold`."""
+        """Return a lock, exclusive among all processes; entering it raises `StoreError` if held."""
         return self.database.hold(name)
 
     def close(self) -> None:
@@ -188,10 +188,7 @@ class Store:
     def gaps(self, unit: str, start_ns: int, end_ns: int) -> list[Gap]:
         """Return the gaps of a unit that end from `start_ns` to before `end_ns`, oldest first.
 
-        Raises
-        ------
-        QueryTooLargeError
-            If the range has more than `MAX_GAPS` gaps.
+        Raises `QueryTooLargeError` if the range has more than `MAX_GAPS` gaps.
         """
         in_range = "AND stop_ns >= ? AND stop_ns < ? ORDER BY stop_ns, first_index LIMIT ?"
         bounds = (unit, storable(start_ns), storable(end_ns), MAX_GAPS + 1)
@@ -202,7 +199,7 @@ class Store:
         return found
 
     def reach(self, unit: str) -> Reach | None:
-        """Return the end of a unit's results, and all later gaps; None without measured results."""
+        """Return the end of a unit's results, with all later gaps; None if nothing was measured."""
         with self._reader() as reader:
             series = reader.execute("SELECT id FROM series WHERE unit = ?", (unit,)).fetchall()
             rows = [reader.execute(SELECT_LAST, row).fetchone() for row in series]

@@ -104,10 +104,7 @@ class WaveformStore(Tables):
     def put(self, files: Sequence[WaveformFile]) -> None:
         """Write index entries in one transaction; replace entries of equal place, kind and name.
 
-        Raises
-        ------
-        StoreError
-            If nothing was written.
+        Raises `StoreError` if nothing was written.
         """
         with self._writing() as writer:
             writer.executemany(PUT, [astuple(file) for file in files])
@@ -118,7 +115,7 @@ class WaveformStore(Tables):
             return [_file(row) for row in reader.execute(FILES, (place,))]
 
     def forget(self, place: str, before_ns: int) -> int:
-        """Delete entries of recordings removed or lost before a time; return how many."""
+        """Delete entries of recordings removed or lost before a time, ns; return their number."""
         with self._writing() as writer:
             return writer.execute(FORGET, (place, before_ns)).rowcount
 
@@ -128,5 +125,6 @@ def _file(row: tuple[Any, ...]) -> WaveformFile:
     try:
         found |= {"kind": WaveformKind(found["kind"]), "state": WaveformState(found["state"])}
     except ValueError as error:
-        raise StoreError(f"invalid index entry of recording {found['name']}: {error}") from error
+        name = f"index entry of recording {found['name']}"
+        raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
     return WaveformFile(**found)

@@ -68,7 +68,9 @@ class AuditAction:
 
 @dataclass(frozen=True)
 class AuditEntry:
-    """Stored entry of the audit trail; the other fields are those of `AuditAction`, truncated.
+    """Stored entry of the audit trail, an action with a hash that depends on the previous entry.
+
+    Fields that are not listed are those of `AuditAction`; long texts are truncated.
 
     Parameters
     ----------
@@ -99,7 +101,8 @@ class AuditEntry:
 def canonical(document: object) -> str | None:
     """Return the canonical JSON text of a JSON value; None for None.
 
-    A text longer than `MAX_DOCUMENT` is replaced by an object with its beginning and its length.
+    A text of more than `MAX_DOCUMENT` characters is replaced by a JSON object that contains the
+    beginning of the text and the number of its characters.
 
     Raises
     ------
@@ -129,10 +132,7 @@ FIRST = "0" * 64
 def digest(values: Sequence[object]) -> str:
     """Return the SHA-256, in hexadecimal, of all fields of an audit entry except its hash.
 
-    Raises
-    ------
-    TypeError
-        If a field is not text, a number or None.
+    Raises `TypeError` if a field is not text, a number or None.
     """
     text = json.dumps([FORMAT, *values], separators=(",", ":"))  # ASCII, so that the text is unique
     return hashlib.sha256(text.encode("ascii")).hexdigest()
@@ -141,7 +141,8 @@ def digest(values: Sequence[object]) -> str:
 def chained(action: AuditAction, number: int, previous_hash: str) -> AuditEntry:
     """Return the audit entry of an action, chained to the hash of the previous entry.
 
-    Long texts are truncated. Raises `ValueError` for a number that is not finite, as `canonical`.
+    `number` is the number of the new entry. Long texts are truncated. Raises `ValueError` if the
+    state before or after the action contains a number that is not finite.
     """
     columns = (
         *(number, action.time_ns, storable(action.actor, MAX_NAME), action.source.value),
@@ -190,7 +191,8 @@ class ActedNews(AlarmNews):
     peer
         Network address of the client; None if unknown.
     command
-        Identifier of the operator command; storing the update also answers the command.
+        Identifier of the operator command, which is answered when the update is stored; None if
+        the action was not an operator command.
     """
 
     peer: str | None = None

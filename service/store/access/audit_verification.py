@@ -38,10 +38,7 @@ def chain_name(head: Path) -> str:
 def read_head(path: Path) -> AuditHead:
     """Read the head of an audit trail from its file.
 
-    Raises
-    ------
-    HeadError
-        If the file is missing, unreadable or invalid.
+    Raises `HeadError` if the file is missing, unreadable or invalid.
     """
     try:
         with path.open("rb") as file:
@@ -59,10 +56,7 @@ def read_head(path: Path) -> AuditHead:
 def write_head(path: Path, head: AuditHead) -> None:
     """Write the head of an audit trail to its file, durable on return.
 
-    Raises
-    ------
-    OSError
-        If the file cannot be written; the previous head stays.
+    Raises `OSError` if the file cannot be written; the previous head stays.
     """
     write_private(path, json.dumps({"format": FORMAT, **asdict(head)}).encode() + b"\n")
 
@@ -148,7 +142,7 @@ def walk(
         Head from the file, or the reason why the file cannot be read. The file must be read before
         the entries, since the head may be older than the newest entry, but not newer.
     rename
-        Function that describes the defect of an entry with a wrong hash.
+        Function that returns a sentence about the defect of an entry with a wrong hash.
     is_shared
         Whether other hosts also write to the trail.
     """
@@ -208,7 +202,10 @@ def _wrong_head(
 
 
 def place_of(entry: AuditEntry, last: int) -> str:
-    """Return as text whether an entry with a wrong hash was altered, or moved from 1 to `last`."""
+    """Return a sentence that an entry with a wrong hash was altered, or has a wrong number.
+
+    The number is wrong if the hash matches with another number from 1 to `last`.
+    """
     for number in range(1, last + 1):
         if recomputed(replace(entry, number=number)) == entry.hash:
             return f"entry {entry.number} is out of order; its content is that of entry {number}"

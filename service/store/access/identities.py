@@ -168,11 +168,11 @@ class SessionLimits:
         return -self.slack_s <= age_s < self.absolute_s and -self.slack_s <= idle_s < self.idle_s
 
     def is_news(self, session: Session, now_ns: int) -> bool:
-        """Return whether the stored time of last use is `step_s` old or older: write a new one."""
+        """Return whether to update the stored time of last use: it is at least `step_s` old."""
         return now_ns - session.seen_ns >= self.step_s * NS_PER_S
 
     def oldest_ns(self, now_ns: int) -> int:
-        """Return the earliest login time, in ns, of a session that may still be valid."""
+        """Return the earliest login time of a session that may be valid, in ns since 1970 UTC."""
         return now_ns - round(self.absolute_s * NS_PER_S)
 
 
@@ -224,7 +224,7 @@ class ApiKey:
         return KeyState.VALID if now_ns < self.expires_ns else KeyState.EXPIRED
 
     def is_news(self, now_ns: int) -> bool:
-        """Return whether the stored time of last use is missing or one minute old or older."""
+        """Return whether the stored time of last use is None or at least one minute old."""
         return self.used_ns is None or now_ns - self.used_ns >= SEEN_STEP_NS
 
 
@@ -233,16 +233,13 @@ NAME = re.compile(r"[a-z0-9](?:[a-z0-9._@-]{0,62}[a-z0-9])?", re.ASCII)
 
 
 class NameRefusedError(ValueError):
-    """Error raised if the name of an account or an API key breaks the rules, which it states."""
+    """Error raised if the name of an account or an API key is invalid; it states the rules."""
 
 
 def account_name(written: str) -> str:
-    """Return the name of an account or an API key as stored: stripped and in lower case.
+    """Return an entered name of an account or an API key as stored: stripped, in lower case.
 
-    Raises
-    ------
-    NameRefusedError
-        If the name is invalid.
+    Raises `NameRefusedError` if the name is invalid.
     """
     name = written.strip().lower()
     if NAME.fullmatch(name) is None:

@@ -114,9 +114,10 @@ class AccountStore(AuditedTables):
     def add(
         self, name: str, role: Role, password_hash: str, now_ns: int, must_change: bool = False
     ) -> None:
-        """Add an account; a repeated call has no effect.
+        """Add an account; a repeated call with the same arguments has no effect.
 
-        Raises `AccessRefusedError` if another account has the name.
+        With `must_change`, the owner must change the password at the first login. Raises
+        `AccessRefusedError` if another account has the name.
         """
         with self._writing() as writer:
             found = writer.execute(SELECT_ACCOUNTS, {"name": name}).fetchone()
@@ -154,7 +155,8 @@ class AccountStore(AuditedTables):
     ) -> None:
         """Set the password of an account and end its sessions.
 
-        Raises `AccessRefusedError` if the account is unknown.
+        With `must_change`, the owner must change the password at the next login. Raises
+        `AccessRefusedError` if the account is unknown.
         """
         with self._writing() as writer:
             _role(writer, name)
@@ -341,7 +343,7 @@ class SetUpStore(AuditedTables):
             return writer.execute(offer, (digest, expires_ns)).rowcount == 1
 
     def holds(self, digest: bytes, now_ns: int) -> bool:
-        """Return whether a digest is of the stored set-up token, not expired, without accounts."""
+        """Return whether a digest matches the set-up token; False if expired or accounts exist."""
         with self._reading() as reader:
             return bool(reader.execute(IS_TAKEABLE, (digest, now_ns)).fetchone()[0])
 
@@ -369,7 +371,7 @@ class AccessStore:
     chain
         Audit trail of the changes of access data, of logins and of refused requests.
     integrity
-        Integrity checks of the database; none for PostgreSQL.
+        Integrity checks of the database; None for PostgreSQL, which checks its data itself.
     """
 
     def __init__(
@@ -385,9 +387,10 @@ class AccessStore:
         self._rolled_back: tuple[str, ...] = ()
 
     def accept(self, now_ns: int) -> str | None:
-        """Accept an older copy of the database, with audit entries; return how it differs.
+        """Accept the database as the newest copy; return how it differs from the high-water mark.
 
-        The result is None, and nothing is written, if the database is the newest copy.
+        The difference is written to the audit trail. The result is None, and nothing is written,
+        if there is no difference.
 
         Raises
         ------

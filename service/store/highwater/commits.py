@@ -90,15 +90,16 @@ OTHER_HOST = (
 def _history(mark: Mark, database: Mark) -> list[MarkFinding]:
     if mark.store != database.store:
         words = (
-            f"the database was replaced: the former had {mark.n_commits} transactions up to"
-            f" {_when(mark.time_ns)}, this one has {database.n_commits}"
+            f"the database was replaced: the previous one had {mark.n_commits} transactions up"
+            f" to {_when(mark.time_ns)}, this one has {database.n_commits}"
         )
         return [MarkFinding(Kind.REPLACED, None, words)]
     n_missing = mark.n_commits - database.n_commits
     if n_missing > 0:
         words = (
-            f"the database was rolled back: {n_missing} transactions, written after"
-            f" {_when(database.time_ns)} and up to {_when(mark.time_ns)}, are missing"
+            "the database was rolled back: transactions written after"
+            f" {_when(database.time_ns)}, up to {_when(mark.time_ns)}, are missing"
+            f" ({n_missing} in total)"
         )
         return [MarkFinding(Kind.ROLLED_BACK, n_missing, words)]
     if n_missing == 0 and mark.nonce != database.nonce:
@@ -176,8 +177,9 @@ class CommitMarks:
     def open(self, writer: Connection, in_file: Mark | str | None) -> None:
         """Compare a newly opened database with the mark file, within a transaction.
 
-        A database without a mark receives a mark; if the file is missing, that is if `in_file` is
-        None, it is then created. Raises `OSError` if it cannot be created.
+        `in_file` is the mark in the file, or the reason why it cannot be read, or None if the file
+        is missing. A database without a mark receives a mark, and then a missing file is created.
+        Raises `OSError` if the file cannot be created.
         """
         writer.execute(CREATE)
         mark = select_mark(writer)
@@ -191,7 +193,7 @@ class CommitMarks:
         self.found = compared(lost if in_file is None else in_file, mark, self._host)
 
     def count(self, writer: Connection) -> None:
-        """Increment the commit counter within the current transaction, unless `found` is set.
+        """Increment the commit counter in the current transaction, unless `found` has differences.
 
         Raises `StoreError` if the database has lost its mark.
         """

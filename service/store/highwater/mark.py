@@ -51,7 +51,7 @@ def encoded(mark: Mark) -> bytes:
 
 
 def decoded(slot: bytes) -> Mark | None:
-    """Return the mark in a slot, the inverse of `encoded`; None if the slot is invalid."""
+    """Return the mark in the bytes that `encoded` returned; None if the bytes are invalid."""
     text, checksum = slot[:TEXT_BYTES], slot[TEXT_BYTES:]
     if checksum != b"%08x\n" % zlib.crc32(text):
         return None
@@ -91,10 +91,7 @@ class MarkFile:
     def read(self) -> Mark:
         """Return the newest mark in the file.
 
-        Raises
-        ------
-        MarkError
-            If the file is unreadable or damaged; `NoMarkError` if it does not exist.
+        Raises `MarkError` if the file is unreadable or damaged; `NoMarkError` if it does not exist.
         """
         try:
             with _opened(self.path, os.O_RDONLY) as descriptor:
@@ -132,10 +129,7 @@ class MarkFile:
     def replace(self, mark: Mark) -> None:
         """Replace the file by a new file with this mark.
 
-        Raises
-        ------
-        OSError
-            If the file cannot be written; the previous file stays.
+        Raises `OSError` if the file cannot be written; the previous file stays.
         """
         write_private(self.path, encoded(mark).ljust(SLOTS[1], b"\0") + encoded(mark))
 

@@ -130,7 +130,7 @@ Session = psycopg.Connection[tuple[Any, ...]]
 
 
 class PostgresConnection:
-    """Connection within a transaction; runs statements that are written for both databases."""
+    """Connection within a transaction; translates SQL statements that are written for SQLite."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -151,7 +151,9 @@ class PostgresConnection:
 
 
 def connected(address: PostgresAddress, purpose: str, settings: str) -> Session:
-    """Return a new session with the settings `SESSION` and additional SET statements.
+    """Return a new session; `settings` are SET statements in addition to `SESSION`.
+
+    `purpose` is shown in the application_name of the session.
 
     Raises
     ------
@@ -175,7 +177,7 @@ class _Context:
 
 
 def require_fit(session: Session, where: str) -> None:
-    """Check that a server is suitable.
+    """Check that a server is suitable; `where` names the database in the message.
 
     Raises
     ------
@@ -238,7 +240,7 @@ def cancelled_when_gone(session: Session) -> Iterator[None]:
             yield
     finally:
         if asker.has_gone:
-            raise StoreError("interrupted: the client has disconnected")
+            raise StoreError("the query was cancelled: the client has disconnected")
 
 
 BY_STATE = {

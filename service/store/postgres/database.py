@@ -58,7 +58,7 @@ class Readers:
 
     def _begun(self) -> Session:
         if self._pool.is_closed:
-            raise StoreError(f"{self._address.name} is closed")
+            raise StoreError(f"{self._address.name}: this process has closed its connections")
         while (idle := self._pool.take()) is not None:
             try:
                 idle.execute(BEGIN_READING)
@@ -118,7 +118,7 @@ class Writer:
 
     def _begin(self) -> str:
         if self._is_closed:
-            raise StoreError(f"{self._where} is closed")
+            raise StoreError(f"{self._where}: this process has closed its connection")
         if not self._session.closed:
             try:
                 return self._begun()
@@ -148,7 +148,10 @@ class Writer:
             self._settle(number, error)
         else:
             if done.statusmessage != "COMMIT":
-                raise StoreError(f"{self._where}: the transaction was rolled back after an error")
+                raise StoreError(
+                    f"{self._where}: nothing was written: the server rolled the transaction back"
+                    " after an error"
+                )
 
     def _settle(self, number: str, lost: psycopg.Error) -> None:
         """Determine the outcome of a commit without a reply; raise an error unless it succeeded."""
@@ -319,9 +322,9 @@ class PostgresDatabase:
             yield reader
 
     def ever_had(self, connection: Connection, table: str) -> bool:  # noqa: ARG002
-        """Return True, so that a head file missing after the store was opened is an error."""
+        """Return True without a query, so that a missing head file is always an error."""
         return True
 
     def hold(self, name: str) -> PostgresHold:
-        """Return an advisory lock on a name; its errors are as for `Database.hold`."""
+        """Return an advisory lock on a name; entering it raises `StoreError` if it is held."""
         return PostgresHold(self.address, name)

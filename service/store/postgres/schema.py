@@ -132,6 +132,8 @@ N_TABLES = """
 def migrate(session: Session, where: str, origin: Origin) -> None:
     """Migrate a database to the current schema in one transaction, under an advisory lock.
 
+    `where` names the database in messages; `origin` is the required origin of its data.
+
     Raises
     ------
     StoreError
@@ -160,7 +162,7 @@ def _schema_number(session: Session, where: str, origin: Origin) -> int:
     if session.execute(HAS_WHAT).fetchone() == (True,):
         row = session.execute("SELECT origin, schema_number FROM padwatch").fetchone()
         if row is None:
-            raise StoreError(f"{where} has lost the origin of its data; restore a backup")
+            raise StoreError(f"{where} lacks the entry with its schema number; restore a backup")
         if row[0] != origin.value:
             raise StoreError(
                 f"{where} holds {row[0]} results and cannot be used for {origin} ones;"

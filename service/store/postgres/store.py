@@ -61,12 +61,12 @@ class PostgresStore(Store):
 def open_server_access(
     address: PostgresAddress, head: Path, origin: Origin = Origin.LIVE
 ) -> AccessStore:
-    """Open the accounts, sessions and keys in a database; the parameters are as in `PostgresStore`.
+    """Open the accounts, sessions and keys in a database; `head` is the head file on this host.
 
     Raises
     ------
     StoreError
-        As in `PostgresStore`.
+        If the database cannot be reached or used, or has data of another origin than `origin`.
     """
     database = PostgresDatabase(address, origin)
     with closed_after_error(database, head):
@@ -103,7 +103,7 @@ def _begun(head: Path) -> AuditAction:
 
 
 def server_trail(address: PostgresAddress, head: Path) -> Trail:
-    """Return the audit trail of a database, read without migration; `head` is of this host."""
+    """Return the audit trail of a database, without migration; `head` is this host's head file."""
     return Trail(partial(_opened, address), head, is_shared=True)
 
 

@@ -112,7 +112,8 @@ class _Covering:
     def take(self, span: Span, widths_ns: Sequence[int], *, is_coarse: bool = False) -> None:
         """Cover a span by the widest roll-ups, its ends by finer roll-ups or single readings.
 
-        With `is_coarse`, single readings are deleted; the finest roll-ups extend beyond the span.
+        `widths_ns` are the available widths, finest first. With `is_coarse`, single readings no
+        longer exist, and the finest roll-ups may extend beyond the span.
         """
         if span[0] >= span[1]:
             return
@@ -134,7 +135,7 @@ class _Covering:
             self._take_inner(some, width_ns, finer_ns, is_coarse=is_coarse)
 
     def take_coarse(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span by roll-ups whose single readings, except late readings, are deleted."""
+        """Cover a span without single readings by roll-ups, and by readings that arrived late."""
         self.take(span, widths_ns, is_coarse=True)
         late = self._redone(span)
         self.cover.spans += [_within(span, (hour, hour + HOUR_NS)) for hour in late]
@@ -218,12 +219,9 @@ def _runs(time_ns: IntArray, width_ns: int) -> Iterator[Span]:
 
 
 def read_trend(reader: Connection, query: TrendQuery) -> Trend:
-    """Return the trends of one bearing as a page, or as ``max_points`` or fewer points or buckets.
+    """Return the trends of one bearing: a page, or at most ``max_points`` readings or buckets.
 
-    Raises
-    ------
-    QueryTooLargeError
-        If too many single readings would have to be read.
+    Raises `QueryTooLargeError` if too many single readings would have to be read.
     """
     series = find_series(reader, query.unit, query.bearing)
     deleted = DeletedUntil({}) if series is None else select_deleted(reader, series)

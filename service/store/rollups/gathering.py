@@ -62,7 +62,7 @@ def gather_next(writer: Connection, series: int, now_ns: int) -> None:
 
 
 def gather_again(writer: Connection, series: int) -> None:
-    """Aggregate again the next hours of a bearing for which readings were stored late."""
+    """Repeat the aggregation of hours of a bearing for which readings were stored late."""
     mark_ns = select_mark(writer, series)
     hours = writer.execute(
         "SELECT start_ns FROM rollup_redo WHERE series = ? ORDER BY start_ns LIMIT ?",
@@ -134,10 +134,7 @@ class RollupStore(Tables):
     def gather(self, series: int, now_ns: int) -> None:
         """Aggregate some readings of one bearing in a short transaction.
 
-        Raises
-        ------
-        StoreError
-            If the transaction failed; nothing was aggregated.
+        Raises `StoreError` if the transaction failed; nothing was aggregated.
         """
         with self._writing() as writer:
             gather_again(writer, series)

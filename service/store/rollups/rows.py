@@ -74,13 +74,16 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Cells:
-    """Roll-up cells: statistics of readings with their operating conditions, in order of time."""
+    """Roll-up cells in order of time: statistics of readings with their operating conditions.
+
+    The readings of a cell are of one time span, and similar in state, eccentricity and temperature.
+    """
 
     conditions: Conditions
     summaries: Summaries
 
     def gathered(self, width_ns: int) -> "Cells":
-        """Return the cells aggregated over wider time spans, one row per span and grid cell."""
+        """Return the cells aggregated over time spans of `width_ns`, in order of time."""
         bucket = self.summaries.time_ns // width_ns
         keys = np.stack(
             [
@@ -99,7 +102,7 @@ class Cells:
         )
 
     def slots(self) -> IntArray:
-        """Return the number of each cell within its time span, from 0; shape (n,)."""
+        """Return the index of each cell among the cells of its time span; shape (n,)."""
         time_ns = self.summaries.time_ns
         first = np.flatnonzero(np.concatenate([[True], np.diff(time_ns) != 0]))
         lengths = np.diff(np.append(first, time_ns.size))
@@ -294,8 +297,7 @@ def select_cells(
     asked
         Bounds of the operating conditions, by SQL parameter.
     has_conditions
-        Whether the conditions of the cells are read; otherwise they are unknown, and the sealed
-        keys of the numbers take the place of the checksums of the cells.
+        Whether the operating conditions of the cells are read; otherwise they are unknown.
     """
     series_of = {"series": series, "width_s": width_ns // NS_PER_S}
     is_all = asked == ANYTHING

@@ -23,7 +23,10 @@ NULL_FINDING = "NULL value in "
 
 @dataclass(frozen=True)
 class Finding:
-    """Defect of a database, of kind "structure", "altered" or "missing" (row), or "high_water"."""
+    """Defect of a database.
+
+    `kind` is "structure", "altered" (row), "missing" (row) or "high_water"; `detail` a sentence.
+    """
 
     kind: str
     detail: str
@@ -147,10 +150,7 @@ class Scrubber:
     def check_some(self) -> bool:
         """Check the next rows; return True if the check of all rows is then complete.
 
-        Raises
-        ------
-        StoreError
-            If the database is temporarily unusable.
+        Raises `StoreError` if the database is temporarily unusable.
         """
         if self._number < 0:
             with self._database.reading() as reader:

@@ -82,7 +82,10 @@ class SqliteReading:
 
     @contextmanager
     def reading(self, unreadable: Unreadable = "strict") -> Iterator[sqlite3.Connection]:
-        """Open a read-only transaction on one consistent state; see `Database.reading`."""
+        """Open a read-only transaction on one consistent state, and yield its connection.
+
+        `unreadable` is the handling of text that is not UTF-8.
+        """
         with self._store_errors(), self._readers.reading() as reader:
             if unreadable == "strict":
                 yield reader
@@ -96,7 +99,7 @@ class SqliteReading:
         return connection.execute(EVER_HAD, (table,)).fetchone() is not None
 
     def hold(self, name: str) -> FileHold:
-        """Return a lock on a name, which is a lock file; its errors are as for `Database.hold`."""
+        """Return a lock on a name, a lock file; entering it raises `StoreError` if it is held."""
         return held(self._path, name)
 
     @contextmanager
@@ -108,7 +111,7 @@ class SqliteReading:
             raise kind(error_message(self._path, error)) from error
         except UnicodeDecodeError as error:  # in an error message of SQLite
             raise StoreError(
-                f"{self._path}: the file is damaged: names in it are not text"
+                f"{self._path}: the file is damaged: invalid table names; restore a backup"
             ) from error
 
 

@@ -29,10 +29,7 @@ class OpenedFile:
     def require(self) -> None:
         """Check that the opened file is still at the path; no check before `remember`.
 
-        Raises
-        ------
-        StoreError
-            If the file was removed or replaced.
+        Raises `StoreError` if the file was removed or replaced.
         """
         if self._opened is None:
             return
@@ -200,6 +197,9 @@ class FileHold:
 
 
 def held(database: Path, name: str) -> FileHold:
-    """Return a lock on a name, which is a lock file; its errors are as for `Database.hold`."""
+    """Return a lock on a name, a lock file beside the database.
+
+    Entering the lock raises `StoreError` if another process holds it.
+    """
     safe = re.sub(r"[^A-Za-z0-9_-]", lambda found: f"%{ord(found[0]):x}", name)
     return FileHold(database.with_name(f"{database.name}.{safe}.lock"), name)

@@ -67,7 +67,7 @@ async def test_a_database_that_was_rolled_back_is_told_as_long_as_the_service_ru
             await soundness.look()
 
         assert soundness.trouble is not None
-        assert "rolled back: 2 transactions" in soundness.trouble
+        assert "(2 in total)" in soundness.trouble
         assert len(store.audit.entries(AuditQuery(action="store.rolled_back"))) == 1
         assert told_to_prometheus(soundness)["padwatch_store_rolled_back"] == 1.0
 

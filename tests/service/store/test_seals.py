@@ -160,7 +160,7 @@ def test_a_schema_whose_names_are_no_text_is_refused_and_found(path):
             " WHERE name = 'strange'"
         )
 
-    with pytest.raises(StoreError, match="is damaged: names in it are not text"):
+    with pytest.raises(StoreError, match="is damaged: invalid table names"):
         SqliteStore(path)
     assert [finding.kind for finding in findings(path)] == ["structure"]
 

@@ -52,8 +52,8 @@ def test_an_older_database_is_told_with_what_is_missing_and_since_when():
 
     assert (found.kind, found.n_missing) == (Kind.ROLLED_BACK, 50)
     assert found.detail == (
-        "the database was rolled back: 50 transactions, written after 2025-12-31T23:00:00Z and up"
-        " to 2026-01-01T00:00:00Z, are missing"
+        "the database was rolled back: transactions written after 2025-12-31T23:00:00Z, up to"
+        " 2026-01-01T00:00:00Z, are missing (50 in total)"
     )
 
 

@@ -227,7 +227,7 @@ def test_every_commit_waits_for_the_disk(postgres_place):
 
 def test_what_an_error_has_undone_is_never_taken_for_written(postgres_store, postgres_place):
     with (
-        pytest.raises(StoreError, match="the transaction was rolled back after an error"),
+        pytest.raises(StoreError, match="the server rolled the transaction back after an error"),
         postgres_store.database.writing() as writer,
         suppress(psycopg.Error),
     ):
