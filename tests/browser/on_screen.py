@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from playwright.async_api import Locator, Page, Route, expect
@@ -32,6 +33,13 @@ AGE = """() => {
     return 60 * Number(minutes ?? 0) + Number(seconds);
 }"""
 
+AXE = Path(__file__).parent / "javascript" / "node_modules" / "axe-core" / "axe.min.js"
+GRAVE = """async () => {
+  const options = { rules: { "target-size": { enabled: true } }, resultTypes: ["violations"] };
+  const { violations } = await axe.run(document, options);
+  const grave = violations.filter(({ impact }) => ["serious", "critical"].includes(impact));
+  return grave.map(({ id, nodes }) => [id, nodes.map(({ html }) => html)]);
+}"""
 N_TABS = 180
 WIDTHS = "() => [document.documentElement.scrollWidth, window.innerWidth]"
 
@@ -107,6 +115,15 @@ async def assert_fits(page: Page) -> None:
     """Nobody has to scroll sideways."""
     width, visible = await page.evaluate(WIDTHS)
     assert width <= visible, f"{page.url} is {width} px wide and {visible} px are seen"
+
+
+async def assert_accessible(page: Page) -> None:
+    """Axe-core has nothing serious or critical to say, in the look that the page has now."""
+    if not AXE.is_file():
+        pytest.skip("needs npm")
+    await page.evaluate(AXE.read_text())
+    grave = await page.evaluate(GRAVE)
+    assert not grave, f"{page.url}: {grave}"
 
 
 async def tab_to(page: Page, has_focus: str, wanted: str) -> None:

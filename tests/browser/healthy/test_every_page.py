@@ -1,12 +1,10 @@
 """What holds for every page there is: no complaint, a title, phone width, light and dark."""
 
-import json
-from pathlib import Path
-
 import pytest
 from on_screen import (
     A_NUMBER,
     FILES,
+    assert_accessible,
     assert_fits,
     await_charts,
     await_orbit,
@@ -17,7 +15,6 @@ from on_screen import (
 from playwright.async_api import Browser, Page, expect
 from rigs.tiers import fast_and_long
 
-AXE = Path(__file__).parents[1] / "javascript" / "node_modules" / "axe-core" / "axe.min.js"
 SEGMENTS = {":unit": "U1", ":bearing": "UJB"}
 BEARING = "#/units/U1/bearings/UJB"
 
@@ -25,12 +22,6 @@ PATTERNS = f"""import('{FILES}pages.js')
     .then(({{ PAGES }}) => PAGES.map(({{ pattern }}) => pattern))"""
 WAITING = "Asking the service."
 BAND = "getComputedStyle(document.body).backgroundColor"
-GRAVE = """async () => {
-  const options = { rules: { "target-size": { enabled: true } }, resultTypes: ["violations"] };
-  const { violations } = await axe.run(document, options);
-  const grave = violations.filter(({ impact }) => ["serious", "critical"].includes(impact));
-  return grave.map(({ id, nodes }) => [id, nodes.map(({ html }) => html)]);
-}"""
 LONG_NAMES = (
     "Гидроагрегат_№12_Саяно-Шушенской_ГЭС_имени_Непорожнего_640МВт",
     "مولد الطاقة الكهرومائية رقم ١٢ في محطة السد العالي بأسوان ⚡🌊",
@@ -131,17 +122,13 @@ async def test_a_wrong_clock_of_the_browser_changes_no_time_on_a_page(plant, bro
 
 @pytest.mark.parametrize("schemes", fast_and_long(("light", "dark"), ("dark", "light")))
 async def test_no_page_shuts_anybody_out_in_light_or_in_dark(plant, page, schemes):
-    if not AXE.is_file():
-        pytest.skip("needs npm")
     pages = await addresses(page, plant.url)
-    await page.evaluate(AXE.read_text())
     for number, address in enumerate(pages):
         scheme = schemes[number % len(schemes)]
         await page.emulate_media(color_scheme=scheme)
         await open_settled(page, plant.url + address)
         await expect(page.locator(f"html[data-theme={scheme}]")).to_be_attached()
-        grave = await page.evaluate(GRAVE)
-        assert not grave, f"{address}, {scheme}: {json.dumps(grave, indent=1)}"
+        await assert_accessible(page)
 
 
 async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembered(plant, page):

@@ -3,7 +3,15 @@
 import copy
 import re
 
-from on_screen import A_NUMBER, FILES, assert_fits, await_charts, await_spectra, freeze
+from on_screen import (
+    A_NUMBER,
+    FILES,
+    assert_accessible,
+    assert_fits,
+    await_charts,
+    await_spectra,
+    freeze,
+)
 from playwright.async_api import Page, expect
 
 FILM = "#/units/U1/bearings/UJB/film"
@@ -136,6 +144,10 @@ async def test_the_first_screen_says_which_bearing_is_unwell_by_how_much_since_w
         data = await shown.locator(".quality .mark").evaluate_all(LOOKS)
         assert "danger" in verdicts
         assert not set(verdicts) & set(data)
+        await assert_accessible(shown)
+        await shown.goto(plant.url + BEARING)
+        await expect(shown.locator(".verdict .mark").first).to_contain_text(WORDS)
+        await assert_accessible(shown)
 
 
 async def test_a_time_without_spectra_says_why_and_since_when_there_are_some(plant, page):

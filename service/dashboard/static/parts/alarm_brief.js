@@ -44,6 +44,7 @@ function alarmBrief(title, isMine, sentenceOf = null, isShort = false) {
     const n = { open: open.length, hidden: mine.length - open.length, unjudged: unjudged.filter(isMine).length };
     keepingFocus(link, () => drawRows(shown));
     setText(link, shown.length < open.length ? `Alarm list (${open.length - shown.length} more)` : isShort ? "" : "Alarm list");
+    link.hidden = link.textContent === "";
     setText(sentence, sentenceOf?.(n) ?? "");
     node.hidden = sentenceOf === null && open.length === 0;
   }, () => PERIOD_S, (failure) => {

@@ -49,7 +49,7 @@ export function spectrumCursor(onChange) {
 }
 
 function listOf(words, body) {
-  const headings = ["", ...HEADINGS, "Amplitude"].map((one) => element("th", { scope: "col" }, one));
+  const headings = ["No.", ...HEADINGS, "Amplitude"].map((one) => element("th", { scope: "col" }, one));
   return element("table", { class: "readings" }, element("caption", {}, words), element("thead", {}, element("tr", {}, ...headings)), body);
 }
 
