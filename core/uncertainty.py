@@ -110,7 +110,10 @@ def random_line(name: str, standard: float, freedoms: float = math.inf) -> Budge
 
 
 def systematic_line(name: str, half_width: float, sensitivity: float) -> BudgetLine:
-    """Return a systematic, uniform contribution; `half_width` is in the unit of the input."""
+    """Return a systematic, uniform contribution of an input quantity with the given half-width.
+
+    `sensitivity` is the change of the result per unit of the input quantity.
+    """
     return BudgetLine(name, Kind.SYSTEMATIC, Distribution.UNIFORM, half_width, sensitivity)
 
 

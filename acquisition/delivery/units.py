@@ -109,7 +109,8 @@ def unit_in(heading: str) -> str | None:
 def require_unit(place: object, found: str | None, mapped: str) -> None:
     """Check that a column's unit, if its file states one, equals the unit in the import mapping.
 
-    Raises ConfigError if the units differ; the message states both, and the column, `place`.
+    `place` names the column, `found` is its unit in the file, and `mapped` that in the mapping.
+    Raises ConfigError if the units differ; the message states column and units.
     """
     if found and found.strip() and canonical(found) != canonical(mapped):
         raise ConfigError(

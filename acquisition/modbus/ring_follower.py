@@ -31,7 +31,10 @@ _N_TRIES = 4
 
 
 class RingReader:
-    """Reader of the header and slots of one block ring; slots are not checked."""
+    """Reader of the header and slots of one block ring; slots are not checked.
+
+    The header begins at `base_address`; `function` is 3 (holding) or 4 (input registers).
+    """
 
     def __init__(self, client: ModbusClient, base_address: int, function: int) -> None:
         self._client = client

@@ -97,7 +97,7 @@ class ConfinedProcess:
 
 
 def confine(memory_bytes: int) -> None:
-    """Limit the address space of this process, its CPU time, and the size of files it writes."""
+    """Limit this process to an address space of `memory_bytes`; limit CPU time and file sizes."""
     for kind, limit in (
         (resource.RLIMIT_AS, memory_bytes),
         (resource.RLIMIT_CPU, CPU_S),
@@ -117,5 +117,5 @@ def memory_in_use_bytes() -> int:
 
 
 def printable(text: str, max_length: int = 300) -> str:
-    """Return a text that is safe to print: shortened, with control characters replaced."""
+    """Return a text that is safe to print: cut to `max_length`, control characters replaced."""
     return "".join(c if c.isprintable() else "�" for c in text)[:max_length]

@@ -88,7 +88,7 @@ def write_rows(recording: Recording, kind: ExportFormat, sink: Path | RawIOBase)
 
 
 def export_tables(recording: Recording, schema: Any) -> Iterator[Any]:
-    """Yield the rows of a recording as pyarrow tables of some ten thousand rows.
+    """Yield the rows of a recording as pyarrow tables of `schema`, some ten thousand rows each.
 
     Missing samples have no rows: time and index jump. Times are whole microseconds. Samples of a
     bad channel and implausible slow values are NaN. Raises ConfigError if a file of the recording

@@ -209,7 +209,7 @@ def manifest_text(manifest: Manifest) -> str:
 
 
 def checksum_of(document: dict[str, object]) -> str:
-    """Return the SHA-256 of all values but the checksum, independent of key order and spacing."""
+    """Return the SHA-256 of a manifest without its checksum, independent of order and spacing."""
     rest = {name: value for name, value in document.items() if name != "checksum"}
     text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode("ascii")).hexdigest()

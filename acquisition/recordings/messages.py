@@ -49,7 +49,7 @@ Rejected = tuple[int, str, int]
 
 
 def send(stream: BinaryIO, head: dict[str, Any], body: bytes = b"") -> None:
-    """Write one message to a stream."""
+    """Write one message, a JSON header and raw bytes, to a stream."""
     text = json.dumps(head, ensure_ascii=False).encode("utf-8", "surrogatepass")
     stream.write(len(text).to_bytes(4, "little") + len(body).to_bytes(4, "little") + text + body)
 
@@ -95,7 +95,7 @@ def blocks_message(
     counts: RawArray | None = None,
     done: float = 0.0,
 ) -> Message:
-    """Return a message with consecutive blocks.
+    """Return a message with consecutive blocks, and the rejections before them.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ class Progress:
     def after(
         self, heads: Heads, rejected: Mapping[int, Sequence[Rejection]], n_channels: int
     ) -> "Progress":
-        """Return the position after the next blocks.
+        """Return the position after the next blocks; `rejected` is by index in `heads`.
 
         Raises ConfigError if a block is invalid at this position; the message contains its number.
         """

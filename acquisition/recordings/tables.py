@@ -97,13 +97,13 @@ def _writer(path: Path, schema: Any, **options: Any) -> Any:
 
 @contextmanager
 def parquet_file(path: Path, schema: Any, n_rows: int, rows_per_group: int) -> Iterator[Any]:
-    """Open a Parquet file, check that its footer matches the manifest, and yield the file.
+    """Open a Parquet file, check its columns and numbers of rows in its footer, and yield it.
 
     Only for use in the confined child, because pyarrow allocates the size stated in a page header:
     up to 2 GB for a page of 64 kB.
 
-    Raises ConfigError if the file does not match the manifest, or reading it fails inside the
-    context.
+    Raises ConfigError if the footer differs from `schema`, `n_rows` or `rows_per_group`, or if
+    reading fails inside the context.
     """
     full, last = divmod(n_rows, rows_per_group)
     with foreign_errors_of(path), path.open("rb") as stream, pq.ParquetFile(stream) as file:

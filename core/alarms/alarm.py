@@ -244,7 +244,8 @@ def changed(
 ) -> tuple[Alarm, AlarmEvent]:
     """Return the changed alarm with its event count increased by one, and the event.
 
-    `before` and `after` are the states of the alarm. `actor` is empty for automatic changes.
+    `before` and `after` are the states of the alarm, `time_ns` is the time of the event. `actor` is
+    empty for automatic changes, and `reason` may be empty.
     """
     after = replace(after, n_events=before.n_events + 1)
     event = AlarmEvent(

@@ -127,9 +127,9 @@ def ewma_weight(time_scale_h: float, reading_h: float) -> float:
 
 
 def ewma(x: FloatArray, alpha: float) -> FloatArray:
-    """Return the moving averages y[i] = (1 - α) y[i-1] + α x[i] of x (n,), starting from y = 0.
+    """Return the moving averages y[i] = (1 - α) y[i-1] + α x[i] of x (n,), with α = `alpha`.
 
-    Divided by the moving average of ones, it is an exponentially weighted mean.
+    The first is α x[0]. Divided by those of ones, they are exponentially weighted means.
     """
     from scipy.signal import lfilter  # slow import, not needed at start-up
 
@@ -137,5 +137,5 @@ def ewma(x: FloatArray, alpha: float) -> FloatArray:
 
 
 def ewma_step(total: float, x: float, alpha: float) -> float:
-    """Return (1 - α) total + α x: the moving average `total` of `ewma` after one more value x."""
+    """Return the moving average `total` after one more value x: (1 - alpha) total + alpha x."""
     return total * (1.0 - alpha) + alpha * x

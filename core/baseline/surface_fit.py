@@ -184,7 +184,10 @@ def _std(
 
 
 def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Surface:
-    """Return the surface refitted, with the weights of `fit`, to groups where `is_used` is 1."""
+    """Return the surface refitted, with the weights of `fit`, to groups where `is_used` is 1.
+
+    `bend_std` is the prior standard deviation of the change of slope of ln k between knots.
+    """
     shape, offset = fit.surface.shape, fit.surface.offset
     points = _Points.of(groups, shape, offset)
     precision = is_used * fit.robust_weight / (fit.group_std**2 * fit.clustering)

@@ -56,9 +56,9 @@ def outcomes(
 ) -> Iterator[Outcome]:
     """Yield, for each reading of a film in one direction, its comparison with the baseline.
 
-    A verdict is yielded instead if a reading cannot be compared, or if there is no baseline. All
-    arrays are (n,): `value` is ln of the stiffness (NaN if it was not measured), `u_random` its
-    random standard uncertainty, and `codes` are values of `ReadingOutcome`.
+    A verdict is yielded instead if a reading is not settled or cannot be compared, or if there is
+    no baseline. All arrays are (n,): `value` is ln of the stiffness (NaN if not measured),
+    `u_random` its random standard uncertainty, and `codes` are values of `ReadingOutcome`.
     """
     unusable = np.full(value.size, -1)
     columns: tuple[FloatArray, ...] = (np.zeros(value.size),) * 4

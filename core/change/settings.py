@@ -20,7 +20,7 @@ danger."""
 
 
 def percent_of(ln: float) -> float:
-    """Return a change of a logarithm in percent of the expected value."""
+    """Return a change `ln` of a logarithm in percent of the expected value."""
     return 100.0 * math.expm1(ln)
 
 

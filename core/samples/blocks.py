@@ -103,7 +103,7 @@ class SideValues:
 
     @classmethod
     def of(cls, start_ns: int, ok: Sequence[bool], slow: Sequence[float]) -> "SideValues":
-        """Return the side values of a block with a single cell that starts at `start_ns`."""
+        """Return the side values of a single cell from its time, OK states and slow values."""
         return cls(
             starts=np.zeros(1, dtype=np.int64),
             start_ns=np.array([start_ns], dtype=np.int64),

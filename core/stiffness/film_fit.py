@@ -164,7 +164,8 @@ class FilmTerms:
     """Products of the terms of films at each line, for the normal equations of the fits.
 
     The force of a row is a sum of terms ``θ φ(ω) u`` with real coefficients θ, functions φ, and the
-    shaft's motion u in x and y. Coefficients are ordered by function, then by motion.
+    shaft's motion u in x and y. The p coefficients are ordered by function, then by motion; they
+    are those of the first `n_functions` functions where this number is given.
 
     Parameters
     ----------

@@ -55,6 +55,8 @@ def tilt_lag(
     ----------
     omega : (n, n_lines)
         Angular frequencies.
+    turn_rad_s
+        Angular velocity of the shaft.
     deviation : (n, k)
         Deviations of the lag τ from its prior mean, in standard deviations of the prior.
     """

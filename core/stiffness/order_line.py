@@ -116,7 +116,7 @@ class OrderLine:
         return float(self.orders.frequency_hz[self.at])
 
     def n_segments(self, first: int, last: int) -> int:
-        """Return the number of segments or changed polls in which two channels are usable."""
+        """Return the number of segments or changed polls in which both channels are usable."""
         if self.bins is not None:
             return int(self.orders.n_segments[first, last])
         both = self.usable[:, first] & self.usable[:, last]

@@ -135,7 +135,10 @@ def rotor_of(ids: tuple[str, ...]) -> RotorParameters:
 
 
 def shaft_motion(height_m: float) -> FloatArray:
-    """Return the matrix (2, 4) from X, Y, φ_x, φ_y to shaft motion x, y (Brito et al., Table 3)."""
+    """Return the matrix (2, 4) from X, Y, φ_x, φ_y to shaft motion x, y at a height.
+
+    `height_m` is the height above the mass centre (Brito et al., Table 3).
+    """
     return np.array([[1.0, 0.0, 0.0, height_m], [0.0, 1.0, -height_m, 0.0]])
 
 
