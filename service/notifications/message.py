@@ -152,7 +152,7 @@ class Composer:
     def alarm(self, alarm: Alarm, event: AlarmEvent, is_active: bool, now_ns: int) -> Message:
         """Return the message about an event of an alarm, written at the time `now_ns`.
 
-        `alarm` is the state after the event; `is_active` is that of the `Notice` of the event.
+        `alarm` is the alarm after the event, and `is_active` whether receivers regard it as active.
         """
         identity, context = event.identity, self._context(event.identity)
         return {

@@ -17,7 +17,7 @@ DELIVERY = {
 
 
 def add_deliveries(families: Families, views: Sequence[ReceiverView] | None, now_ns: int) -> None:
-    """Add the messages of all receivers; ``views`` is None if the outbox cannot be read.
+    """Add the delivery metrics of all receivers; ``views`` is None if the outbox is unreadable.
 
     The recipients of one mail have one label, the id of the mail; labels contain no address.
     """

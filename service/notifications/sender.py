@@ -157,7 +157,7 @@ class Sender:
         now_ns, before = self._clock.now_ns(), self.status
         if before.n_failures == 0:
             found = {"receiver": self.receiver.name, "id": letter.event_id}
-            log.warning("message not delivered; it is sent again", **found, reason=failed.answer)
+            log.warning("message not delivered; sending is repeated", **found, reason=failed.answer)
         await self._stored(lambda: self._outbox.fail(letter.id, failed.answer))
         await self._expire(failed.answer)
         n_failures = before.n_failures + 1
@@ -275,7 +275,7 @@ class Deliveries:
         )
 
     async def look(self) -> list[ReceiverView]:
-        """Return the state of all receivers, as `receiver_views` does.
+        """Return the delivery statistics and the status of the sender of each receiver.
 
         Raises `StoreError` if the outbox cannot be read.
         """

@@ -60,17 +60,21 @@ class CaptureSettings:
 
     @property
     def longest_pre_s(self) -> float:
-        """Maximum duration before an alarm, in s, that leaves room for `post_s` in the capture."""
+        """Duration recorded before a film alarm, in s, which is at least that of other alarms."""
         return max(self.pre_s, min(self.window_s, self.max_s - self.post_s))
 
     def start_ns(self, event: AlarmEvent) -> int:
-        """Return the start time, in ns, of the capture of an alarm event."""
+        """Return the start time, in ns since 1970 UTC, of the capture of an alarm event."""
         is_film = event.identity.kind == FILM_STIFFNESS
         return event.time_ns - ns_from_s(self.longest_pre_s if is_film else self.pre_s)
 
 
 def is_captured(event: AlarmEvent) -> bool:
-    """Return whether samples around an alarm event are captured: new, not shelved or suppressed."""
+    """Return whether samples around an alarm event are captured.
+
+    They are if the event raises or escalates an alarm that is not shelved or suppressed, and if
+    captures are made for this kind of alarm.
+    """
     return (
         event.change in ANNOUNCED
         and event.identity.kind in SAMPLED_KINDS
@@ -188,7 +192,7 @@ class Captures(WriterThread):
         self.n_written = self.n_failed = 0
 
     def set_listener(self, listener: Callable[[Outcome], None]) -> None:
-        """Set the function that gets the outcome of each capture; it runs on the event loop."""
+        """Set the function that is called on the event loop with the outcome of each capture."""
         self._listener = listener
 
     def expects(self, event: AlarmEvent) -> bool:
@@ -219,7 +223,7 @@ class Captures(WriterThread):
         return [*self._ended, *self._running.values()]
 
     def take(self, block: SampleBlock, news: Sequence[AlarmNews]) -> None:
-        """Keep a block in memory; start, extend or replace a capture for its alarm events."""
+        """Keep a block in memory; start, extend or replace a capture for the alarms in `news`."""
         if block.unit not in self._histories:
             return
         is_new = self._histories[block.unit].add(block)
@@ -244,7 +248,7 @@ class Captures(WriterThread):
         self._news.set()
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Write pending blocks until cancelled; call `close` afterwards."""
+        """Write pending blocks until cancelled, with heartbeats to `pulse`; then call `close`."""
         pulse.beat(MAX_BUSY_S)
         await self._in_thread(self._remove_incomplete)
         while True:
@@ -335,6 +339,6 @@ class Captures(WriterThread):
     def _remove_incomplete(self) -> None:
         try:
             for folder in remove_incomplete(self._root, self._histories):
-                log.warning("a capture left incomplete by a crash is removed", folder=folder.name)
+                log.warning("a capture left incomplete by a crash was removed", folder=folder.name)
         except OSError as error:
             self._note(str(error))

@@ -83,7 +83,7 @@ class Omission:
 
 
 def unseen_part(block: SampleBlock, end: Position | None) -> SampleBlock | None:
-    """Return the part of a block after the position `end`; None if there is none.
+    """Return the part of a block after the position `end`; None if no samples are left.
 
     The whole block is returned if `end` is None, of another epoch, or not within the block.
     """
@@ -132,10 +132,8 @@ class UnitRecorder:
     def write(self, block: SampleBlock, now_s: float) -> None:
         """Append a block; start a new segment if the open segment does not cover the block.
 
-        Raises
-        ------
-        RecordingError
-            If the block, or an earlier block, cannot be recorded.
+        `now_s` is the monotonic time. Raises `RecordingError` if the block, or an earlier block,
+        cannot be recorded.
         """
         unseen = unseen_part(block, self._end)
         if unseen is None:
@@ -153,12 +151,9 @@ class UnitRecorder:
         self.sync(now_s)
 
     def sync(self, now_s: float) -> None:
-        """Sync the open part of the segment to the disk if `Segment.is_due`.
+        """Sync the open part of the segment to the disk if its duration has been reached.
 
-        Raises
-        ------
-        RecordingError
-            If the part cannot be written.
+        `now_s` is the monotonic time. Raises `RecordingError` if the part cannot be written.
         """
         if self._segment is not None and self._segment.is_due(now_s):
             self._finish_part(self._segment)
@@ -338,7 +333,7 @@ class ContinuousRecorder(WriterThread):
         self._n_waiting += unseen.counts.size
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Write queued blocks until cancelled; call `close` afterwards."""
+        """Write queued blocks until cancelled, with heartbeats to `pulse`; then call `close`."""
         pulse.beat(10 * MAX_BUSY_S)
         await self._in_thread(self._recover)
         if not self._units:
@@ -435,4 +430,4 @@ class ContinuousRecorder(WriterThread):
         for folder in left:
             self._note(self._join_one())
             if folder.exists():
-                log.warning("an unfinished recording is completed", folder=folder.name)
+                log.warning("an unfinished recording was completed", folder=folder.name)

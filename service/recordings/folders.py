@@ -69,13 +69,9 @@ def damaged_folder(folder: Path, part: Path) -> Path:
 def remove_incomplete(root: Path, units: Container[str | None]) -> list[Path]:
     """Remove the incomplete recordings of units after a crash of the service; return their folders.
 
-    Recordings of other units are kept: another process may be writing them. None includes names
-    without a unit.
-
-    Raises
-    ------
-    OSError
-        If the disk cannot be read or written.
+    Recordings of other units are kept: another process may be writing them. If `units` contains
+    None, recordings whose names have no unit are removed as well. Raises `OSError` if the disk
+    cannot be read or written.
     """
     found = [
         path

@@ -68,7 +68,7 @@ class Index:
                 self._removed.pop(key, None)  # the name is in use again
 
     def remove(self, file: WaveformFile, reason: str, now_ns: int) -> None:
-        """Remove an entry from the index in memory; `store_removals` then updates the store."""
+        """Remove an entry from the index in memory; call `store_removals` to update the store."""
         gone = replace(file, state=WaveformState.REMOVED, reason=reason, changed_ns=now_ns)
         self._files.pop((file.kind, file.name), None)
         self._removed[file.kind, file.name] = gone
@@ -86,12 +86,9 @@ class Index:
             self._removed.clear()
 
     def forget(self, before_ns: int) -> None:
-        """Delete the entries of recordings that have been removed or missing since before a time.
+        """Delete the entries of recordings removed or missing since before `before_ns`, ns.
 
-        Raises
-        ------
-        StoreError
-            If the store cannot be written; no entry is deleted.
+        Raises `StoreError` if the store cannot be written; no entry is then deleted.
         """
         self._store.forget(self.place, before_ns)
         self._files = {
@@ -109,7 +106,9 @@ DAMAGE_ERRORS = (
 
 
 def inspected(folder: Path, place: str, kind: WaveformKind, now_ns: int) -> WaveformFile:
-    """Read a whole recording and return its index entry, with the fault of a damaged recording.
+    """Read a whole recording and return its index entry, which states damage, if any.
+
+    `place` is the identifier of the data folder, and `now_ns` the time of the check.
 
     Raises
     ------
@@ -273,7 +272,10 @@ class RetryList:
 
     @contextmanager
     def noted(self, kind: WaveformKind, name: str) -> Iterator[None]:
-        """Return a context that catches `OSError` and lists the recording; success unlists it."""
+        """Return a context manager that adds a recording to the list, or removes it.
+
+        The recording is added after an `OSError`, which is caught, and removed after success.
+        """
         try:
             yield
         except OSError as error:

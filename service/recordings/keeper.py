@@ -132,7 +132,7 @@ class RecordingIndexer:
         return self._gauge.is_full
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Maintain the recordings in the thread until cancelled; call `close` afterwards."""
+        """Maintain the recordings until cancelled, with heartbeats to `pulse`; then `close`."""
         while True:
             pulse.beat(MAX_LOOK_S)
             start_s = self._clock.monotonic_s()

@@ -85,10 +85,7 @@ class RecordingLibrary:
     def opened(self, name: str) -> Recording:
         """Check all files of a recording and open it.
 
-        Raises
-        ------
-        ConfigError
-            If the recording is damaged or does not exist.
+        Raises `ConfigError` if the recording is damaged or does not exist.
         """
         folder = self._folder(name)
         if folder is None:
@@ -98,23 +95,24 @@ class RecordingLibrary:
         return open_recording(folder)
 
     def summary(self, name: str) -> RecordingSummary:
-        """Return the summary of a recording; raises as `opened` does."""
+        """Return the summary of a recording; raise `ConfigError` if damaged or missing."""
         return summary_of(self.opened(name))
 
     def zip_pieces(self, name: str) -> Generator[bytes, None, None]:
-        """Yield the content of a ZIP file with all files of a recording; raises as `opened` does.
+        """Yield the content of a ZIP file with all files of a recording.
 
-        Raises
-        ------
-        OSError
-            If a file cannot be read.
+        Raises `ConfigError` if the recording is damaged or does not exist, and `OSError` if a file
+        cannot be read.
         """
         folder = self.opened(name).folder
         there = [file for file in FILES if (folder / file).is_file()]
         return zipped({f"{name}/{file}": folder / file for file in there})
 
     def csv_pieces(self, name: str) -> Generator[bytes, None, None]:
-        """Yield the samples as CSV text with units in the header; raises as `opened` does."""
+        """Yield the samples of a recording as CSV text with units in the header.
+
+        Raises `ConfigError` if the recording is damaged or does not exist.
+        """
         recording, sink = self.opened(name), Sink()
         for _ in write_rows(recording, ExportFormat.CSV, sink):
             yield from sink.taken()

@@ -238,7 +238,7 @@ def _rows(manifest: Manifest, unit: Unit, bearing: Bearing) -> Mapping[str, int]
             raise NoMotionError(f"channel {id_} of bearing {bearing.id} was not recorded")
         if recorded[id_][1] is not configured[id_]:
             then, now = recorded[id_][1], configured[id_]
-            raise NoMotionError(f"channel {id_} is recorded as {then}, but configured as {now}")
+            raise NoMotionError(f"channel {id_} was recorded as {then}, but is configured as {now}")
     wanted = channels_for(unit, bearing)
     return {id_: recorded[id_][0] for id_ in wanted if id_ in recorded}
 

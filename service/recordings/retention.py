@@ -35,7 +35,7 @@ MAX_LENGTH_NS = 3600 * NS_PER_S
 
 
 class AgeLimit:
-    """Age limit `keep_ns` of continuous recordings (`files`), by the clock of each unit.
+    """Maximum age, `keep_ns`, of the continuous recordings `files`, by the clock of each unit.
 
     The age is counted back from the start of the newest day of recordings, or from now if that is
     earlier, so that a forward step of the clock does not make all recordings too old.
@@ -54,7 +54,7 @@ class AgeLimit:
         self._newest_ns = max(self._since_ns.values(), default=None)
 
     def is_old(self, file: WaveformFile) -> bool:
-        """Return whether a recording is too old; False without a limit, for lack of recordings."""
+        """Return whether a recording is too old; False if its unit has less than a day of them."""
         since_ns = self._since_ns.get(file.unit) if file.unit else self._newest_ns
         return since_ns is not None and _time_ns(file) < since_ns
 
@@ -108,7 +108,8 @@ def make_room(
         Disk space to free, in bytes, by kind. To free it, captures are removed only if the removal
         of continuous recordings frees too little, and never if evidence refers to the captures.
     in_use, remove
-        Function that returns the names of these captures, and function that removes a recording.
+        Function that returns the names of the captures to which evidence refers, and function
+        that removes a recording for a reason and returns whether it succeeded.
 
     Raises
     ------
@@ -319,7 +320,7 @@ class RecordingRetention:
         known, there = self._index.names(kind), set(finished(root))
         if known and not root.is_dir():
             n = len(known)
-            why = f"the folder of {n} recordings does not exist; mount or restore it"
+            why = f"the folder of recordings ({n} in the index) is missing; mount or restore it"
             raise OSError(f"{root}: {why}")
         self._retry.keep(kind, there)
         missing = [file for name in known - there if (file := self._index.get(kind, name))]
@@ -384,7 +385,7 @@ class RecordingRetention:
                     with errors.deferred():
                         left = finish_removal(root / name)
                         if left is not None:
-                            words = "the folder of a removed recording holds other files"
+                            words = "the folder of a removed recording is kept: it has other files"
                             log.warning(words, folder=left.name)
 
     def _check_one(self) -> None:

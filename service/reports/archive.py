@@ -81,7 +81,7 @@ class Occurrence:
     def bundle(self) -> Place:
         """Location of the bundle; raises `LookupError` unless the bundle is complete."""
         if self.place is None:
-            raise LookupError(f"alarm {self.event.identity.id} has no evidence bundle")
+            raise LookupError(f"alarm {self.event.identity.id} has no complete evidence bundle")
         return self.place
 
 
@@ -114,12 +114,10 @@ class EvidenceArchive:
         return self._with_bundles(alarm, found, pending)
 
     def occurrence(self, alarm: str, number: int, pending: Occurrences) -> Occurrence | None:
-        """Return an occurrence of an alarm; None if unknown. `pending` is as in `occurrences`.
+        """Return an occurrence of an alarm; None if the alarm has no occurrence of this number.
 
-        Raises
-        ------
-        StoreError
-            If the store cannot be read.
+        `pending` are the occurrences whose bundles are still to be written, determined before this
+        call. Raises `StoreError` if the store cannot be read.
         """
         for event in self.events(alarm):
             if event.occurrence < number:
@@ -152,7 +150,7 @@ class EvidenceArchive:
         content = json.loads(text)
         del content["sha256"]
         if hashlib.sha256(canonical(content)).hexdigest() != found.sha256:
-            why = "was changed since it was written: its SHA-256 is not the stored one"
+            why = "was changed since it was written: its SHA-256 differs from the stored one"
             raise DamagedEvidenceError(f"{place.folder.name}: {DOCUMENT} {why}; restore a copy")
         return found
 

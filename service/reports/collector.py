@@ -59,7 +59,7 @@ class SnapshotTaker:
         self._units, self._live, self._films = units, live, films
 
     def take(self, event: AlarmEvent, now_ns: int, samples_expected: bool) -> Snapshot:
-        """Return a snapshot of the unit of an alarm event; of the event alone without a unit.
+        """Return a snapshot of the unit of an alarm event, or of the event if it has no unit.
 
         ``now_ns`` is the time of the snapshot, ns since 1970 UTC; ``samples_expected`` states
         whether the samples around the alarm are to be recorded.
@@ -86,9 +86,10 @@ class SnapshotTaker:
 
 
 def bearing_of(unit: UnitSettings, subject: str) -> str | None:
-    """Return the id of the bearing that is, or has the channel, ``subject``; None if none has.
+    """Return the id of the bearing of an alarm subject: a bearing id or a channel of a bearing.
 
-    A bearing with the subject as a required channel precedes one with it as an optional channel.
+    A bearing that requires the channel takes precedence over a bearing for which it is optional.
+    None if the subject belongs to no bearing.
     """
     for keys in (("id", *CHANNEL_KEYS), ("oil_temperature", *GAP_KEYS[:2], *OPTIONAL_CHANNEL_KEYS)):
         for bearing in unit.bearing:
@@ -144,7 +145,7 @@ class EvidenceCollector:
         return len(self._pending)
 
     def see(self, news: Sequence[AlarmNews]) -> None:
-        """Queue a snapshot for each alarm raised or escalated; the oldest is lost if too many."""
+        """Queue a snapshot for each alarm raised or escalated; drop the oldest beyond the limit."""
         for each in news:
             for event in each.events:
                 if event.change in ANNOUNCED:
@@ -170,7 +171,7 @@ class EvidenceCollector:
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Write bundles until cancelled, and retry after errors of disk or store.
 
-        Beats ``pulse`` before each write; call `close` afterwards.
+        ``pulse`` receives a heartbeat before each write; call `close` afterwards.
         """
         pulse.beat(MAX_BUSY_S)
         await self._trying(self._begin)
@@ -243,12 +244,12 @@ class EvidenceCollector:
         keep_configuration(self._folders.configurations, self.configuration)
         note_beginning(self._folders.evidence, self._clock.now_ns())
         for folder in clear_leftovers(self._folders.evidence):
-            log.warning("unfinished evidence is removed", folder=folder.name)
+            log.warning("unfinished evidence was removed", folder=folder.name)
         link_all(self._folders.evidence, self._folders.captures)
 
     def _make_room(self) -> None:
         for name in self._room.make():
-            log.info("evidence is removed to free space", folder=name)
+            log.info("evidence was removed to free space", folder=name)
 
     async def _trying(self, do: Callable[[], None]) -> bool:
         """Run a function in the thread; return whether it raised no error of disk or store."""

@@ -43,7 +43,10 @@ from service.store.port import ValueRange
 
 
 def bearing_part(found: Assessment, film: FilmNews | None, rules: FilmRules | None) -> BearingPart:
-    """Return the part about one bearing; `film` and `rules` are None if its film is not judged."""
+    """Return the part of the evidence document about one bearing.
+
+    `film` and `rules` are None if the film of the bearing is not monitored.
+    """
     watched = None if rules is None else rules.estimators.get(found.bearing)
     return BearingPart.of(
         found,
@@ -56,13 +59,13 @@ def bearing_part(found: Assessment, film: FilmNews | None, rules: FilmRules | No
 
 
 def reading_part(name: str, reading: Reading) -> ReadingPart:
-    """Return the part about the reading of the quantity ``name`` of the catalogue."""
+    """Return the part of the evidence document about a reading of the quantity ``name``."""
     interval = _finite_pair(reading.interval_95)
     return ReadingPart.of(reading, reading.quality, quantity_of(name), interval_95=interval)
 
 
 def cell_bounds(cell: Cell | None, grid: CellGrid | None) -> list[tuple[float, float]] | None:
-    """Return the limits (low, high) of a cell along each axis of its grid; None without them.
+    """Return the limits (low, high) of a cell along each axis of its grid; None without either.
 
     The axes are eccentricity ratio, oil temperature in °C and, if used, attitude in degrees.
     """
@@ -199,7 +202,7 @@ def comparison(
     Parameters
     ----------
     baseline
-        Baseline of the bearing; None leaves what is expected empty.
+        Baseline of the bearing; if None, the expected values are omitted.
     members
         Readings of the cell; None if the store is unreadable or the cell is unknown.
     """

@@ -207,7 +207,7 @@ def sealed(document: dict[str, Any]) -> bytes:
 
 
 def composed(snapshot: Snapshot, maker: Maker) -> dict[str, Any]:
-    """Return the fields of a document that need neither store nor disk, from a snapshot."""
+    """Return the fields of an evidence document that depend on the snapshot alone."""
     return {
         "format": FORMAT,
         "version": VERSION,

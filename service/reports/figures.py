@@ -100,7 +100,10 @@ GN_PER_M = 1e9
 
 
 def stiffness_scale(values: Values) -> tuple[str, float]:
-    """Return the unit in which stiffnesses are drawn, and its size: GN/m, or k_b if unknown."""
+    """Return the unit in which stiffnesses are drawn, and its size in N/m.
+
+    The unit is GN/m; or k_b, of size 1, if stiffnesses are ratios to the bracket stiffness.
+    """
     largest = max((abs(v) for v in values if v), default=GN_PER_M)
     return ("k_b", 1.0) if are_ratios(math.log(largest)) else ("GN/m", GN_PER_M)
 

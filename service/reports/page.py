@@ -106,7 +106,7 @@ def shortened(text: str, longest: int = LONGEST) -> str:
 
 
 def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
-    """Yield name and text of each fact at the top of the report; `now` is its time as text."""
+    """Yield name and text of each fact at the top of the report of the time `now`."""
     evidence, alarm = case.evidence, case.evidence.alarm
     unit = evidence.unit
     where = [evidence.plant, unit.name if unit and unit.name else alarm.unit, alarm.subject]
@@ -125,7 +125,7 @@ def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
 
 
 def value_words(case: Case) -> str:
-    """Return value and limit of the alarm; for film alarms also the newest deviation.
+    """Return value and limit of the alarm as text; for film alarms also the newest deviation.
 
     Without a value the text is "no number".
     """
@@ -141,12 +141,12 @@ def value_words(case: Case) -> str:
 
 
 def quantity_words(found: FindingPart) -> str:
-    """Return the direction of a finding, with "c/k" if it is on damping over stiffness."""
+    """Return the direction of a finding as text, marked if it is about damping over stiffness."""
     return f"{found.direction}, damping over stiffness c/k" if found.is_damping else found.direction
 
 
 def change_words(found: FindingPart) -> str:
-    """Return the newest deviation and the confirmed mean change of a film, in percent.
+    """Return the newest deviation and the confirmed mean change of a film in percent, as text.
 
     A dash stands for both if neither is known.
     """

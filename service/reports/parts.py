@@ -16,7 +16,7 @@ Numbers = list[float | None]
 
 
 class EvidencePart(ValueModel):
-    """Base class of all models of the document."""
+    """Base class of the models that make up the evidence document."""
 
     model_config = ConfigDict(frozen=True)
 

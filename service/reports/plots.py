@@ -131,7 +131,10 @@ class Plot:
             self._marks.append(f'<path class="{look}" d="{"".join(path)}"/>')
 
     def band(self, xs: Values, lows: Values, highs: Values, look: str, longest_step: float) -> None:
-        """Add the area between two lines, interrupted where `line` interrupts a line."""
+        """Add the area between two lines.
+
+        It is interrupted at missing numbers and at steps along x over `longest_step`.
+        """
         piece: list[tuple[float, float, float]] = []
         for x, low, high in zip(xs, lows, highs, strict=True):
             if x is None or low is None or high is None:

@@ -57,17 +57,10 @@ class EvidenceRetention:
             self._crowded.add(place.alarm)
 
     def make(self) -> list[str]:
-        """Remove the oldest bundles until the others meet the limits; always keep the newest.
+        """Remove the oldest bundles until the remaining bundles meet the limits.
 
-        Returns
-        -------
-        list of str
-            Names of the removed folders, oldest first.
-
-        Raises
-        ------
-        OSError
-            If a folder cannot be read or removed; the next call surveys all folders again.
+        The newest bundle is always kept. Returns the names of the removed folders, oldest first.
+        Raises `OSError` if a folder cannot be read or removed; the next call surveys all folders.
         """
         surveyed_s, self._surveyed_s = self._surveyed(), None
         most = self._limits.max_per_alarm

@@ -179,7 +179,7 @@ PROBLEMS = problem_responses(
 )
 
 WHY_NOT = {
-    EvidenceState.LOST: "was lost, because the service ended or the disk failed before",
+    EvidenceState.LOST: "was lost: the service ended or the disk failed before it was written",
     EvidenceState.REMOVED: "was removed to free space for newer evidence",
     EvidenceState.NOT_KEPT: "was never kept",
 }
@@ -266,7 +266,7 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
 
 def _there(desk: EvidenceService | None) -> EvidenceService:
     if desk is None:
-        raise ProblemError(404, "No evidence", "this service keeps no evidence")
+        raise ProblemError(404, "No evidence", "this service does not collect evidence of alarms")
     return desk
 
 
@@ -290,7 +290,7 @@ async def _complete(
         raise ProblemError(404, "Unknown occurrence", detail)
     name = f"evidence of alarm {alarm}, occurrence {occurrence},"
     if found.state is EvidenceState.WAITING:
-        raise ProblemError(409, "Not complete yet", f"{name} is being written")
+        raise ProblemError(409, "Not complete yet", f"{name} is being written; try again later")
     if found.state is not EvidenceState.COMPLETE:
         raise ProblemError(404, "No evidence", f"{name} {WHY_NOT[found.state]}")
     return found

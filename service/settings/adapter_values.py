@@ -66,7 +66,7 @@ Link = TypeVar("Link", bound=LinkSettings)
 
 
 def link_settings(kind: type[Link], source: ModbusLinkSettings) -> Link:
-    """Return the settings of a Modbus device as ``kind``, the link settings of its adapter.
+    """Return the settings of a Modbus device as an instance of ``kind``, a class of its adapter.
 
     Unless set, `requests_in_flight` is `RING_REQUESTS_IN_FLIGHT` for a block ring on TCP, else 1.
     """

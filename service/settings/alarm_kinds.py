@@ -111,7 +111,7 @@ def kind_words(kind: str, directions: str = "") -> str:
 
 
 def value_unit(kind: str) -> str | None:
-    """Return the unit of the values of an alarm kind; None without a value or if unknown."""
+    """Return the unit of the values of an alarm kind; None if it has no value or is unknown."""
     found = ALARM_KINDS.get(kind)
     return None if found is None else found.unit
 

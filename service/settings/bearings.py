@@ -159,7 +159,7 @@ class BearingSettings(Settings):
             )
         if self.bracket_stiffness_n_per_m is None:
             for key in OF_KNOWN_BRACKETS & self.model_fields_set:
-                raise MisfitError("applies only with bracket_stiffness_n_per_m", key)
+                raise MisfitError("applies only with bracket_stiffness_n_per_m; remove it", key)
         if self.alarms.oil_temperature_c is not None and self.oil_temperature is None:
             raise MisfitError(
                 "requires oil_temperature, the slow channel of the bearing's oil temperature",

@@ -226,7 +226,8 @@ class ChannelSettings(Settings):
         for key in (*others, *(VOLTAGE_KEYS if in_counts else ())):
             if getattr(self, key) is not None:
                 which = "without" if in_counts else "with"
-                raise MisfitError(f"applies only to a channel {which} unit_per_count", key)
+                words = f"applies only to a channel {which} unit_per_count; remove it"
+                raise MisfitError(words, key)
         for key in keys:
             if getattr(self, key) is None:
                 raise MissingError("is missing", key)
@@ -362,7 +363,7 @@ class SlowChannelSettings(Settings):
         if self.quantity is None:
             for key in ("bearing", "position", "angle_deg", "limits"):
                 if getattr(self, key) is not None:
-                    raise MisfitError("requires quantity", key)
+                    raise MisfitError("requires quantity; add quantity or remove it", key)
             return self
         unit, is_pad = SLOW_QUANTITIES[self.quantity].setting, self.quantity == PAD_TEMPERATURE
         if self.unit != unit:
@@ -370,7 +371,7 @@ class SlowChannelSettings(Settings):
         if is_pad and self.bearing is None:
             raise MissingError(f"is missing; a {self.quantity} belongs to a bearing", "bearing")
         if self.angle_deg is not None and not is_pad:
-            raise MisfitError("applies only to a pad_temperature", "angle_deg")
+            raise MisfitError("applies only to a pad_temperature; remove it", "angle_deg")
         if self.recorded is not None and self.recorded.reading in BY_NAME:
             raise MisfitError("is the name of a computed value; use another word", "position")
         return self

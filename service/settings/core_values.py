@@ -135,7 +135,7 @@ ZONE_DEADBAND = 0.05
 def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitRules:
     """Return the alarm rules of a unit.
 
-    A replay has no rules for link and clock, nor has a unit whose clock is "ignored" one for it.
+    A replay has no rules for link and clock; a unit with ``clock = "ignored"`` has none for clock.
     """
     is_live = origin is Origin.LIVE
     is_judged = is_live and alarms.clock == "judged"
@@ -258,7 +258,7 @@ STALE_HOPS = 2.5
 
 
 def refresh_s(plant: PlantFile) -> float:
-    """Return the time between two results of the unit with the slowest results, s."""
+    """Return the interval between results, in s, of the unit for which it is longest."""
     hop_samples = analysis_of(plant.analysis).hop_samples
     return max(
         (unit.source.hop_polls if isinstance(unit.source, ModbusVectorSettings) else hop_samples)

@@ -216,7 +216,7 @@ class FilmAlarmSettings(Settings):
         return self
 
     def alert_change(self, quantity: str) -> float:
-        """Return the alert limit of one of the `QUANTITIES`, as a fraction of its value."""
+        """Return the alert limit of one of the `QUANTITIES`, as a fraction of the baseline."""
         is_stiffness = QUANTITIES[quantity].value == "ln_k"
         return (self.change if is_stiffness else self.change_ck).alert_change
 

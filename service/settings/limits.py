@@ -122,7 +122,7 @@ LIMITS = ("alert", "danger", "alert_below", "danger_below", "deadband")
 class LimitSettings(WatchSettings):
     """Main table of alarm limits of a measured value; alert, danger or both must be given.
 
-    Subclasses give the unit of alert, danger and deadband; None is no limit of this level.
+    Alert, danger and deadband have the unit that a subclass states. None means no limit.
     """
 
     alert: float | None
@@ -276,7 +276,7 @@ class PadExcessLimitSettings(LimitSettings):
 
 
 class TwoSidedLimitSettings(LimitSettings):
-    """Alarm limits above and below; at least one of the four must be given."""
+    """Upper limits alert and danger, and lower limits alert_below and danger_below, of a value."""
 
     alert_below: float | None
     danger_below: float | None

@@ -75,7 +75,7 @@ class QuietSettings(Settings):
         return self
 
     def include(self, time_ns: int) -> bool:
-        """Return whether a time, UTC ns since 1970, is not before `start` and is before `end`."""
+        """Return whether a time, ns since 1970 UTC, is in the quiet hours (without their end)."""
         moment = datetime.fromtimestamp(time_ns // NS_PER_S, ZoneInfo(self.time_zone)).time()
         start, end = time.fromisoformat(self.start), time.fromisoformat(self.end)
         return start <= moment < end if start < end else moment >= start or moment < end
@@ -125,7 +125,7 @@ class ReceiverSettings(Settings):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the queues of this receiver in the outbox: one queue, named by its id."""
+        """Names of the queues of this receiver in the outbox; its only queue has its id as name."""
         return (self.id,)
 
 

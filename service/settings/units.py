@@ -54,7 +54,7 @@ ZONES = ("shaft_um_pp", "shaft_max_um_pk", "bearing_mm_s_rms")
 
 
 def _require_no_waveforms(alarms: BearingAlarmSettings, at: tuple[str | int, ...]) -> None:
-    words = 'requires waveforms, which a source of kind "modbus_vector" does not provide'
+    words = 'requires waveforms, which a source of kind "modbus_vector" lacks; remove it'
     for table, keys, place in ((alarms, FROM_WAVEFORMS, at), (alarms.zones, ZONES, (*at, "zones"))):
         for key in keys:
             if getattr(table, key) is not None:
@@ -144,7 +144,8 @@ class UnitSettings(Settings):
         taken = {channel.id for channel in self.channel}
         for n, slow in enumerate(self.slow_channel):
             if slow.id in taken:
-                raise MisfitError("is the id of a waveform channel", "slow_channel", n, "id")
+                words = "is the id of a waveform channel; use another id"
+                raise MisfitError(words, "slow_channel", n, "id")
         refuse_twice(("slow_channel", n, "id", slow.id) for n, slow in enumerate(self.slow_channel))
         refuse_twice(("bearing", n, "id", bearing.id) for n, bearing in enumerate(self.bearing))
         for n, bearing in enumerate(self.bearing):
@@ -190,7 +191,7 @@ class UnitSettings(Settings):
             if id_ := getattr(bearing, key):
                 row = self._row(id_)
                 if self.channel[row].angle_deg is not None:
-                    words = f"does not apply to {key} of {bearing.id}, opposite another probe"
+                    words = f"does not apply to {key} of {bearing.id}, opposite a probe; remove it"
                     raise MisfitError(words, "channel", row, "angle_deg")
 
     def _row(self, id_: str) -> int:
@@ -212,7 +213,7 @@ class UnitSettings(Settings):
                 *at,
             )
         if first.transducer is not second.transducer:
-            words = f"requires transducers of one kind as {keys[0]} and {place}"
+            words = f"requires transducers of the same kind as {keys[0]} and {place}"
             raise MisfitError(words, *at)
         if isinstance(self.source, ModbusVectorSettings):
             words = 'does not apply to a source of kind "modbus_vector"'
@@ -243,7 +244,7 @@ class UnitSettings(Settings):
             if slow is None:
                 continue
             if slow.bearing not in (None, *(bearing.id for bearing in self.bearing)):
-                raise MisfitError("is not a bearing of the unit", *at, "bearing")
+                raise MisfitError("is not a bearing of the unit; use the id of one", *at, "bearing")
             owners = [owner for reading, owner in taken if reading == slow.reading]
             if owners and (slow.bearing is None or {None, slow.bearing} & set(owners)):
                 words = f"has the quantity and position of another channel, {slow.reading}"
@@ -252,7 +253,7 @@ class UnitSettings(Settings):
             if slow.angle_deg is not None:
                 angle = (slow.bearing, slow.angle_deg % 360.0)
                 if angle in angles:
-                    words = "is the angle of another pad of this bearing"
+                    words = "is the angle of another pad of this bearing; correct one of them"
                     raise MisfitError(words, *at, "angle_deg")
                 angles.add(angle)
 

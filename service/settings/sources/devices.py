@@ -258,7 +258,7 @@ class ModbusFifoSettings(ModbusLinkSettings):
         )
         if layout.record_registers > MAX_FIFO_REGISTERS:
             raise MisfitError(
-                f"a record has {layout.record_registers} registers, but a FIFO read at most"
+                f"a record has {layout.record_registers} registers, but a FIFO read returns at most"
                 f' {MAX_FIFO_REGISTERS}; use layout = "per_channel" or fewer channels',
                 *("source", "addresses"),
             )

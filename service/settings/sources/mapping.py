@@ -31,7 +31,7 @@ IN_UTC = ("tdms", "candump")
 
 
 class TimeSettings(Settings):
-    """Settings of the sample times in the file."""
+    """Settings of the times of the samples in an imported file."""
 
     source: Literal["file", "column", "start"]
     """Source of the times. "file": time stamps of the format (MDF4 time channel, TDMS waveform
@@ -139,9 +139,9 @@ class ImportMapping(Settings):
         self._check_time()
         self._check_channels()
         if self.csv is not None and self.format != "csv":
-            raise MisfitError(f"applies only to CSV files, not to {self.format}", "csv")
+            raise MisfitError(f"applies only to CSV files, not to {self.format}; remove it", "csv")
         if self.bus and self.format not in CAN_LOGS:
-            raise MisfitError(f"applies only to CAN logs, not to {self.format}", "bus")
+            raise MisfitError(f"applies only to CAN logs, not to {self.format}; remove it", "bus")
         return self
 
     def _check_time(self) -> None:
@@ -167,7 +167,8 @@ class ImportMapping(Settings):
         form, start = self.time.form or "", self.time.start
         for wanted, only in (("iso8601", "csv"), ("timestamp", "tdms")):
             if form == wanted and self.format != only:
-                raise MisfitError(f"applies only to {only}, not to {self.format}", "time", "form")
+                words = f"applies only to {only}, not to {self.format}; use another form"
+                raise MisfitError(words, "time", "form")
         has_start = self.format == "mdf4"
         needs = self.time.source == "start" or (form.startswith("elapsed") and not has_start)
         if needs and start is None:

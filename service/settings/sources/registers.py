@@ -300,10 +300,7 @@ class MapDefaults:
 def require_apart(values: Sequence[MapValue], base: int) -> None:
     """Check that no two values have the same id, or the same register except for different bits.
 
-    Raises
-    ------
-    MisfitError
-        If two values do; for a shared register, with the location of the second value.
+    Raises `MisfitError` otherwise; the error of a shared register is located at the second value.
     """
     taken: dict[tuple[int, int], MapValue] = {}
     for n, value in enumerate(values):
@@ -313,7 +310,7 @@ def require_apart(values: Sequence[MapValue], base: int) -> None:
             if other is not value and not _are_different_bits(cell, other.cell):
                 raise MisfitError(
                     f"overlaps the registers of value {other.id!r} (address {other.cell.address},"
-                    f" {other.cell.type})",
+                    f" {other.cell.type}); correct one of the addresses",
                     *("value", n, "address"),
                 )
         if value.id in [other.id for other in values[:n]]:

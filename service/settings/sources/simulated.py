@@ -169,7 +169,7 @@ class SimulationSettings(SimulatedLifeSettings):
             if key in self.model_fields_set:
                 has_life = self.life_seed is not None
                 raise MisfitError(
-                    f"applies only {'without' if has_life else 'with'} life_seed", key
+                    f"applies only {'without' if has_life else 'with'} life_seed; remove it", key
                 )
         for key in NEEDED if self.life_seed is None else ():
             if key not in self.model_fields_set:

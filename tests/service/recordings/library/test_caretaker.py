@@ -172,7 +172,7 @@ def test_a_disk_that_is_away_is_told_and_its_recordings_are_not_given_up(rig, tm
     rig.roots[CONTINUOUS].rename(tmp_path / "unmounted")
     keeper.look()
     assert keeper.trouble is not None
-    assert "folder of 1 recordings does not exist" in keeper.trouble
+    assert "folder of recordings (1 in the index) is missing" in keeper.trouble
     assert [file.state for file in rig.files()] == [WaveformState.PRESENT]
     (tmp_path / "unmounted").rename(rig.roots[CONTINUOUS])
     keeper.look()
