@@ -25,7 +25,7 @@ class Health:
     Parameters
     ----------
     checks
-        Function that returns the fault of each required part, by name of the part; None without.
+        Function that returns, by name of each required part, its fault; None if the part works.
     shown
         Function that returns further status texts by name, which do not affect readiness.
     metrics

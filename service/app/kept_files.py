@@ -73,7 +73,7 @@ def _window_s(plant: PlantFile, unit: UnitSettings) -> float:
 def tape_of(
     plant: PlantFile, origin: Origin, clock: Clock, press: Callable[[], DropReason | None]
 ) -> ContinuousRecorder:
-    """Return the continuous recorder of a plant; `press` returns why it must pause, None if not."""
+    """Return the continuous recorder of a plant; `press` returns a reason to pause, or None."""
     found = plant.recording
     units = {
         unit.id: recorded_unit(unit)

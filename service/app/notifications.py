@@ -35,7 +35,7 @@ def receivers_of(plant: PlantFile, origin: Origin, clock: Clock) -> list[Receive
 
 
 def router_of(plant: PlantFile, origin: Origin, context: FindContext, clock: Clock) -> Address:
-    """Return the function that chooses the recipients of a stored event; a replay has none."""
+    """Return the function that chooses the recipients of a stored event; none in a replay."""
     if origin is not Origin.LIVE or not plant.delivery.receiver:
         return no_recipients
     return Router(plant.delivery.receiver, composer_of(plant, context), clock.now_ns)

@@ -46,7 +46,7 @@ class Supervision:
         self._manager.notify(READY="1", STATUS=self._status())
 
     def announce(self, write: Callable[[str], None], url: str, token: str | None) -> None:
-        """Notify the service manager; `write` the URL and the set-up token, None if unused."""
+        """Notify the service manager; `write` the URL and, unless it is None, the set-up token."""
         self.ready()
         write(url)
         if token is not None:

@@ -128,7 +128,7 @@ class PlayedOut:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link; see :class:`acquisition.source.SampleSource`.
+        """Open the link and yield its blocks, until the recording or the DAQ ends.
 
         Raises
         ------

@@ -28,7 +28,7 @@ Release = Mapping[str, str]
 
 
 def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[AuditAction]:
-    """Return the audit entries of a start: first, if it has changed, the configuration.
+    """Return the audit entries of a service start; a changed configuration comes first.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class ServiceTrail:
         await self._attempt(self._audit.record, [deed])
 
     async def watch_clock(self, pulse: Pulse = UNHEARD) -> None:
-        """Record steps of the host clock of over `CLOCK_STEP_S` seconds, until cancelled."""
+        """Record steps of the host clock above `CLOCK_STEP_S` seconds, until cancelled."""
         seen = Arrival.now(self._clock)
         while True:
             pulse.beat(LOOK_S)

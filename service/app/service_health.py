@@ -55,7 +55,7 @@ def health_of(
 
 
 def recording_error(tape: ContinuousRecorder, recordings: RecordingIndexer) -> str | None:
-    """Return the error of the continuous recorder, else of the recording indexer; None without."""
+    """Return the error of the continuous recorder or of the indexer; None without an error."""
     return tape.trouble or recordings.lasting_trouble
 
 

@@ -145,7 +145,7 @@ ACCESS_EVERY_S = 10.0
 
 
 def access_reports(access: AccessStore, exchange: ServingEnd, clock: Clock) -> Loop:
-    """Return a loop that reports faults of the accounts to the measuring process, for its alarm."""
+    """Return a loop that reports faults of the database of accounts to the measuring process."""
 
     async def report(pulse: Pulse) -> None:
         while True:
@@ -165,7 +165,7 @@ async def serve_beside(
     listener: socket.socket,
     clock: Clock,
 ) -> None:
-    """Serve requests until the measuring process, at `reader` and `writer`, ends or stops this."""
+    """Serve requests until the measuring process, connected by `reader` and `writer`, ends."""
     plant, stopped = start.plant, stop_on_signals()
     with (
         closing(open_store_to_serve(plant, start.origin)) as store,

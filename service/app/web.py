@@ -49,7 +49,7 @@ def _names(plant: PlantFile) -> list[str]:
 def access_desk(
     plant: PlantFile, store: AccessStore, clock: Clock, is_demo: bool = False
 ) -> Authenticator:
-    """Return the authenticator of requests; log an error if the accounts are of another copy.
+    """Return the authenticator of requests; log an error if the accounts were replaced.
 
     Parameters
     ----------

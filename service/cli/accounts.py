@@ -40,7 +40,7 @@ def access_of(plant: PlantFile, creates: bool = False) -> Iterator[AccessStore]:
 
 
 def time_text(time_ns: int) -> str:
-    """Return a time in ns since 1970 UTC as RFC 3339 text, truncated to the second."""
+    """Return a time, ns since 1970 UTC, as RFC 3339 text, truncated to the second."""
     return datetime.fromtimestamp(time_ns // NS_PER_S, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 

@@ -180,7 +180,7 @@ def held_lines(endpoints: Endpoints) -> Iterator[None]:
 
 @contextmanager
 def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
-    """Run ``padwatch daq`` as a child process, and yield it once it serves; stop it at the end.
+    """Run ``padwatch daq`` with `arguments` as a child process; yield it once it serves; stop it.
 
     Raises `CommandError` if the child ends before it serves; it has printed the reason.
     """

@@ -154,7 +154,7 @@ def plant_store(plant: "PlantFile", creates: bool = False) -> Iterator["Store"]:
 
 @contextmanager
 def plant_access(plant: "PlantFile", creates: bool = False) -> Iterator["AccessStore"]:
-    """Open the plant's database of accounts and keys, yield its store, and close it."""
+    """Open the database of accounts and keys (`creates`: also create it); yield its store."""
     from service.app.storage import access_name, has_access, open_access
 
     _require(has_access(plant), access_name(plant), creates)

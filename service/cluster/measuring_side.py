@@ -99,7 +99,7 @@ INTERRUPTED = Answer(
 
 
 class CommandWorker:
-    """Worker that executes the operators' commands on the units of this process, one at a time.
+    """Worker that executes the operators' commands on the units `held` by this process, in turn.
 
     An alarm command is marked as answered in the transaction that stores the alarm event. An open
     alarm command was therefore not executed, and another process can execute it.

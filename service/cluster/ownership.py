@@ -42,7 +42,7 @@ class Holds:
             if refusal is None:
                 break
             if refusal != self.waits_for:
-                log.info("standing by", reason=refusal)
+                log.info("standing by until the locks of the units are free", reason=refusal)
             self.waits_for = refusal
             await self._clock.sleep(EVERY_S)
         self.waits_for = None

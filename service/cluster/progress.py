@@ -42,7 +42,7 @@ def memories_of(stored: Iterable[StreamPosition]) -> dict[str, UnitMemory]:
     found = {position.unit: read(position.memory) for position in stored}
     for unit, memory in found.items():
         if memory is None:
-            log.error("the stored analysis state is unreadable or of another version", unit=unit)
+            log.error("the analysis starts anew: its stored state cannot be read", unit=unit)
     return {unit: memory for unit, memory in found.items() if memory is not None}
 
 
@@ -78,7 +78,7 @@ class Window:
         self._seen: deque[_Seen] = deque()
 
     def note(self, sequence: int, block: SampleBlock, state: MonitorState) -> None:
-        """Add the message of a block; remove messages that no replay to `state` needs."""
+        """Add the message of a block, and remove those that no replay to `state` needs."""
         self._seen.append(_Seen(sequence, state.epoch, block.stop_index))
         while len(self._seen) > 1 and not self._is_needed(self._seen[0], state):
             self._seen.popleft()
@@ -165,10 +165,10 @@ class UnitProgress:
                 unit=self.unit,
             )
         elif first_sequence > stored.window_sequence:
-            log.warning("the stream begins within the window of the analysis", unit=self.unit)
+            log.warning("the stream lacks old samples of the averaging window", unit=self.unit)
 
     async def take(self, sequence: int, payload: bytes) -> bool:
-        """Process the message of a sequence number; return False if it cannot be used.
+        """Process the message `payload` with its sequence number; return False if it is unusable.
 
         A message that was processed before is only counted as repeated.
         """

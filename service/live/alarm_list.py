@@ -14,7 +14,7 @@ from service.settings.alarm_kinds import ANALYSIS_GONE, SAMPLES_LOST
 
 @dataclass(frozen=True)
 class AlarmCount:
-    """Counts of alarms by state."""
+    """Numbers of alarms by state; an alarm may be counted in several states."""
 
     __pydantic_config__ = ConfigDict(
         extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
@@ -69,7 +69,7 @@ ShownAlarm = tuple[Alarm, bool, bool]
 class LiveAlarms:
     """List of all alarms, from reports and from the database.
 
-    While no reports on a unit arrive, the conditions of its alarms are unknown.
+    While no reports on a unit arrive (not `is_alive`), the conditions of its alarms are unknown.
     """
 
     def __init__(

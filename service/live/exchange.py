@@ -145,7 +145,7 @@ class MeasuringEnd:
                     async with asyncio.timeout(TAKEN_WITHIN_S):
                         await _write(writer, content)
                 except TimeoutError:
-                    log.error("the serving process hangs", reason="it does not read reports")
+                    log.error("the serving process does not read reports; it is restarted")
                     return
                 except ConnectionError:
                     return  # it has ended
@@ -206,9 +206,9 @@ class ServingEnd:
             future.set_exception(MeasuringGoneError(reply.error))
 
     async def ask(self, kind: str, document: str, actor: str = "", peer: str | None = None) -> Any:
-        """Ask the measuring process, with `document` as arguments in JSON; return its answer.
+        """Ask the measuring process a question, `kind` with `document` in JSON; return its answer.
 
-        `actor` and `peer` are user and network address of the request; empty and None without.
+        `actor` and `peer` are the user and the network address of the request, if there is one.
         Raises `MeasuringGoneError` if the answer is an error, or does not arrive within
         `ANSWER_WITHIN_S` seconds.
         """

@@ -26,7 +26,7 @@ class SenderStatus:
     n_failures
         Number of failed attempts since the last delivery.
     failing_since_ns
-        Time of the first failure since the last delivery, ns since 1970 UTC; None without.
+        Start of the present failures, ns since 1970 UTC; None without failures.
     reason
         Reason of the newest failure; None without failures.
     next_attempt_ns

@@ -174,7 +174,7 @@ class AlarmEngine:
         return news
 
     def link(self, unit: str, is_connected: bool, reason: str | None = None) -> None:
-        """Update the link alarm of a unit from its link state."""
+        """Update the link alarm of a unit; `reason` is why the unit is not connected."""
         self.revision += 1
         self._publish(self._units[unit].link(is_connected, reason, self._host_ns()))
 
@@ -325,6 +325,8 @@ async def alarm_engine(
 
     Parameters
     ----------
+    put, listener
+        Functions that queue findings for the store, and receive each block with its changes.
     rows
         Channel of each row of a block, by unit; only for units whose rows are not their channels.
     look

@@ -132,7 +132,7 @@ class Analyser:
     async def replay(
         self, block: SampleBlock, sampled_s: float, account: SampleAccount | None = None
     ) -> None:
-        """Analyse a block whose findings are already stored, to restore the monitor.
+        """Restore the monitor from a block with stored findings, last sampled at ``sampled_s``.
 
         Parameters
         ----------

@@ -60,7 +60,7 @@ class Learner:
     def learn(
         self, place: FilmPlace, now_ns: int, author: str = PADWATCH, reason: str = ""
     ) -> BearingBaseline | None:
-        """Learn and store a baseline; accept it if that is automatic and all checks pass.
+        """Learn and store a baseline by `author`; accept it if that is automatic and checks pass.
 
         Returns
         -------
@@ -145,8 +145,9 @@ class Learner:
             return "learned with another estimator than the first accepted version"
         for name, found in mean_difference(first, baseline).items():
             if abs(percent_of(found)) >= 100.0 * self._settings.alert_change(name):
-                since = f"from version {versions.first_accepted} under like conditions"
-                return f"{QUANTITIES[name].label} differs by {percent_of(found):+.1f} % {since}"
+                size = f"{abs(percent_of(found)):.1f} % {'above' if found > 0.0 else 'below'}"
+                since = f"version {versions.first_accepted} under like conditions"
+                return f"{QUANTITIES[name].label} is {size} that of {since}"
         return None
 
 
@@ -168,8 +169,8 @@ def drifted(
         change = percent_of(found.change)
         if abs(change) >= 100.0 * limit(quantity.quantity):
             return (
-                f"{QUANTITIES[quantity.quantity].label} changed by {change:+.1f} %"
-                f" ± {200 * found.std:.1f} % under like conditions during learning"
+                f"{QUANTITIES[quantity.quantity].label} {'rose' if change > 0.0 else 'fell'} by"
+                f" {abs(change):.1f} ± {200 * found.std:.1f} % under like conditions while learning"
             )
     return None
 

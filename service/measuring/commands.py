@@ -102,7 +102,7 @@ class CommandExecutor:
 
 
 class Questions:
-    """Answerer of the questions of the serving process to the measuring process.
+    """Handler of the questions that the serving process asks the measuring process.
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ class FilmMonitor:
         return self._films[unit].watch.memory if unit in self._films else None
 
     def resume(self, unit: str, memory: FilmMemory | None) -> None:
-        """Restore a unit's films to a state of another process, if any; call it after `start`."""
+        """Restore a unit's films from ``memory`` of another process; call it after `start`."""
         if memory is not None and unit in self._films:
             self._films[unit].watch.restore(memory)
 

@@ -51,7 +51,7 @@ class LiveView:
             self._stored[unit] = StoredResults(before.n_writes + 1, max(before.newest_ns, time_ns))
 
     def stored(self, unit: str) -> StoredResults:
-        """Return number of writes and newest result of a unit in the database."""
+        """Return the number of writes and the time of the newest stored result of a unit."""
         return self._stored[unit]
 
     def note_unstored(self, n_findings: int, reason: str) -> None:
@@ -74,7 +74,7 @@ class LiveView:
     def set_received(
         self, block: SampleBlock, account: SampleAccount, sampled_s: float | None = None
     ) -> None:
-        """Set a unit's newest block, last sampled at the monotonic time ``sampled_s`` (now)."""
+        """Set a unit's newest block; ``sampled_s`` is the monotonic time of its end, by default now."""
         if block.unit not in self._blocks:
             most = HELD_SAMPLES // max(block.counts.shape[0], 1)
             self._blocks[block.unit] = BlockHistory(min(round(HELD_S * block.rate_hz), most))
@@ -89,7 +89,7 @@ class LiveView:
         )
 
     def set_assessment(self, assessment: Assessment, sampled_s: float | None = None) -> None:
-        """Set a bearing's newest result, sampled at the monotonic time ``sampled_s`` (now)."""
+        """Set a bearing's newest result; ``sampled_s`` is its monotonic time, by default now."""
         self._revisions[assessment.unit] += 1
         key = (assessment.unit, assessment.bearing)
         since_s = self._clock.monotonic_s() if sampled_s is None else sampled_s

@@ -35,13 +35,13 @@ MAX_BYTES = 16_000_000
 
 
 class ParkedRows:
-    """File of the rows that the database refused, with reasons; JSON lines for its owner only."""
+    """JSON Lines file of the rows that the database refused, with reasons; private to its owner."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def add(self, time_ns: int, refused: Iterable[tuple[object, str]]) -> None:
-        """Append pairs of row and reason, refused at ``time_ns`` (ns since 1970 UTC); sync.
+        """Append pairs of refused row and reason for ``time_ns``, ns since 1970 UTC; sync the file.
 
         Raises
         ------

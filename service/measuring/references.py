@@ -25,7 +25,7 @@ Gaps = tuple[MicrometrePair, MicrometrePair | None]
 
 
 def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
-    """Check gaps (x, y) in µm that a user entered against the probes of the bearing; return them.
+    """Check gaps (x, y) in µm, entered by a user, against the probes of a bearing; return them.
 
     ``near`` are gaps of the probes on the positive axes, ``opposite`` those of opposite probes.
 

@@ -83,7 +83,7 @@ log = structlog.get_logger()
 
 
 class HostTime:
-    """Wall clock of the host; detects that the clock was set by the monotonic clock."""
+    """Wall clock of the host, with detection of its steps by comparison with the monotonic clock."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -237,7 +237,7 @@ class ServiceAlarms(AlarmBoard):
     def restore(
         self, stored: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
     ) -> list[AlarmNews]:
-        """Restore stored alarms.
+        """Restore stored alarms at the host time ``host_ns``, ns since 1970 UTC.
 
         Earlier losses are unknown, so an active alarm about lost samples stays active until this
         process has observed ten minutes.

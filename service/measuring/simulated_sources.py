@@ -122,7 +122,7 @@ def simulated_feed(unit: UnitSettings, clock: Clock) -> SimulatedUnit:
     """
     simulation, now_ns = unit.simulation, clock.now_ns()
     if simulation is None:
-        raise LookupError(f"unit {unit.id} has no [unit.simulation] table")
+        raise LookupError(f"unit {unit.id} has no [unit.simulation] table; add one")
     machine, calibration = machine_of(unit), calibration_of(unit)
     scenario: Scenario | LifeCourse
     if simulation.life_seed is None:

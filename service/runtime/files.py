@@ -78,7 +78,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def zipped(files: Mapping[str, Path | bytes]) -> Generator[bytes, None, None]:
-    """Yield a ZIP archive in non-empty pieces; `files` are paths or contents by name in it.
+    """Yield a ZIP archive in non-empty pieces; `files` maps names to paths or contents.
 
     All files are opened first, so a file that is removed during the iteration is still complete.
     Raises `OSError` if a file cannot be read.

@@ -42,7 +42,7 @@ class Families(Collector):
             self._families[name].add_sample(f"padwatch_{name}", labels, float(value))
 
     def include(self, metric: Collector, **labels: str) -> None:
-        """Add the samples of a metric of the library, with `labels` besides its own."""
+        """Add the samples of a `prometheus_client` metric, with `labels` besides its own."""
         for found in metric.collect():
             family = self._families.setdefault(
                 found.name, Metric(found.name, found.documentation, found.type)

@@ -99,7 +99,7 @@ def _current_task() -> asyncio.Task[Any] | None:
 
 
 class TimedSource:
-    """Wrapper of a sample source that measures the poll durations of the source."""
+    """Wrapper of a sample source, made by `make` with a clock that measures poll durations."""
 
     def __init__(self, make: Callable[[Clock], SampleSource], clock: Clock) -> None:
         self._clock = PollClock(clock)

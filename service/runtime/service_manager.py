@@ -48,7 +48,7 @@ def _address(named: str) -> str | None:
     if named.startswith("/"):
         return named
     if named:
-        log.warning("NOTIFY_SOCKET is neither a path nor an abstract name", value=named)
+        log.warning("NOTIFY_SOCKET is not a path or @name; nothing is notified", value=named)
     return None
 
 

@@ -158,7 +158,7 @@ class Authenticator:
     async def log_in(self, name: str, password: str, peer: str) -> LoggedIn | NotLoggedIn:
         """Check the password of an account, and start a session if it is correct.
 
-        A wrong password or an attempt that comes too early returns `NotLoggedIn`.
+        `peer` is the client's address. A wrong password or too early a try returns `NotLoggedIn`.
 
         Raises
         ------

@@ -100,7 +100,7 @@ class Hashing:
         return self._hasher.hash(NO_ACCOUNT)
 
     def is_outdated(self, stored: str) -> bool:
-        """Whether a hash was computed with parameters other than the current ones."""
+        """Whether the hash `stored` was computed with parameters other than the current ones."""
         return self._hasher.check_needs_rehash(stored)
 
 

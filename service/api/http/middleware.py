@@ -154,7 +154,7 @@ class CheckedRequests:
             raise ProblemError(421, "Wrong host", detail)
 
 
-TOO_LARGE = f"the body is larger than {MAX_BODY_BYTES // 1024} KiB"
+TOO_LARGE = f"the body must not be larger than {MAX_BODY_BYTES // 1024} KiB"
 
 
 def _require_small_body(scope: Scope) -> None:

@@ -35,7 +35,7 @@ class BaselineVersionModel(BaselineOriginModel):
     """Status: in force; rejected by an engineer; superseded by another version or by a machine
     event; or learned and not yet accepted by an engineer."""
 
-    remark: Annotated[str, Field(examples=["-5.1 % from version 1 under like conditions"])]
+    remark: Annotated[str, Field(examples=["x is 5.1 % below that of version 1"])]
     """Reason why this version was not accepted automatically, remark on its readings, or empty."""
 
     is_frozen: bool

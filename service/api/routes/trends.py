@@ -42,7 +42,7 @@ def trend_table(
     groups
         Groups whose rows are returned one group after the other; None for those of the trend.
     past_end_ns
-        End of the simulated readings of the bearing, ns since 1970 UTC; None if it has none.
+        End of the simulated readings, ns since 1970 UTC; None without simulated readings.
     """
     parts = [trend] if groups is None else [group.trend for group in groups]
     times = [time_ns for part in parts for time_ns in part.time_ns]
@@ -164,7 +164,7 @@ def trend_answer(
     groups
         Groups of readings with their trends; None if not requested.
     past_end_ns
-        End of the simulated readings of the bearing, ns since 1970 UTC; None if it has none.
+        End of the simulated readings, ns since 1970 UTC; None without simulated readings.
     """
     return {
         "unit": query.unit,

@@ -71,7 +71,7 @@ class Learning:
     until_ns: int | None = None
 
     def end_ns(self, begin_ns: int, is_first: bool) -> int:
-        """Return the end of the learning period that begins at `begin_ns`, ns since 1970 UTC."""
+        """Return the end of the first or a later period that begins at `begin_ns`, ns, 1970 UTC."""
         if is_first and self.until_ns is not None:
             return self.until_ns
         return begin_ns + round(self.days * DAY_NS)
@@ -261,8 +261,8 @@ def rules_of(
 ) -> BackTestRules:
     """Return the rules of a back-test with the limits of `settings`.
 
-    Rated figures and bracket stiffness are those of `plant`; with None they are unknown.
-    `created_ns` is the time stored with the baselines, ns since 1970 UTC.
+    Rated figures and bracket stiffness are those of `plant`; with None they are unknown. `author`,
+    `created_ns` (ns since 1970 UTC) and `estimator` are stored with the baselines.
     """
     units = plant.unit if plant else ()
     return BackTestRules(

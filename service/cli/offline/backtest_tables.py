@@ -193,7 +193,7 @@ def _batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
             if len(batch):
                 yield converted(pa.Table.from_batches([batch]), row, "row"), size * n_read // n_rows
         if n_read != n_rows:
-            raise ReadingsError(f"the file has {n_read} rows, but {n_rows} according to its footer")
+            raise ReadingsError(f"damaged Parquet file: {n_read} rows, but {n_rows} by its footer")
 
 
 MEMORY_BYTES = 3 * 2**30

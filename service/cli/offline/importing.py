@@ -138,7 +138,7 @@ def import_recording(
 ) -> Manifest:
     """Write the samples of a foreign file as a recording of a unit into the new `folder`.
 
-    Returns the manifest of the recording.
+    Returns the manifest of the recording, in which `made_by` names its author.
 
     Parameters
     ----------

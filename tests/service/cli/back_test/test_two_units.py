@@ -120,7 +120,7 @@ def test_damage_is_told_with_evidence_and_a_learned_fault_is_doubted(two_units, 
     learning = Learning(days=30, until_ns=until_ns)
     found = run_back_test({place: histories[place]}, BackTestRules(learning))
     (doubt,) = found.doubts
-    assert doubt.startswith("U2 LJB baseline 1: x changed by -")
+    assert doubt.startswith("U2 LJB baseline 1: x fell by ")
     assert doubt.endswith("the service would require acceptance by an engineer")
 
 
