@@ -92,7 +92,7 @@ class Context:
     recordings: Sequence[pathlib.Path] | None = None
 
     def now_revision(self, unit: str) -> Hashable:
-        """Return a value that changes with every change of the state of a unit or of its films."""
+        """Return a value that changes when the state of a unit or its films changes."""
         found: list[Hashable] = [self.live.revision(unit)]
         for bearing in self.units[unit].bearing:
             news = self.films.newest(unit, bearing.id)

@@ -53,7 +53,7 @@ NOT_MODIFIED = {
 
 
 def describe_answers(document: dict[str, Any]) -> None:
-    """Add the schemas of problems, headers and entity tags to an OpenAPI document, in place."""
+    """Add schemas of problems, headers and entity tags to an OpenAPI document, which is changed."""
     document.setdefault("components", {}).setdefault("schemas", {}).update(problem_schemas())
     for path, methods in document["paths"].items():
         for method, operation in methods.items():
@@ -104,7 +104,7 @@ NEEDED = "x-padwatch-needs"
 
 
 def describe_access(document: dict[str, Any], operations: Mapping[str, Declared]) -> None:
-    """Add security schemes, required permissions and refusals to an OpenAPI document, in place."""
+    """Add security schemes, required permissions and refusals to the given OpenAPI document."""
     document.setdefault("components", {})["securitySchemes"] = SCHEMES
     for path, methods in document["paths"].items():
         for method, operation in methods.items():

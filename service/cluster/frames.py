@@ -179,7 +179,7 @@ STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="constants")
 
 
 class Cell(NamedTuple):
-    """Values from sample ``start`` on: time in ns, bit mask ``ok`` of good channels, slow values."""
+    """Values from sample ``start`` on: time, ns; bit mask ``ok`` of good channels; slow values."""
 
     start: Index
     start_ns: Ns

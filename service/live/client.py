@@ -53,7 +53,7 @@ class LiveClient:
         return replace(self._plant, loops=dict.fromkeys(self._plant.loops, fault))
 
     async def take(self, report: Report, *, is_direct: bool = False) -> None:
-        """Apply a report; `is_direct` means not by the database, so that its age is known.
+        """Apply a report; `is_direct` is False for one from the database, whose age is unknown.
 
         A baseline that has come into force and cannot be read is not shown; the next report with
         results of its unit tries again.

@@ -207,7 +207,7 @@ class LiveUnits:
         return None if sent_s is None else self._clock.monotonic_s() - sent_s
 
     def is_alive(self, unit: str) -> bool:
-        """Return whether a process has reported on the unit in the last `SILENT_AFTER_S`, s."""
+        """Return whether the age of the last report on the unit is at most `SILENT_AFTER_S` s."""
         silence_s = self.silence_s(unit)
         return silence_s is not None and silence_s <= SILENT_AFTER_S
 
@@ -283,7 +283,7 @@ class LiveUnits:
             raise NotAvailableError(f"{kind} of unit {which[0]}: {error}") from error
 
     def why_no_samples(self, unit: str) -> Reason | None:
-        """Return the reason why the newest samples of a unit are not current; None if current."""
+        """Return the reason why the newest samples of a unit are outdated; None if they are not."""
         return self._why_not_current(unit, self.data_age_s(unit))
 
     def data_age_s(self, unit: str) -> float | None:

@@ -43,7 +43,7 @@ class VersionError(Exception):
 
 @dataclass(frozen=True)
 class Question:
-    """Question of the serving process to the measuring process.
+    """Question or command of the serving process to the measuring process.
 
     Parameters
     ----------

@@ -108,7 +108,7 @@ def add_films(
     films: Callable[[str, str], FilmNews | None],
     bearings: Bearings,
 ) -> None:
-    """Add the number of films by verdict, and the stiffness ratio of judged, current films.
+    """Add the number of films by verdict, and the ratio of stiffness to its expected value.
 
     Parameters
     ----------

@@ -73,7 +73,7 @@ class ReferencesInForce:
         self._trouble = TroubleLog("references cannot be read", "references can be read again")
 
     def of(self, unit: str, bearing: str) -> GapReference | None:
-        """Return the stored gap reference of a bearing; None if it has that of the plant file."""
+        """Return the stored gap reference in force; None if that of the plant file is in force."""
         return self._in_force.get((unit, bearing))
 
     def bearing(self, unit: str, bearing: str) -> Bearing:

@@ -203,7 +203,7 @@ class CaptureStatus:
 
 @dataclass(frozen=True)
 class EvidenceStatus:
-    """State of the evidence of alarms.
+    """State of the collection of evidence about alarms.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ class LiveView:
     def set_received(
         self, block: SampleBlock, account: SampleAccount, sampled_s: float | None = None
     ) -> None:
-        """Set a unit's newest block; ``sampled_s`` is the monotonic time of its end, by default now."""
+        """Set a unit's newest block; ``sampled_s`` is its monotonic time, by default now."""
         if block.unit not in self._blocks:
             most = HELD_SAMPLES // max(block.counts.shape[0], 1)
             self._blocks[block.unit] = BlockHistory(min(round(HELD_S * block.rate_hz), most))

@@ -83,7 +83,7 @@ log = structlog.get_logger()
 
 
 class HostTime:
-    """Wall clock of the host, with detection of its steps by comparison with the monotonic clock."""
+    """Wall clock of the host, with detection of steps against the monotonic clock."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock

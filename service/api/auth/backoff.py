@@ -17,7 +17,7 @@ IPV6_NETWORK_BITS = 64
 
 @dataclass(frozen=True)
 class WaitRule:
-    """Rule of an exponential backoff: wait after a number of failures.
+    """Rule of an exponential backoff: the wait after a number of failed logins.
 
     Parameters
     ----------

@@ -64,7 +64,7 @@ class NotLoggedIn:
 
 
 class AccessService:
-    """Service for logins, accounts and keys; its methods block.
+    """Service for logins, accounts and API keys; its methods block while the store is used.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ SECURITY_HEADERS = (
 
 
 class AddedHeaders:
-    """ASGI middleware that adds headers to all answers that do not contain them."""
+    """ASGI middleware that adds headers to answers, unless an answer has the header already."""
 
     def __init__(self, app: ASGIApp, headers: Sequence[tuple[str, str]]) -> None:
         self._app, self._headers = app, headers

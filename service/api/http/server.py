@@ -28,7 +28,7 @@ class HttpServer(uvicorn.Server):
     """Uvicorn server that sends heartbeats and leaves signals to the program."""
 
     async def run_on(self, listener: socket.socket, pulse: Pulse = UNHEARD) -> None:
-        """Serve requests on a listening socket until stopped; send a heartbeat every `BEAT_S`."""
+        """Serve requests on a listening socket until stopped; send heartbeats to `pulse`."""
 
         async def beat() -> None:
             pulse.beat(BEAT_S)
@@ -49,7 +49,7 @@ def http_server(
     headers: Sequence[tuple[str, str]] = (),
     tls: SSLContext | None = None,
 ) -> HttpServer:
-    """Return the server of an application.
+    """Return an HTTP server for an ASGI application.
 
     Parameters
     ----------

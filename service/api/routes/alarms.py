@@ -99,7 +99,7 @@ RAISED_AT = {
 
 
 def event_table(events: Sequence[StoredEvent], grid: CellGrid) -> list[Column]:
-    """Return alarm events as table columns: ``time_utc``, and columns named like JSON fields."""
+    """Return alarm events as table columns: ``time_utc``, and columns named as the JSON fields."""
     rows = [event_model(stored, grid) for stored in events]
     times = Column("time_utc", "time", [stored.event.time_ns for stored in events])
     flat = [name for name in AlarmEventModel.model_fields if name not in ("time", "raised_at")]

@@ -102,7 +102,7 @@ class Period:
 def periods_of(
     time_ns: TimeArray, events: Sequence[MachineEvent], learning: Learning
 ) -> list[Period]:
-    """Return the periods between events that have readings; times (n,) and result are ascending."""
+    """Return the periods between events that have readings, in order; `time_ns` (n,) ascends."""
     ordered = sorted(events, key=lambda event: event.time_ns)
     cuts = [0, *(int(np.searchsorted(time_ns, event.time_ns)) for event in ordered), time_ns.size]
     texts = ["", *(event.text for event in ordered)]

@@ -143,7 +143,7 @@ class FilmReport(_Part):
 
 
 class RateReport(_Part):
-    """Rate of alarms, null without compared readings; on a healthy plant all alarms are false."""
+    """Rate of alarms, null without compared readings; on a healthy plant the false-alarm rate."""
 
     unit_years: float
     """From the end of learning to the end of readings, all units together."""
