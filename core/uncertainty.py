@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -71,6 +71,11 @@ class Budget:
     lines: tuple[BudgetLine, ...]
     bounded_interval: tuple[float, float] | None = None
 
+    def __reduce__(self) -> tuple[object, ...]:
+        # pickling the lines column by column takes a third of the time
+        columns = zip(*self.lines, strict=True)
+        return _of_columns, (self.value, self.bounded_interval, *columns)
+
     @property
     def random(self) -> float:
         """Standard uncertainty due to the random contributions."""
@@ -99,6 +104,13 @@ class Budget:
         half = _coverage_factor(combined, fourth, CONFIDENCE) * math.sqrt(combined)
         interval = self.bounded_interval or (self.value - half, self.value + half)
         return Reading(self.value, quality, math.sqrt(random), math.sqrt(systematic), interval)
+
+
+def _of_columns(
+    value: float, bounded_interval: tuple[float, float] | None, *columns: Sequence[Any]
+) -> Budget:
+    """Return a budget from the fields of its lines, as `pickle` stores them."""
+    return Budget(value, tuple(map(BudgetLine, *columns)) if columns else (), bounded_interval)
 
 
 def random_line(name: str, standard: float, freedoms: float = math.inf) -> BudgetLine:
