@@ -274,11 +274,10 @@ def _delay(fits: FilmFits, may_be_late: npt.NDArray[np.bool_]) -> FloatArray:
     Where a delay is not excluded it is beside a film of constant coefficients, otherwise beside
     lagging parts with the lag of the prior: a fitted lag would take up the delay.
     """
-    delay, share = np.array(fits.delay([DELAY, MASS])), fits.kept[:, 0]
-    if not share.any():
-        return delay
-    mixed = (1.0 - share) * delay + share * np.array(fits.delay([DELAY, MASS, *LAGS]))
-    return np.where((share > 0.0) & ~may_be_late, mixed, delay)
+    share = fits.kept[:, 0]
+    constant, lagging = fits.delays(([DELAY, MASS], [DELAY, MASS, *LAGS]))
+    mixed: FloatArray = (1.0 - share) * constant + share * lagging
+    return np.where((share > 0.0) & ~may_be_late, mixed, constant)
 
 
 def _results(

@@ -206,14 +206,16 @@ class FilmFits(FittedFilms):
         influences = steps[:, np.newaxis] @ self._sensitivity[:, :, fitted]
         return np.where(separate[:, np.newaxis], value, np.nan), influences
 
-    def delay(self, fitted: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the delay, its standard uncertainty, and its change per bracket damping, (n,).
+    def delays(self, fits: Sequence[Sequence[int]]) -> FloatArray:
+        """Return `DELAY`, first of joint estimates, of several fits, (n_fits, 3, n).
 
-        The delay is the first of the bracket properties `fitted`, which are estimated jointly.
+        The three are the delay, its standard uncertainty, and its change per `DAMPING`.
         """
-        value, influences = self.estimate(fitted)
-        std = np.sqrt(self.covariance(influences[:, :, :1])[:, 0, 0])
-        return value[:, 0], std, self.follow(DAMPING, fitted)[:, 0]
+        found = [self.estimate(fitted) for fitted in fits]
+        weights = np.concatenate([influences[:, :, :1] for _, influences in found], axis=2)
+        std = np.sqrt(np.einsum("nee->en", self.covariance(weights)))
+        follows = [self.follow(DAMPING, fitted)[:, 0] for fitted in fits]
+        return np.stack([np.array([value[:, 0] for value, _ in found]), std, follows], axis=1)
 
     def parts_left(self, dropped: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return two covariances of the unknowns due to errors of the parts, (n, 2, 4, 4) each.
