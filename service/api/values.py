@@ -273,7 +273,7 @@ def states_named(names: list[OperatingStateName] | None) -> tuple[OperatingState
 def condition_model(
     time_ns: int, condition: BearingCondition, grid: CellGrid
 ) -> FilmConditionModel:
-    """Return the API model of the operating condition of a bearing."""
+    """Return the API model of a bearing's operating condition at `time_ns`, ns since 1970 UTC."""
     cell = None if condition.cell is None else cell_model(condition.cell, grid)
     return FilmConditionModel.of(
         condition, time=time_ns, operating_state=condition.state, cell=cell

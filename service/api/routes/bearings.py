@@ -168,7 +168,7 @@ class BudgetModel(ApiModel):
 
 
 def reference_model(reference: GapReference | None) -> ReferenceModel:
-    """Return the API model of the origin of a gap reference; the plant file for None."""
+    """Return the API model of the origin of a gap reference; None is that of the plant file."""
     if reference is None:
         return PLANT_FILE
     return ReferenceModel.of(reference, note=reference.note or None)

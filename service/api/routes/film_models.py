@@ -111,7 +111,7 @@ class FilmQuantityModel(FilmVerdictModel):
 
 
 class FilmDampingModel(FilmQuantityModel):
-    """Decision on damping over stiffness, c/k."""
+    """Verdict on the ratio c/k of damping to stiffness of an oil film, with its change."""
 
     ck_s: float | None
     """Damping over stiffness of the newest reading, s; null if it could not be determined."""

@@ -43,7 +43,7 @@ from service.settings.units import UnitSettings
 
 
 class EllipseModel(ApiModel):
-    """Ellipse of the 1× orbit of the shaft, at the middle sample."""
+    """Ellipse of the 1× orbit of the shaft, at the middle sample of the answer."""
 
     major_um_pk: float
     """Semi-major axis, µm."""

@@ -151,7 +151,7 @@ def source_model(live: LiveUnits, unit: str) -> SourceModel:
 
 
 class GapModel(ApiModel):
-    """Gap in the samples of a unit, also while the service was stopped."""
+    """Gap in the samples of a unit, also a gap because the service was stopped."""
 
     epoch: int
     """Epoch of the sample index; it changes when the device restarts its count."""

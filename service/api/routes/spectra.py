@@ -188,7 +188,7 @@ def _full(spectrum: CrossSpectrum, x: int, y: int, sense: int) -> FullSpectrumMo
 
 
 def spectrum_model(assessment: Assessment, rotation_sense: int) -> SpectrumModel:
-    """Return the API model of the spectra of a result; sense +1 is rotation from x to y."""
+    """Return the API model of the spectra of a result; `rotation_sense` +1 is from x to y."""
     spectrum, readings = assessment.spectrum, assessment.readings
     return SpectrumModel.of(
         time=assessment.time_ns,

@@ -196,7 +196,7 @@ def _columns_of(trend: Trend) -> dict[str, object]:
 
 
 def trend_columns(quantities: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of the stored columns of quantities: values, and uncertainties if any."""
+    """Return the names of the stored columns of quantities: values, and their uncertainties."""
     return columns_of(_quantities(quantities))
 
 
