@@ -36,7 +36,7 @@ class DuplicateSenderDetector:
         return self._n_windows_to_wait > 0
 
     def note(self, *, contrary: bool) -> None:
-        """Count a frame that contradicts other frames, or is consistent with a single sender."""
+        """Count a frame; `contrary` is whether it contradicts a single sender of all frames."""
         self._n_frames += 1
         self._n_contrary += contrary
         if self._n_frames >= _WINDOW_FRAMES:

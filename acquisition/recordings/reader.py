@@ -41,7 +41,7 @@ class Recording:
             yield from blocks_in(message, calibration, (self.manifest.sample_type,))
 
     def heads(self) -> Iterator[tuple[Heads, Mapping[int, list[Rejection]]]]:
-        """Yield arrays of some hundred block headers, with the rejections by index of the block."""
+        """Yield arrays of some hundred block headers, and rejections before them by array index."""
         for message in self._messages(0, self.manifest.n_blocks, with_samples=False):
             heads, rejected, _ = heads_in(message, len(self.manifest.slow_channels))
             if heads.size:

@@ -62,9 +62,9 @@ class SensorLimits:
 
 
 def quietest_rms(samples: FloatArray) -> FloatArray:
-    """Return the smallest standard deviation of each channel (n_channels,) among `N_PIECES` pieces.
+    """Return the standard deviation of each channel (n_channels,) in its quietest piece.
 
-    `samples` is (n_channels, n_samples), with at least `N_PIECES` samples.
+    `samples` (n_channels, n_samples) are divided into `N_PIECES` pieces of at least one sample.
     """
     n_channels, n_samples = samples.shape
     length = n_samples // N_PIECES

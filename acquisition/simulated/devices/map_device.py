@@ -84,7 +84,7 @@ class MapDevice(ModbusDevice):
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Fault injectors by name, called with a count: frozen data, invalid numbers, status."""
+        """Fault injectors by name, called with a count: frozen data, bad numbers, bad status."""
         spoils = {name: partial(self._spoil_values, name) for name in (_SENTINEL, _FLAG)}
         return {**super().faults, **spoils}
 

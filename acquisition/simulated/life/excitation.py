@@ -65,7 +65,7 @@ def draw_grade_mm_s(random: np.random.Generator, operation: Operation) -> FloatA
 def has_vortex(load: FloatArray) -> FloatArray:
     """Return the relative strength of the vortex rope at given loads, from 0 to 1, (n,).
 
-    The load range has linear edges of 5 % of rated power.
+    It rises and falls linearly over 5 % of rated power at the ends of the load range.
     """
     low, high = VORTEX_LOADS
     rising = np.clip((load - low) / 0.05, 0.0, 1.0)

@@ -113,7 +113,7 @@ def draw_inputs(
 
 
 def rated_speed_rpm(unit_seed: int) -> float:
-    """Return the rated speed in r/min of the unit with a random seed."""
+    """Return the rated speed in r/min of the simulated unit with the seed `unit_seed`."""
     return RATED_SPEEDS_RPM[unit_seed % 2]
 
 
