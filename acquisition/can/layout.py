@@ -209,5 +209,5 @@ def _require_full_scale(
         raise ConfigError(
             f"channel {channel.id}: full_scale_v is {calibration.full_scale_v:.9g} in the plant"
             f" file, but factor {signal.source.scale!r} {signal.unit} of {signal.path} in the DBC"
-            f" file corresponds to {by_dbc_v:.9g}"
+            f" file corresponds to {by_dbc_v:.9g}; correct one of them"
         )

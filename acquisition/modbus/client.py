@@ -307,7 +307,8 @@ class ModbusClient:
                     return
             raise LinkError(
                 f"{self.where}: the serial line was not silent for {timeout_s} s"
-                f" within {_MAX_SILENCE_TRIES * timeout_s:g} s: {protocol.unsolicited}"
+                f" within {_MAX_SILENCE_TRIES * timeout_s:g} s: {protocol.unsolicited};"
+                " disconnect any other master"
             )
         except (LinkError, asyncio.CancelledError):
             self.close()

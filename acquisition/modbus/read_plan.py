@@ -123,7 +123,7 @@ def _wanted(
             if start < last and first < stop and not first <= start < stop <= last:
                 raise MapError(
                     f"the block from register {first + registers.base} contains only a part of the"
-                    f" value at register {start + registers.base}",
+                    f" value at register {start + registers.base}; extend the block",
                     "together",
                 )
     return [b for b in blocks if any(b[0] <= start < b[1] for start, _ in stretches)]

@@ -90,7 +90,7 @@ class _CsvFile:
             try:
                 yield line.decode("utf-8-sig" if self._n_lines == 1 else "utf-8")
             except UnicodeDecodeError as error:
-                raise self._wrong("the line is not valid UTF-8") from error
+                raise self._wrong("the line is not valid UTF-8; save the file as UTF-8") from error
 
     def _parsed(self) -> Iterator[list[str]]:
         try:

@@ -83,7 +83,8 @@ def _text_to_us(text: str, zone: timezone) -> int:
     try:
         time = datetime.fromisoformat(text.strip())
     except ValueError as error:
-        raise ConfigError(f"{text[:40]!r} of the time column is not an ISO 8601 time") from error
+        words = "of the time column is not an ISO 8601 time such as 2026-05-01T12:00:00.000Z"
+        raise ConfigError(f"{text[:40]!r} {words}") from error
     if time.tzinfo is None:
         time = time.replace(tzinfo=zone)
     return (time - _EPOCH) // _MICROSECOND

@@ -244,5 +244,6 @@ def _channels(machine: Unit, scenario: Scenario) -> list[ChannelScenario]:
     """Return the scenarios of all channels, in the channel order of the machine."""
     unknown = scenario.channels.keys() - {channel.id for channel in machine.channels}
     if unknown:
-        raise ConfigError(f"unit {machine.id!r} has no channel {', '.join(sorted(unknown))}")
+        names = ", ".join(sorted(unknown))
+        raise ConfigError(f"unit {machine.id!r} has no channel {names}; correct the scenario")
     return [scenario.channel(channel.id) for channel in machine.channels]

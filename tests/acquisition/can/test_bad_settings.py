@@ -134,7 +134,7 @@ def test_samples_of_one_channel_with_different_factors_are_refused(dbc):
 def test_a_full_scale_that_differs_is_refused_with_both(full_scale_v, signal, dbc):
     calibration = dataclasses.replace(VOLT, full_scale_v=full_scale_v)
     with pytest.raises(
-        ConfigError, match=rf"full_scale_v is {full_scale_v:g} .* corresponds to 10$"
+        ConfigError, match=rf"full_scale_v is {full_scale_v:g} .* corresponds to 10; correct"
     ):
         compiled(dbc, channel("x", signal), calibration=calibration)
 
