@@ -181,7 +181,7 @@ def condition_words(bearing: BearingPart) -> str:
 
 
 def seen_words(case: Case) -> str:
-    """Return person and time of the newest acknowledgement; "not acknowledged" without one."""
+    """Return person and time of the newest acknowledgement, or "not acknowledged", as text."""
     seen = [each for each in case.events if each.change is AlarmChange.ACKNOWLEDGED]
     if not seen:
         return "not acknowledged"

@@ -101,9 +101,9 @@ class EvidenceService:
         self._downloads, self._trend_days = downloads, trend_days
 
     async def occurrences(self, alarm: str, most: int) -> list[tuple[Occurrence, SamplesState]]:
-        """Return the newest occurrences of an alarm with their samples' states, newest first.
+        """Return the newest occurrences of an alarm, newest first, each with its samples' state.
 
-        At most `most` are returned.
+        At most `most` occurrences are returned.
         """
         pending, capturing = self._unfinished()
 

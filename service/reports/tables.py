@@ -69,7 +69,12 @@ CHANGES = ("change", "change_std", "deviation", "deviation_std")
 
 
 def trend_table(found: FilmHistory) -> bytes:
-    """Return readings of a film, oldest first, as a Parquet table; NaN becomes null."""
+    """Return the readings of a film as a Parquet table, one row per reading, oldest first.
+
+    The columns are time, operating condition and baseline version; and for x and y the stiffness in
+    N/m, damping over stiffness in s, amplitudes in µm, verdict, alarm level, and deviations from
+    the baseline in ln. NaN becomes null.
+    """
     return _written(_trend(found))
 
 
@@ -112,7 +117,7 @@ def _trend(found: FilmHistory) -> "pa.Table":
 
 
 def trend_columns(found: FilmHistory) -> Columns:
-    """Return the columns of `trend_table` as lists; NaN becomes None."""
+    """Return the columns of the table of `trend_table` as lists, by name; NaN becomes None."""
     columns: Columns = _trend(found).to_pydict()
     return columns
 

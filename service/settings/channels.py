@@ -367,11 +367,11 @@ class SlowChannelSettings(Settings):
             return self
         unit, is_pad = SLOW_QUANTITIES[self.quantity].setting, self.quantity == PAD_TEMPERATURE
         if self.unit != unit:
-            raise MisfitError(f'must be "{unit}" for a {self.quantity}', "unit")
+            raise MisfitError(f'must be "{unit}" for quantity {self.quantity}', "unit")
         if is_pad and self.bearing is None:
-            raise MissingError(f"is missing; a {self.quantity} belongs to a bearing", "bearing")
+            raise MissingError(f"is missing; quantity {self.quantity} requires it", "bearing")
         if self.angle_deg is not None and not is_pad:
-            raise MisfitError("applies only to a pad_temperature; remove it", "angle_deg")
+            raise MisfitError("applies only to quantity pad_temperature; remove it", "angle_deg")
         if self.recorded is not None and self.recorded.reading in BY_NAME:
             raise MisfitError("is the name of a computed value; use another word", "position")
         return self

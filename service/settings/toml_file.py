@@ -226,7 +226,7 @@ def load_toml(path: Path, model: type[Model]) -> Model:
 
 
 def read_text(path: Path, max_bytes: int, fault: type[Exception], encoding: str = "utf-8") -> str:
-    """Return the text of a small file; raise ``fault`` if it is unreadable or not UTF-8."""
+    """Return the text of a file; raise ``fault`` if unreadable, too large, or not UTF-8."""
     try:
         content = read_small_file(path, max_bytes)
         return content.decode(encoding)
@@ -234,7 +234,8 @@ def read_text(path: Path, max_bytes: int, fault: type[Exception], encoding: str 
         raise fault(f"{path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise fault(f"{path}:{line}: byte {error.start} is not valid UTF-8") from error
+        words = f"byte {error.start} is not valid UTF-8; save the file as UTF-8"
+        raise fault(f"{path}:{line}: {words}") from error
 
 
 UNQUOTED = re.compile(r"\s*[\w.-]+\s*=\s*[^\W\d]")

@@ -270,7 +270,7 @@ class Seals:
 
 
 def unchecked(reader: Connection, table: str) -> str:
-    """Return the name by which a reader finds the rows of a table, damaged ones included."""
+    """Return the name in SQL of a table with all its rows, including damaged rows."""
     return f"main.{table}" if isinstance(reader, sqlite3.Connection) else table
 
 

@@ -173,14 +173,9 @@ class Store:
             write_positions(writer, positions)
 
     def trend(self, query: TrendQuery) -> Trend:
-        """Return the trends of one bearing as a page, or as ``max_points`` or fewer points.
+        """Return the trends of one bearing: a page, or at most ``max_points`` readings or buckets.
 
-        More readings are aggregated into buckets.
-
-        Raises
-        ------
-        QueryTooLargeError
-            If too many single readings would have to be read.
+        Raises `QueryTooLargeError` if too many single readings would have to be read.
         """
         with self._reader() as reader:
             return read_trend(reader, query)

@@ -18,12 +18,12 @@ IN_STATES = """(
 
 
 def at_least(column: str, name: str) -> str:
-    """Return the SQL condition that a column is at least `:name`; NULL means no bound."""
+    """Return the SQL condition that a column is at least parameter `name`; NULL means no bound."""
     return f"(CAST(:{name} AS DOUBLE PRECISION) IS NULL OR {column} >= :{name})"
 
 
 def at_most(column: str, name: str) -> str:
-    """Return the SQL condition that a column is at most `:name`; NULL means no bound."""
+    """Return the SQL condition that a column is at most parameter `name`; NULL means no bound."""
     return f"(CAST(:{name} AS DOUBLE PRECISION) IS NULL OR {column} <= :{name})"
 
 
@@ -37,7 +37,7 @@ BETWEEN_BOUNDS = f"""{at_least("eccentricity_ratio", "eccentricity_low")}
 def condition_arguments(
     states: Iterable[OperatingState], eccentricity_ratio: ValueRange, oil_temperature_c: ValueRange
 ) -> dict[str, object]:
-    """Return the SQL parameters of `IN_STATES` and `BETWEEN_BOUNDS`."""
+    """Return the SQL parameters of the conditions on state, eccentricity and oil temperature."""
     return {
         "eccentricity_low": eccentricity_ratio.low,
         "eccentricity_high": eccentricity_ratio.high,

@@ -173,7 +173,7 @@ class Acting:
     actor
         Name of the person or machine; empty before authentication.
     command
-        Identifier of the operator command that is being executed; None if there is none.
+        Identifier of the operator command that is being executed; None for other actions.
     """
 
     source: Source = Source.PADWATCH

@@ -81,9 +81,9 @@ MAX_BEHIND = 64
 
 @dataclass(frozen=True)
 class Finding:
-    """Defect of an audit trail: number of the first affected entry (None for the head file).
+    """Defect of an audit trail, described by the sentence `detail`.
 
-    `detail` is a sentence that describes the defect.
+    `number` is the number of the first affected entry; None if the head file is affected.
     """
 
     number: int | None

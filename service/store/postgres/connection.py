@@ -245,7 +245,7 @@ def cancelled_when_gone(session: Session) -> Iterator[None]:
 
 BY_STATE = {
     "53100": "the disk of the database is full: free space there",
-    "53200": "the database server is out of memory",
+    "53200": "the database server is out of memory: give it more memory",
     "53300": "too many connections are open: raise max_connections",
     "57014": "the query timed out: the database is too slow, or overloaded",
     "55P03": "another padwatch has been writing for too long: check what it waits for",

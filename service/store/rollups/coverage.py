@@ -75,7 +75,7 @@ def covered(
     deleted
         Times up to which data of the bearing were deleted.
     whole
-        Requested time range, ns.
+        Requested half-open time range, ns since 1970 UTC.
     bucket_ns
         Width of the requested buckets.
 

@@ -53,7 +53,7 @@ SET_MARK = """
 
 
 def gather_next(writer: Connection, series: int, now_ns: int) -> None:
-    """Aggregate the readings of the next complete minutes of a bearing into roll-ups."""
+    """Aggregate readings of a bearing into roll-ups: the next complete minutes before `now_ns`."""
     mark_ns = select_mark(writer, series)
     until_ns = _until(writer, series, mark_ns, now_ns)
     if until_ns > mark_ns:

@@ -291,7 +291,7 @@ def select_cells(
     Parameters
     ----------
     span
-        First start time of the cells, and the end, which is excluded, in ns.
+        Half-open range of the start times of the cells, in ns since 1970 UTC.
     names
         Requested columns.
     asked

@@ -40,7 +40,7 @@ def floored(time_ns: int, width_ns: int) -> int:
 
 
 def select_mark(reader: Connection, series: int) -> int:
-    """Return the time, in ns, up to which a bearing's readings are aggregated; 0 if none are."""
+    """Return the time, ns since 1970 UTC, up to which readings are aggregated; 0 without any."""
     found = reader.execute(
         "SELECT until_ns FROM rollup_mark WHERE series = ?", (series,)
     ).fetchone()
@@ -139,11 +139,11 @@ class DeletedUntil:
 
     @property
     def readings_ns(self) -> int:
-        """Time, in ns, up to which single readings were deleted; 0 if none were deleted."""
+        """Time, ns since 1970 UTC, up to which single readings were deleted; 0 if never."""
         return self.of(SINGLE_S)
 
     def of(self, width_s: int) -> int:
-        """Return the time, in ns, up to which data of a width were deleted; 0 if never."""
+        """Return the time, ns since 1970 UTC, up to which data of a width were deleted, or 0."""
         return self.until_ns.get(width_s, 0)
 
     def kept_ns(self, time_ns: int) -> tuple[int, ...]:
