@@ -294,8 +294,8 @@ class ChannelAssembly:
     def place(self, pieces: list[FifoPiece], now_s: float) -> list[PlacedSamples]:
         """Add one reading of each queue, in the order of the channels; return the aligned samples.
 
-        Raises LinkError if the counters of two channels differ too much, as after a restart between
-        the reads.
+        `now_s` is the monotonic time of the reading. Raises LinkError if the counters of two
+        channels differ too much, as after a restart between the reads.
         """
         first, *others = pieces
         for sample in place_records(first, self._samples, now_s):

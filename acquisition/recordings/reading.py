@@ -154,8 +154,8 @@ def imported_blocks(path: Path, job: ImportJob) -> Generator[tuple[SampleBlock, 
 
     The calibration of the blocks is :attr:`ImportJob.calibration`.
 
-    Raises ConfigError if the file is missing or does not match the job; one sentence with the path
-    of the file.
+    Raises ConfigError if the file does not exist or does not match the job; the message contains
+    its path.
     """
     calibration = job.calibration
     for message in _imported(path, job, "blocks"):
@@ -165,7 +165,7 @@ def imported_blocks(path: Path, job: ImportJob) -> Generator[tuple[SampleBlock, 
 def imported_frames(path: Path, job: ImportJob) -> Generator[tuple[Frames, float]]:
     """Yield the frames of a CAN log in batches, each with the fraction of the log read so far.
 
-    Raises ConfigError if the log is missing or invalid; the message contains its path.
+    Raises ConfigError if the log does not exist or is invalid; the message contains its path.
     """
     for message in _imported(path, job, "frames"):
         yield frames_of(message), _done(message)

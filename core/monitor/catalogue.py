@@ -114,8 +114,8 @@ _SLOW = re.compile(rf"({'|'.join(SLOW_QUANTITIES)})(?:_([a-z0-9_]+))?_(c|m|perce
 def quantity_named(name: str) -> Quantity | None:
     """Return the quantity with a name; None if there is none.
 
-    Beside `CATALOGUE`, these are the slow quantities at any position, and the ratios of film
-    coefficients to the bracket stiffness.
+    The names are those in `CATALOGUE`, those of slow quantities at any position, and those of the
+    ratios of film coefficients to the bracket stiffness.
     """
     if name in BY_NAME:
         return BY_NAME[name]

@@ -205,7 +205,7 @@ class FittedFilms:
 
     @property
     def unknowns(self) -> FloatArray:
-        """Coefficients (k_i1, k_i2, c_i1, c_i2) of each row, in N/m, (n, 2, 4)."""
+        """Coefficients (k_i1, k_i2, c_i1, c_i2) of each row, c × `omega_unit`, N/m, (n, 2, 4)."""
         return self.coefficients[..., :N_UNKNOWNS]
 
     @cached_property
