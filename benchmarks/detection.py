@@ -25,12 +25,16 @@ from benchmarks.detection_cases import (
     find_damage,
     leave_support,
 )
+from benchmarks.detection_causes import CAUSE_CASES, judged_per_day, tell
 from benchmarks.detection_fixed import BANDS
 from benchmarks.detection_table import HEADINGS, MOST_FALSE_ALARMS, Line, UnitResult, lines
 from benchmarks.detection_unit import LearnedUnit, fixed_false_alarms
 
 SINGLE_THREADED = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """For the workers: they are the parallelism."""
+
+TWO_SHIFT_EVERY = 5
+"""One of so many units lives a second time, with two runs a day."""
 
 REPORTED_PLANTS, TUNING_PLANT = (1, 2, 3, 4, 5), 900
 
@@ -53,6 +57,8 @@ def examine(job: tuple[int, float]) -> UnitResult:
         {case.name: find_damage(unit, case, random, band) for case in DAMAGE_CASES},
         tuple(change_condition(unit, stiffer, random, band) for stiffer in (True, False)),
         {damaged: leave_support(unit, damaged, random, band) for damaged in (False, True)},
+        {case.name: tell(unit, case, random) for case in CAUSE_CASES},
+        judged_per_day(seed) if seed % TWO_SHIFT_EVERY == 0 else None,
     )
 
 

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.simulated.life.damage import Damage, DamageKind
-from benchmarks.detection_unit import DAY_NS, LearnedUnit
+from acquisition.simulated.life.operation import HeldLoad
+from benchmarks.detection_unit import DAY_NS, START_NS, LearnedUnit
 from core.baseline.history import DIRECTIONS, QUANTITIES
 from core.change.cause import Cause
+from core.change.decision import JUDGED
 
 ROWS_PER_H = 6
 TOLD_AFTER_H = 7 * 24
@@ -66,6 +68,10 @@ CAUSE_CASES = (
 )
 
 
+TWO_SHIFTS = HeldLoad(START_NS, 0.9, ((6.0, 11.0), (17.0, 22.0)))
+"""Two runs of five hours a day."""
+
+
 @dataclass(frozen=True)
 class Told:
     """What was found of one change.
@@ -112,6 +118,15 @@ def tell(unit: LearnedUnit, case: CauseCase, random: np.random.Generator) -> Tol
     worst = max(held, key=sizes.__getitem__)
     found = unit.attribution(later, (bearing, worst), later.time_ns.size - 1)
     return Told(by_k, by_ck, found.cause, found.reason)
+
+
+def judged_per_day(seed: int) -> tuple[float, int]:
+    """Readings judged per day of a healthy two-shift unit, of the worst film, and false alarms."""
+    unit = LearnedUnit(seed, TWO_SHIFTS)
+    decided = [unit.decide(unit.healthy, *place) for place in unit.watched()]
+    judged = [np.isin(one.verdict, [int(each) for each in JUDGED]).sum() for one in decided]
+    n_alarms = sum(one.raised().size for one in decided)
+    return float(min(judged)) / (365.25 * unit.healthy.years), n_alarms
 
 
 def shares(told: Sequence[Told], cause: Cause) -> tuple[float, float]:

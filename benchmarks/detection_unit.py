@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from acquisition.simulated.life.damage import Damage
 from acquisition.simulated.life.life import live
+from acquisition.simulated.life.operation import HeldLoad
 from acquisition.simulated.life.shaft import ConditionChange
 from acquisition.simulated.life.truth import UnitLife
 from acquisition.simulated.plant.rotor import RotorParameters
@@ -19,7 +20,7 @@ from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.backtest import DecisionHistory, decide_all, last_decision, operation_history
 from core.change.cause import Attribution, UnitReadings, attribute
-from core.change.damping_cause import FilmEvidence, line_finding, told_by_damping
+from core.change.damping_cause import FilmEvidence, cause_by_damping, line_finding
 from core.change.decision import JUDGED
 from core.change.evidence import Finding
 from core.change.film_judge import MAX_RECENT
@@ -64,9 +65,9 @@ class Later:
 class LearnedUnit:
     """A unit with its baselines; damage comes to it after it has been learned."""
 
-    def __init__(self, seed: int) -> None:
-        self.seed = seed
-        life = live(seed, START_NS, YEARS)
+    def __init__(self, seed: int, held: HeldLoad | None = None) -> None:
+        self.seed, self.held = seed, held
+        life = live(seed, START_NS, YEARS, held=held)
         settled, n = _settled(life), _n_learning(life)
         learning = {bearing: history.rows(0, n) for bearing, history in life.readings.items()}
         self.baselines = {
@@ -81,7 +82,7 @@ class LearnedUnit:
         self, damage: Iterable[Damage] = (), changes: Iterable[ConditionChange] = ()
     ) -> Later:
         """The same life, damaged or changed."""
-        return _later(live(self.seed, START_NS, YEARS, damage, changes))
+        return _later(live(self.seed, START_NS, YEARS, damage, changes, held=self.held))
 
     def decide(self, later: Later, bearing: str, quantity: str) -> DecisionHistory:
         columns = later.histories[bearing], later.is_settled
@@ -119,7 +120,7 @@ class LearnedUnit:
         before = later.rows(max(0, row - EVIDENCE_ROWS), row + 1)
         lines = {d: line_finding((place[0], d), self.response, newest) for d in DIRECTIONS}
         evidence = {p: self._evidence(before, *p) for p in self.places()}
-        return told_by_damping(place, found, evidence, lines)
+        return cause_by_damping(place, found, evidence, lines)
 
     def _evidence(self, later: Later, bearing: str, direction: str) -> FilmEvidence:
         return FilmEvidence(

@@ -164,7 +164,7 @@ def line_finding(
     return line.judge(film[0], shaft, motion, ln_k, rise)
 
 
-def told_by_damping(
+def cause_by_damping(
     film: FilmDirection,
     found: Attribution,
     evidence: Mapping[FilmDirection, FilmEvidence],

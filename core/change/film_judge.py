@@ -11,7 +11,7 @@ from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.history import DIRECTIONS, QUANTITIES, are_ratios
 from core.change.cause import Attribution, Cause, UnitReadings, attribute
-from core.change.damping_cause import FilmEvidence, line_finding, told_by_damping
+from core.change.damping_cause import FilmEvidence, cause_by_damping, line_finding
 from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, outcomes, step
 from core.change.film_reading import FilmReading
 from core.change.settings import ChangeLimits, FilmRules, percent_of
@@ -323,7 +323,7 @@ class FilmJudge:
             for direction in DIRECTIONS
         }
         evidence = {each: self._evidence(*each) for each in self._films}
-        return told_by_damping(film, found, evidence, lines)
+        return cause_by_damping(film, found, evidence, lines)
 
     def _evidence(self, bearing: str, direction: str) -> FilmEvidence:
         """Return the mean deviations of a film over each time scale."""

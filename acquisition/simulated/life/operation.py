@@ -69,14 +69,15 @@ def time_grid_ns(start_ns: int, years: float, step_s: float = STEP_S) -> TimeArr
 
 @dataclass(frozen=True)
 class HeldLoad:
-    """Operation at constant load without a stop, from the time `from_ns`.
+    """Operation at constant load in some hours of each day, from the time `from_ns`.
 
-    Earlier operation is unchanged. `load` is a share of rated power. Raises `ValueError` if it is
-    not above 0, or is above 1.
+    Earlier operation is unchanged. `load` is a share of rated power; `hours` are pairs of begin and
+    end, by default the whole day. Raises `ValueError` if the load is not above 0, or is above 1.
     """
 
     from_ns: int
     load: float
+    hours: tuple[tuple[float, float], ...] = ((0.0, 24.0),)
 
     def __post_init__(self) -> None:
         if not 0.0 < self.load <= 1.0:
@@ -174,7 +175,9 @@ def draw_operation(
     speed = np.where(load > 0.0, 1.0, 0.0)
     _start(random, load, speed)
     if held is not None:  # after all random draws, so that their values do not change
-        load[time_ns >= held.from_ns], speed[time_ns >= held.from_ns] = held.load, 1.0
+        hour, later = time_ns % DAY_NS / (3600.0 * NS_PER_S), time_ns >= held.from_ns
+        runs = np.any([(hour >= begin) & (hour < end) for begin, end in held.hours], axis=0)
+        load[later], speed[later] = held.load * runs[later], runs[later]
     speed *= 1.0 + wander(random, load.size, STEP_S, 1800.0, 3e-4)
     power_mw = RATED_POWER_MW * np.maximum(load, 0.0)
     power_mw[load > 0.0] += 3.0 * random.standard_normal(int(np.sum(load > 0.0)))

@@ -144,11 +144,11 @@ export function learningSentence(baselines) {
 function recentWords({ days, n_at_speed: atSpeed, n_settled: settled, n_complete: complete, n_judged: judged }, inForce) {
   const readings = `the ${atSpeed} readings at speed in the last ${formatFixed(days, 0)} days`;
   if (atSpeed === 0) return "";
-  if (settled === 0) return `Not judged: none of ${readings} was settled. Each run ends before the oil temperature has settled, or the load changes too often.`;
+  if (settled === 0) return `Not judged: none of ${readings} was settled. Each run ends before the oil temperature has settled (oil_settling_s, warm_up_s), or the load changes too often (settling_s).`;
   if (complete === 0) return `Not judged: none of ${readings} has stiffness, eccentricity and oil temperature that are good.`;
   if (judged === 0 && inForce !== null) return `None of ${readings} was judged: their conditions have not been learned, or they are too few.`;
   const lost = atSpeed - complete;
-  return 2 * lost > atSpeed ? `Of ${readings}, ${atSpeed - settled} were not settled and ${settled - complete} lack a number or a condition.` : "";
+  return 2 * lost > atSpeed ? `Of ${readings}, ${atSpeed - settled} were not settled (oil_settling_s, settling_s) and ${settled - complete} lack a number or a condition.` : "";
 }
 
 function progressWords({ learning, in_force: inForce, is_frozen: isFrozen, versions, acceptance }) {

@@ -3,7 +3,7 @@
 import pytest
 
 from core.change.cause import PROBE_REASON, Attribution, Cause
-from core.change.damping_cause import FilmEvidence, told_by_damping
+from core.change.damping_cause import FilmEvidence, cause_by_damping
 from core.change.evidence import Finding
 from core.change.shaft_line import LineFinding, LineVerdict
 
@@ -30,7 +30,7 @@ def told(
     for bearing, k in zip(("LJB", "TJB"), others, strict=False):
         alike = evidence(k, k, 0.0).items()
         films |= {(bearing, direction): one for direction, one in alike}
-    return told_by_damping(("UJB", "x"), found, films, {"x": line, "y": HOLDS})
+    return cause_by_damping(("UJB", "x"), found, films, {"x": line, "y": HOLDS})
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from rigs.tiers import fast_and_long
 
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.life import live
+from acquisition.simulated.life.operation import HeldLoad
 from acquisition.simulated.life.truth import UnitLife
 from benchmarks.detection_cases import cooling_failure, four_fold
 from core.arrays import FloatArray
@@ -119,6 +120,14 @@ def test_readings_scatter_by_what_they_say_and_by_what_is_alike_for_hours(two_ye
     error_um = 500.0 * readings.eccentricity_ratio - np.hypot(*truth.centre_um)
     assert 0.5 < np.std(error_um) < 8.0  # close to the true position, but not it
     assert np.all(readings.u_eccentricity < 0.02)
+
+
+def test_load_is_held_in_some_hours_of_the_day_only(day_ns):
+    shifts = HeldLoad(day_ns(0), 0.9, ((6.0, 11.0), (17.0, 22.0)))
+    operation = live(0, day_ns(0), 30.0 / 365.25, held=shifts).operation
+    hours = operation.time_ns % (24 * 3600 * 10**9) / 3.6e12
+    assert set(np.floor(hours).tolist()) == {*range(6, 11), *range(17, 22)}
+    assert np.ptp(operation.load) < 0.05
 
 
 def test_clearance_moves_damping_over_stiffness_and_oil_and_gains_do_not(two_years, day_ns):

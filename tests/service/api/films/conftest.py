@@ -3,6 +3,7 @@
 import asyncio
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +43,11 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> PlantFile:
 
 @pytest.fixture(scope="session")
 def lived(film_life: Callable[..., StiffnessHistory]) -> StiffnessHistory:
-    return film_life(3, days=N_DAYS)
+    """Days of a film whose damping over stiffness falls with eccentricity."""
+    history = film_life(3, days=N_DAYS)
+    noise = np.random.default_rng(3).normal(0.0, 0.004, history.ln_k.shape)
+    ln_ck = math.log(0.03) - 0.4 * (history.eccentricity_ratio - 0.35) + noise
+    return replace(history, ln_ck=ln_ck, u_ck=np.full(ln_ck.shape, 0.004))
 
 
 @pytest.fixture(scope="session")
@@ -74,33 +79,47 @@ class Machine:
         service.live.set_link("U1", LinkState.CONNECTED)
         self.run(1)  # in the first interval nothing is read
 
-    def run(self, n: int, ln_change: float = 0.0, quality: Quality = GOOD, **other: Any) -> None:
+    def run(
+        self,
+        n: int,
+        ln_change: float = 0.0,
+        quality: Quality = GOOD,
+        ck_change: float = 0.0,
+        **other: Any,
+    ) -> None:
         """Go on for some intervals, under the condition of the newest reading that was learned."""
         for _ in range(n):
             self.time_ns += PERIOD_NS
             self._service.clock.ns = self.time_ns
-            found = [self._result(b, ln_change, quality, other) for b in ("UJB", "LJB", "TJB")]
+            found = [
+                self._result(b, (ln_change, ck_change), quality, other)
+                for b in ("UJB", "LJB", "TJB")
+            ]
             seen, news = self._service.films.take("U1", found)
             for one in seen:
                 self._service.live.set_assessment(one)
             self._service.store.append([], [], [], news)
 
     def _result(
-        self, bearing: str, ln_change: float, quality: Quality, other: dict[str, float]
+        self, bearing: str, change: tuple[float, float], quality: Quality, other: dict[str, float]
     ) -> Assessment:
         numbers = {name: float(getattr(self._lived, name)[-1]) for name in CONDITION_COLUMNS}
         k = {}
         for direction in DIRECTIONS:
-            value = None if quality.level else math.exp(self._learned(direction) + ln_change)
-            name = f"dynamic_k_{direction * 2}_n_per_m"
-            k[name] = Reading(value, quality, None if value is None else 5e6)
+            axes = direction * 2
+            for name, ln, key, share in (
+                (f"k_{direction}", change[0], f"dynamic_k_{axes}_n_per_m", 0.01),
+                (f"ck_{direction}", change[1], f"dynamic_ck_{axes}_s", 0.004),
+            ):
+                value = None if quality.level else math.exp(self._learned(name) + ln)
+                k[key] = Reading(value, quality, None if value is None else share * value)
         numbers["attitude_angle_deg"] = numbers.pop("attitude_deg")
         numbers.pop("u_eccentricity")
         return self._assessment(self.time_ns, bearing=bearing, **k, **{**numbers, **other})
 
-    def _learned(self, direction: str) -> float:
+    def _learned(self, name: str) -> float:
         """What was learned of the upper bearing under that condition, in ln."""
-        learned = self._service.films.baseline("U1", "UJB").of(f"k_{direction}")
+        learned = self._service.films.baseline("U1", "UJB").of(name)
         newest = self._lived.conditions.rows(np.array([len(self._lived) - 1]))
         return float(learned.surface.at(newest)[0])
 

@@ -40,6 +40,27 @@ async def test_a_film_as_it_was_learned_is_normal_and_tells_its_condition(servic
     assert found["next_reading"].endswith("0:00.000Z")  # the next full period
 
 
+async def test_damping_over_stiffness_is_judged_beside_the_stiffness(service, machine):
+    machine.run(40, ck_change=0.06)
+
+    film = await service.json(FILM)
+    x, damping = film["x"], film["x"]["damping"]
+    assert (x["verdict"], x["level"]) == ("normal", None)
+    assert (damping["verdict"], damping["level"]) == ("alert", "alert")
+    assert film["damping_limits"] == {"alert_percent": 0.8, "danger_percent": 5.0}
+    assert damping["ck_s"] / damping["expected_s"] == pytest.approx(math.exp(0.06))
+    assert damping["deviation"]["percent"] == pytest.approx(6.2, abs=0.1)
+    assert damping["cause"]["cause"] == "clearance"
+    assert "c/k +" in damping["cause"]["reason"]
+    found = service.films.conditions([service.films.newest("U1", "UJB")])["U1:UJB:film_stiffness"]
+    assert found["x"].reason == "clearance_changed"
+    assert (found["x"].limit, found["x"].value) == (0.8, pytest.approx(6.0, abs=1.5))
+
+    readings = await service.json(f"{FILM}/readings", start=film["time"], end="2100-01-01T00:00Z")
+    assert readings["x"]["ck_s"][-1] == pytest.approx(damping["ck_s"])
+    assert (readings["x"]["ck_level"][-1], readings["x"]["level"][-1]) == ("alert", None)
+
+
 async def test_a_softer_film_is_told_with_interval_time_scale_and_cause(service, machine):
     machine.run(40, ln_change=-0.3)
 
