@@ -71,10 +71,7 @@ class CounterFollower:
 
         These are the frame itself, and earlier frames that it confirms; possibly none.
 
-        Parameters
-        ----------
-        arrived_ns
-            Arrival by the host's monotonic clock, ns.
+        `arrived_ns` is the arrival by the host's monotonic clock.
         """
         if part.counter is None:
             return []

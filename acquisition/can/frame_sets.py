@@ -102,10 +102,7 @@ class _Pending:
 class FrameSets:
     """Collector of the frames of each sample instant; returns complete instants in order.
 
-    Parameters
-    ----------
-    refused
-        Counts of refused frames; updated in place.
+    `refused` are the counts of refused frames, which are updated in place.
     """
 
     def __init__(

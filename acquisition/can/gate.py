@@ -15,10 +15,7 @@ Frame: TypeAlias = tuple[int, bytes | None]
 class FrameGate:
     """Filter that admits frames of configured messages and counts refused frames by reason.
 
-    Parameters
-    ----------
-    refused
-        Counts of refused frames; updated in place.
+    `refused` are the counts of refused frames, which are updated in place.
     """
 
     def __init__(self, plan: Plan, refused: RefusalCounts) -> None:

@@ -109,10 +109,7 @@ class WaveChannel:
 class WaveformDecoder:
     """Decoder of the frames of all waveform channels to one sample array.
 
-    Parameters
-    ----------
-    in_counts
-        Whether the raw values are counts of a 16-bit converter.
+    `in_counts` is whether the raw values are counts of a 16-bit converter.
     """
 
     channels: tuple[WaveChannel, ...]

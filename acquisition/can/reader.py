@@ -89,10 +89,7 @@ class FrameReader:
     async def start(self) -> None:
         """Start the thread and wait until the bus is open.
 
-        Raises
-        ------
-        LinkError, ConfigError
-            If `open_bus` fails.
+        Raises LinkError or ConfigError if `open_bus` fails.
         """
         self._loop = asyncio.get_running_loop()
         self._thread = threading.Thread(target=self._run, name=f"can {self._where}", daemon=True)

@@ -111,10 +111,7 @@ class SideTable:
 class BlockBuilder:
     """Builder of sample blocks; a block ends where a side value changes.
 
-    Attributes
-    ----------
-    side
-        Side values of the current epoch.
+    The attribute `side` contains the side values of the current epoch.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -131,10 +128,7 @@ class BlockBuilder:
     def blocks(self, instants: Sequence[Instant], arrived_ns: int) -> list[SampleBlock]:
         """Return the blocks of sample instants, given in index order and of one epoch.
 
-        Parameters
-        ----------
-        arrived_ns
-            Arrival of the last instant, UTC in ns since 1970.
+        `arrived_ns` is the arrival of the last instant, ns since 1970 UTC.
         """
         blocks = []
         if instants:  # the last instant has the smallest delay

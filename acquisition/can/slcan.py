@@ -51,10 +51,7 @@ _STATES = {b"a": None, b"w": None, b"p": RX_PASSIVE | TX_PASSIVE, b"b": 0}
 class SlcanBus(slcanBus):
     """python-can bus of an slcan adapter at a serial port, a pseudo-terminal or a TCP port.
 
-    Parameters
-    ----------
-    ids
-        Frame ids to receive, standard or extended.
+    `ids` are the frame ids to receive, standard or extended.
     """
 
     def __init__(self, channel: str, ids: Container[int], **options: Any) -> None:

@@ -97,10 +97,7 @@ class ArrivalModel:
     line through these blocks is the drift; the residuals give its uncertainty. If the host clock is
     set, estimation restarts: the offset has changed, and monotonic time stops during suspend.
 
-    Parameters
-    ----------
-    rate_hz
-        Nominal sampling rate.
+    `rate_hz` is the nominal sampling rate.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -115,10 +112,7 @@ class ArrivalModel:
     def add(self, epoch: int, stop_index: int, stop_ns: int | None, arrived: Arrival) -> None:
         """Add the arrival of all samples before `stop_index`.
 
-        Parameters
-        ----------
-        stop_ns
-            Time of `stop_index` by the device stamps; None without device stamps.
+        `stop_ns` is the time of `stop_index` by the device stamps; None without device stamps.
         """
         if epoch != self._epoch or self._was_set(arrived):
             self._begin(epoch, stop_index, arrived.steady_s)
@@ -140,10 +134,7 @@ class ArrivalModel:
     def device_clock(self, n_faults: int = 0) -> DeviceClock:
         """Return the present offset and drift of the device clock; unknown fields are None.
 
-        Parameters
-        ----------
-        n_faults
-            Number of faults of the device's time stamps, for the result.
+        `n_faults` is the number of faults of the device's time stamps, for the result.
         """
         offsets_ns = (bin_[2] for bin_ in reversed(self._bins) if bin_[2] is not None)
         offset_ns = max(islice(offsets_ns, _MIN_BINS), default=None)
@@ -190,10 +181,7 @@ class HostStamps:
     the smallest delay in these ten seconds. The line restarts only if the host clock was set or a
     new epoch began.
 
-    Parameters
-    ----------
-    rate_hz
-        Nominal sampling rate.
+    `rate_hz` is the nominal sampling rate.
     """
 
     def __init__(self, rate_hz: float) -> None:

@@ -124,10 +124,7 @@ class StampCheck:
     returned. Two consecutive wrong stamps that agree with each other indicate that the device clock
     was set: they are accepted, unless they leave the years 2000 to 2100.
 
-    Attributes
-    ----------
-    n_faults
-        Number of stamps that were not used.
+    The attribute `n_faults` is the number of stamps that were not used.
     """
 
     def __init__(self) -> None:

@@ -83,10 +83,7 @@ class MapDecoder:
     def read(self, content: bytes) -> MapReading:
         """Decode the contents read in one poll; return all values with their states.
 
-        Parameters
-        ----------
-        content
-            Concatenated contents of all spans of the plan.
+        `content` are the concatenated contents of all spans of the plan.
         """
         numbers = self._cells.numbers(content)
         times = [numbers[cell] for cell in self._time_cells]

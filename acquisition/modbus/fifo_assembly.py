@@ -136,10 +136,7 @@ class CountedSamples:
     since the last sample is a gap of exactly known length. Any other jump starts a new epoch: the
     device has restarted its counter, or has stopped sampling for a while.
 
-    Parameters
-    ----------
-    removes
-        Whether reading removes samples from the queue; if not, repeated samples are dropped.
+    `removes` is whether reading removes samples; if not, repeated samples are dropped.
     """
 
     def __init__(self, rate_hz: float, epochs: Epochs, *, removes: bool) -> None:
@@ -163,10 +160,7 @@ class CountedSamples:
     def place(self, counter: int, now_s: float) -> SamplePlace | None:
         """Return epoch and index of a sample by its counter; None if it was read before.
 
-        Parameters
-        ----------
-        now_s
-            Monotonic time of the reading, s.
+        `now_s` is the monotonic time of the reading.
         """
         axis, now_ns = self._axis, ns_from_s(now_s)
         if axis.index is None:
@@ -193,10 +187,7 @@ class UncountedSamples:
     Losses are detected by the host's clock alone: the number of missing samples is unknown, so no
     samples are joined across a loss. A loss shorter than the tolerance is not detected.
 
-    Parameters
-    ----------
-    tolerance_s
-        Shortest detectable loss, s; longer than the jitter of polls and replies.
+    `tolerance_s` is the shortest detectable loss; longer than the jitter of polls and replies.
     """
 
     def __init__(self, rate_hz: float, epochs: Epochs, *, tolerance_s: float) -> None:
@@ -225,10 +216,7 @@ class UncountedSamples:
 class PlacedSamples:
     """Consecutive samples of all channels, with epoch and index of the first sample.
 
-    Parameters
-    ----------
-    counts
-        (n_channels, n_samples) int16 counts.
+    `counts` are (n_channels, n_samples) int16 counts.
     """
 
     epoch: int

@@ -13,10 +13,7 @@ from acquisition.modbus.requests import BIT_FUNCTIONS, Span
 class MapError(ConfigError):
     """Error raised if the cells of a register map cannot be read as the map requires.
 
-    Parameters
-    ----------
-    at
-        Path of the faulty field in the map: field names and element numbers.
+    `at` is the path of the faulty field in the map: field names and element numbers.
     """
 
     def __init__(self, message: str, *at: int | str) -> None:

@@ -121,10 +121,7 @@ class MapValue:
 class Together:
     """Block of registers that must be read in one request, as the manual requires.
 
-    Parameters
-    ----------
-    address
-        Address of the first register as printed in the manual.
+    `address` is the address of the first register, as printed in the manual.
     """
 
     address: int

@@ -156,10 +156,7 @@ class RecordingSource:
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
         """Start or continue the replay, and yield an iterator of its sample blocks.
 
-        Raises
-        ------
-        ConfigError
-            During iteration, if a file of the recording has become unreadable.
+        Iteration raises ConfigError if a file of the recording has become unreadable.
         """
         if self._start_s is None:
             self._start_s = self._clock.monotonic_s()

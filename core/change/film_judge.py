@@ -164,10 +164,7 @@ class FilmJudge:
 
     `brackets_n_per_m` is the bracket stiffness by bearing id, None if unknown.
 
-    Attributes
-    ----------
-    response
-        Shaft response used to find the cause of a change; None if it has not been learned.
+    `response` is the shaft response used to find causes; None if it has not been learned.
     """
 
     def __init__(self, rules: FilmRules, brackets_n_per_m: Mapping[str, float | None]) -> None:

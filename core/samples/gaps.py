@@ -245,10 +245,7 @@ class Counts:
     A device or a program that reads it may restart the count without reporting it. The index alone
     then looks like repeated samples; the time shows that they are new.
 
-    Attributes
-    ----------
-    count
-        Current sample count; None before the first block. Set after a restart of padwatch.
+    `count` is the current sample count; None before the first block. Set it after a restart.
     """
 
     def __init__(self) -> None:

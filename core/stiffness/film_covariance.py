@@ -272,10 +272,7 @@ class FilmFits(FittedFilms):
     def covariance(self, weights: FloatArray) -> FloatArray:
         """Return the covariance of estimates, (n, n_estimates, n_estimates).
 
-        Parameters
-        ----------
-        weights : (n, 2, n_estimates, 7 or 11)
-            Weights of the influences in the estimates, through the residual of each row.
+        `weights` (n, 2, n_estimates, 7 or 11) are those of the influences in the estimates, by row.
         """
         own, slope = self._spread(weights)
         through = slope.sum(axis=1)

@@ -94,10 +94,7 @@ class ChannelColumn:
 class SlowColumn:
     """Column of a slow channel: value = factor × value in the file + offset.
 
-    Parameters
-    ----------
-    time
-        Time column of the slow channel, in the form of the time axis; None for the waveform times.
+    `time` is a time column of its own, in the form of the time axis; None for the waveform times.
     """
 
     id: str
@@ -112,10 +109,7 @@ class SlowColumn:
 class CsvLayout:
     """Format of a CSV file.
 
-    Parameters
-    ----------
-    header_line
-        Number of the line with the headings, counted from 1; earlier lines are skipped.
+    `header_line` is the number of the line with the headings, from 1; earlier lines are skipped.
     """
 
     delimiter: str = ","

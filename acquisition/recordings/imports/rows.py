@@ -67,10 +67,7 @@ class Indexer:
     after a pause is a restart of the device and starts a new epoch. All other steps, and a
     different rate, raise an error. Nothing is interpolated.
 
-    Parameters
-    ----------
-    tolerance
-        Maximum deviation of a stamp from the line, in samples.
+    `tolerance` is the maximum deviation of a stamp from the line, in samples.
     """
 
     def __init__(self, rate_hz: float, tolerance: float) -> None:

@@ -233,10 +233,7 @@ def require_one(found: Sequence[Any], place: ColumnName, known: Sequence[str]) -
 def counts_are_kept(job: ImportJob, per_count: Sequence[float | None]) -> bool:
     """Return whether all columns are counts with the gain of their channel's calibration.
 
-    Parameters
-    ----------
-    per_count
-        Value of one count of each column, as stated in the file; None if the file states none.
+    `per_count` are the values of one count of each column by the file; None if it states none.
     """
     gains = [found or c.per_count for c, found in zip(job.channels, per_count, strict=True)]
     return all(
@@ -251,10 +248,7 @@ def engineering_units(
 ) -> SampleArray:
     """Return the values (n,) of a column in the unit of its channel; counts are scaled.
 
-    Parameters
-    ----------
-    per_count
-        Value of one count as stated in the file; None if the file states none.
+    `per_count` is the value of one count by the file; None if the file states none.
     """
     gain = channel.factor * (per_count or channel.per_count or 1.0)
     with np.errstate(over="ignore"):  # overflow to infinity marks the sample as unusable
