@@ -1,6 +1,6 @@
 """Take pictures of every page of the dashboard: `make screenshots`.
 
-Starts the demo plant, waits for its alarm and the recording made for it (some ten minutes), makes
+Starts the demo plant, waits for its danger and the recording made for it (some ten minutes), makes
 an account and a key, and takes each page light and dark, on a screen and on a phone, into
 build/screenshots; what the documentation shows goes to docs/pictures as well. `--url` takes a
 service that runs already; its accounts and keys stay as they are. At last, or alone with the name
@@ -135,9 +135,9 @@ async def prepare(url: str) -> None:
 
 
 async def await_recording(service: APIRequestContext) -> None:
-    """Wait until one is on the disk."""
+    """Wait for those around the alert and the danger: the cause is named by then."""
     began_s = time.monotonic()
-    while not (await (await service.get("recordings")).json())["recordings"]:
+    while len((await (await service.get("recordings")).json())["recordings"]) < 2:
         if time.monotonic() - began_s > WAIT_S:
             sys.exit(f"no alarm within {WAIT_S:.0f} s: nothing to show")
         await asyncio.sleep(5.0)
