@@ -103,7 +103,7 @@ class Context:
     def unit(self, unit: str) -> UnitSettings:
         """Return the settings of a unit; raise a problem of status 404 for an unknown unit."""
         if unit not in self.units:
-            raise ProblemError(404, "Unknown unit", f"there is no unit {unit!r} in this plant")
+            raise ProblemError(404, "Unknown unit", f"unknown unit {unit!r}; see /api/v1/units")
         return self.units[unit]
 
     def bearing(self, unit: str, bearing: str) -> BearingSettings:

@@ -81,9 +81,7 @@ class Problem(BaseModel):
     )
     title: str = Field(description="Kind of problem.", examples=["Unknown unit"])
     status: int = Field(description="HTTP status.", examples=[404])
-    detail: str = Field(
-        description="Description of this problem.", examples=["there is no unit 'U9' in this plant"]
-    )
+    detail: str = Field(description="Description of this problem.", examples=["unknown unit 'U9'"])
     instance: str = Field(description="Path of the request.", examples=["/api/v1/units/U9"])
     errors: list[Mistake] = Field(
         description="Wrong parameters; at most the first few.", default_factory=list
@@ -158,7 +156,7 @@ async def refuse_unknown_parameters(request: Request) -> None:
     length = request.headers.get("content-length", "0")
     has_body = length != "0" or "transfer-encoding" in request.headers
     if route.body_field is None and has_body:
-        raise ProblemError(400, "Unexpected body", "this request takes no body")
+        raise ProblemError(400, "Unexpected body", "this request takes no body; omit it")
     operation = f"{request.method} {route.path}"
     known = request.app.declared[operation].query_parameters
     for name in request.query_params:

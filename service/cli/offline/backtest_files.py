@@ -60,7 +60,7 @@ def read_histories(
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):
-            raise ReadingsError("the path is not a regular file")
+            raise ReadingsError("not a regular file; give a CSV or Parquet file")
         with path.open("rb") as stream:
             word = "row" if stream.read(len(MAGIC)) == MAGIC else "line"
         return histories_of(_columns(path, word, advanced), places, word)
@@ -121,7 +121,7 @@ def _check_names(key: str, column: Any, names: set[str], line: Any, word: str) -
         names.add(name)
     if len(names) > MAX_NAMES:
         raise ReadingsError(
-            f"more than {MAX_NAMES} different names in column {key} up to {word} {line[-1]}"
+            f"more than {MAX_NAMES} names in column {key} up to {word} {line[-1]}; check the column"
         )
 
 

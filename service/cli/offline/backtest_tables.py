@@ -61,7 +61,7 @@ def _checked(text: bytes, first: int) -> Lines:
         text.decode()
     except UnicodeDecodeError as error:
         number = first + text.count(b"\n", 0, error.start)
-        raise ReadingsError(f"line {number}: the line is not valid UTF-8") from error
+        raise ReadingsError(f"line {number}: not valid UTF-8; convert the file") from error
     return (text, np.array([n for n, line in enumerate(lines, first) if line.rstrip(b"\r")]))
 
 

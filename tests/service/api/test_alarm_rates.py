@@ -68,7 +68,7 @@ async def test_a_quiet_plant_has_rates_of_zero_of_spans_that_can_be_counted(read
     assert found["all"]["share_by_level"] == {"alert": 0.0, "danger": 0.0}
     assert (found["is_complete"], found["stale"]) == (True, [])
     for parameters, status, words in (
-        ({"unit": "U9"}, 404, "no unit 'U9'"),
+        ({"unit": "U9"}, 404, "unknown unit 'U9'"),
         ({"start": "2026-01-02T00:00:00Z", "end": "2026-01-01T00:00:00Z"}, 422, "must be before"),
         ({"start": "2020-01-01T00:00:00Z", "end": "2026-01-01T00:00:00Z"}, 422, "400 days"),
     ):

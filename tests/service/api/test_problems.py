@@ -26,7 +26,7 @@ async def test_an_unknown_unit_bearing_or_path_is_not_found(read_only):
     for path in (*units, *(f"{bearing}/{what}" for what in ("latest", "spectrum", "orbit"))):
         problem = await read_only.problem(f"/api/v1/units/{path}", 404)
         assert problem["title"] == "Unknown unit"
-        assert "there is no unit" in problem["detail"]
+        assert "unknown unit" in problem["detail"]
     for what in ("", "/latest", "/spectrum", "/orbit"):
         problem = await read_only.problem(f"/api/v1/units/U1/bearings/XJB{what}", 404)
         assert problem["detail"] == "unit 'U1' has no bearing 'XJB'"

@@ -87,7 +87,7 @@ def test_ten_lines_are_named_the_others_counted_and_other_encodings_refused(text
     assert "line 21: u_random is not a number: 'x'; and 10 more" in said
     assert (
         refusal(text(line(100, unit="Ü")).encode("latin-1"))
-        == "line 12: the line is not valid UTF-8"
+        == "line 12: not valid UTF-8; convert the file"
     )
     assert refusal(text().encode("utf-16")) == "line 1: the line contains a NUL byte"
 
