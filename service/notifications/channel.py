@@ -114,7 +114,7 @@ def _context(ca_file: str | None) -> ssl.SSLContext:
     try:
         return ssl.create_default_context(cafile=ca_file)
     except (OSError, ValueError) as error:  # ssl.SSLError is an OSError
-        raise OSError(f"ca_file {ca_file}: {error}") from error
+        raise OSError(f"ca_file {ca_file} cannot be used: {error}") from error
 
 
 async def connected_socket(look_up: NameLookUp, port: int, timeout_s: float) -> socket.socket:

@@ -150,7 +150,7 @@ class Composer:
         self._context, self._new_id = context, new_id
 
     def alarm(self, alarm: Alarm, event: AlarmEvent, is_active: bool, now_ns: int) -> Message:
-        """Return the message about an event of an alarm, written at the time `now_ns`.
+        """Return the message about an event of an alarm, written at `now_ns`, ns since 1970 UTC.
 
         `alarm` is the alarm after the event, and `is_active` whether receivers regard it as active.
         """
@@ -182,7 +182,7 @@ class Composer:
         }
 
     def test(self, now_ns: int) -> Message:
-        """Return a test message, written at the time `now_ns`."""
+        """Return a test message, written at the time `now_ns`, ns since 1970 UTC."""
         return self._head("test", now_ns)
 
     def _head(self, type_: str, now_ns: int) -> Message:

@@ -235,7 +235,7 @@ def _rows(manifest: Manifest, unit: Unit, bearing: Bearing) -> Mapping[str, int]
     configured = {channel.id: channel.measurand for channel in unit.channels}
     for id_ in (bearing.shaft_x, bearing.shaft_y):
         if id_ not in recorded:
-            raise NoMotionError(f"channel {id_} of bearing {bearing.id} was not recorded")
+            raise NoMotionError(f"the recording lacks channel {id_} of bearing {bearing.id}")
         if recorded[id_][1] is not configured[id_]:
             then, now = recorded[id_][1], configured[id_]
             raise NoMotionError(f"channel {id_} was recorded as {then}, but is configured as {now}")

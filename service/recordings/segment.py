@@ -120,7 +120,7 @@ class CaptureFile:
 
 
 def write_alarms(path: Path, alarms: Sequence[AlarmEvent]) -> None:
-    """Write alarm events to a JSON file with a checksum, synced. Raises `OSError` if this fails."""
+    """Write alarm events to a JSON file with a checksum, durable on return; may raise `OSError`."""
     document: dict[str, object] = {"alarms": [_alarm(event) for event in alarms]}
     text = json.dumps(document | {"checksum": checksum_of(document)}, indent=1) + "\n"
     write_synced(path, text.encode())
@@ -292,7 +292,7 @@ def _readable(folder: Path, parts: Path) -> Iterator[Recording]:
         except ConfigError as error:
             aside = part.rename(damaged_folder(folder, part))
             log.error(
-                "an unreadable part of a continuous recording is set aside",
+                "an unreadable part of a continuous recording was set aside",
                 folder=aside.name,
                 reason=str(error),
             )

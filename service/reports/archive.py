@@ -145,13 +145,13 @@ class EvidenceArchive:
             text = (place.folder / DOCUMENT).read_bytes()
             found = Evidence.model_validate_json(text)
         except (OSError, ValidationError) as error:
-            why = f"{place.folder.name}: {DOCUMENT} cannot be read: {error}; restore a copy"
+            why = f"{place.folder.name}: {DOCUMENT} cannot be read: {error}; restore a backup"
             raise DamagedEvidenceError(why) from error
         content = json.loads(text)
         del content["sha256"]
         if hashlib.sha256(canonical(content)).hexdigest() != found.sha256:
             why = "was changed since it was written: its SHA-256 differs from the stored one"
-            raise DamagedEvidenceError(f"{place.folder.name}: {DOCUMENT} {why}; restore a copy")
+            raise DamagedEvidenceError(f"{place.folder.name}: {DOCUMENT} {why}; restore a backup")
         return found
 
     def samples(self, found: Occurrence, capturing: Occurrences) -> SamplesState:

@@ -34,7 +34,7 @@ NAME = re.compile(
 class Place:
     """Location of a bundle, and its alarm.
 
-    `moment` is the UTC time of the event in the folder's name, as `compact` writes it.
+    `moment` is the UTC time of the event in the folder's name, such as 20260101T000000.000Z.
     """
 
     folder: Path

@@ -106,7 +106,10 @@ def shortened(text: str, longest: int = LONGEST) -> str:
 
 
 def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
-    """Yield name and text of each fact at the top of the report of the time `now`."""
+    """Yield name and text of each fact at the top of a report.
+
+    `now` is the time of the report as text.
+    """
     evidence, alarm = case.evidence, case.evidence.alarm
     unit = evidence.unit
     where = [evidence.plant, unit.name if unit and unit.name else alarm.unit, alarm.subject]

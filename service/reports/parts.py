@@ -268,7 +268,7 @@ class TimeScalePart(EvidencePart):
 
 
 class MembersPart(EvidencePart):
-    """Readings in the cell that the baseline was learned from, by column."""
+    """Readings of the current cell in the learning period of the baseline, by column."""
 
     n_in_all: int
     """Number of readings in the cell; of many readings, an evenly spaced selection is listed."""

@@ -130,7 +130,7 @@ def read_table(path: Path) -> Columns:
     try:
         columns: Columns = pq.read_table(path, memory_map=False).to_pydict()
     except (OSError, pa.ArrowException) as error:
-        raise TableError(f"{path.name}: {error}") from error
+        raise TableError(f"{path.name}: {error}; restore a backup") from error
     return columns
 
 

@@ -279,7 +279,7 @@ class ChannelSettings(Settings):
 
     @property
     def scale(self) -> dict[str, float]:
-        """Arguments of `ChannelCalibration`; with `unit_per_count`, one count is treated as 1 V."""
+        """Arguments of `ChannelCalibration`, by name; with `unit_per_count`, a count is 1 V."""
         full_scale, low, high = (getattr(self, key) for key in SCALE_KEYS_V)
         if self.unit_per_count is not None:
             limits = (

@@ -135,7 +135,7 @@ ZONE_DEADBAND = 0.05
 def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitRules:
     """Return the alarm rules of a unit.
 
-    A replay has no rules for link and clock; a unit with ``clock = "ignored"`` has none for clock.
+    A replay has no rules for link and clock; a unit with ``clock = "ignored"`` has no clock rule.
     """
     is_live = origin is Origin.LIVE
     is_judged = is_live and alarms.clock == "judged"

@@ -96,7 +96,7 @@ class WatchSettings(Settings):
 
 
 class LimitTableSettings(RegionSettings):
-    """Limits in one region of operating conditions; keys not given are those of the main table."""
+    """Limits in one region of operating conditions; missing keys are taken from the main table."""
 
     alert: float | None = None
     """Alert limit in this region; by default `alert` of the main table."""

@@ -75,7 +75,7 @@ class QuietSettings(Settings):
         return self
 
     def include(self, time_ns: int) -> bool:
-        """Return whether a time, ns since 1970 UTC, is in the quiet hours (without their end)."""
+        """Return whether a time, ns since 1970 UTC, is in the quiet hours; the end is excluded."""
         moment = datetime.fromtimestamp(time_ns // NS_PER_S, ZoneInfo(self.time_zone)).time()
         start, end = time.fromisoformat(self.start), time.fromisoformat(self.end)
         return start <= moment < end if start < end else moment >= start or moment < end

@@ -51,6 +51,6 @@ class VectorReferenceSettings(Settings):
         return self
 
     def vectors(self) -> dict[str, Vector]:
-        """Return the configured vectors by measuring point: shaft or bearing, x or y."""
+        """Return the configured vectors by measuring point, such as "shaft_x"."""
         found = {place: getattr(self, place) for place in PLACES}
         return {place: vector for place, vector in found.items() if vector is not None}

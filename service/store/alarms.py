@@ -83,7 +83,10 @@ def insert_alarms(
 
 
 def select_alarms(reader: Connection) -> list[Alarm]:
-    """Return the current state of every alarm with events; raise `StoreError` if one is invalid."""
+    """Return the current state of all alarms, ordered by alarm id.
+
+    Raises `StoreError` if a stored alarm is invalid.
+    """
     return [_alarm(row) for row in reader.execute(SELECT_ALARMS)]
 
 

@@ -28,7 +28,7 @@ class Summaries:
     names
         Names of the quantities.
     time_ns : (n,)
-        Times of single readings, or starts of aggregated time spans.
+        Times of single readings, or starts of aggregated time spans, in ns since 1970 UTC.
     count : (n, n_names)
         Number of usable readings.
     mean, minimum, maximum : (n, n_names)

@@ -224,7 +224,7 @@ class Outbox(Tables):
             return writer.execute(REVIVE, (now_ns, receiver)).rowcount
 
     def backlogs(self) -> list[Backlog]:
-        """Return the delivery statistics of every receiver that has had a message."""
+        """Return the delivery statistics of all receivers with messages, ordered by name."""
         with self._reading() as reader:
             names = reader.execute("SELECT DISTINCT receiver FROM outbox ORDER BY receiver")
             return [_backlog(reader, str(name)) for (name,) in names.fetchall()]

@@ -102,7 +102,7 @@ class Trend:
     bucket_ns
         Width of the buckets; None for single readings.
     time_ns
-        Start times of the buckets, or times of the single readings.
+        Start times of the buckets, or times of the single readings, in ns since 1970 UTC.
     series
         Statistics of the readings by quantity.
     next_ns
@@ -120,7 +120,7 @@ class Trend:
 
 @dataclass(frozen=True)
 class StoredReadings:
-    """Stored readings of one bearing at one time, by quantity."""
+    """Stored readings of one bearing at one time, ns since 1970 UTC, by quantity."""
 
     time_ns: int
     readings: Mapping[str, Reading]

@@ -115,7 +115,7 @@ class UnitStates(Tables):
                     writer.execute(UPSERT_REPORT, (*astuple(report), process))
 
     def beats(self) -> list[UnitBeat]:
-        """Return the newest status report on each unit, without the state documents."""
+        """Return the newest status report on each unit, ordered by unit id, without states."""
         with self._reading() as reader:
             return [UnitBeat(*row) for row in reader.execute(SELECT_BEATS)]
 

@@ -57,7 +57,7 @@ class StoredSpectrum:
     Parameters
     ----------
     time_ns
-        Time of the end of the averaged samples.
+        Time of the end of the averaged samples, in ns since 1970 UTC.
     duration_s
         Duration of the averaged samples.
     n_segments

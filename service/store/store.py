@@ -222,7 +222,7 @@ class Store:
             return select_position(reader, unit)
 
     def alarms(self) -> list[Alarm]:
-        """Return the current state of every alarm that has had an event."""
+        """Return the current state of every alarm that has had an event, ordered by alarm id."""
         with self._reader() as reader:
             return select_alarms(reader)
 

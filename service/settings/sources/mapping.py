@@ -75,7 +75,7 @@ class CsvSettings(Settings):
 
 
 class MappedColumn(Settings):
-    """Assignment of a column of the file to a channel of the unit."""
+    """Assignment of a column of an imported file to a channel of the unit."""
 
     id: Identifier
     """Id of the channel in the plant file; example: "ujb_shaft_x"."""
@@ -93,7 +93,7 @@ class MappedColumn(Settings):
 
 
 class MappedChannel(MappedColumn):
-    """Assignment of a column of the file to a waveform channel."""
+    """Assignment of a column of an imported file to a waveform channel."""
 
     unit_per_count: Annotated[float, Field(allow_inf_nan=False)] | None = None
     """Scale in `unit` per count, if the column contains counts of the converter; example:
@@ -101,7 +101,7 @@ class MappedChannel(MappedColumn):
 
 
 class MappedSlowChannel(MappedColumn):
-    """Assignment of a column of the file to a slow channel."""
+    """Assignment of a column of an imported file to a slow channel."""
 
     time_column: ColumnName | None = None
     """Time column of a slow channel whose rate differs from that of the waveforms; its format is

@@ -233,7 +233,7 @@ class CommitMarks:
         self._put(writer, last, max(last.n_commits, n_before) + 1)
 
     def adopted(self) -> None:
-        """Write the accepted mark to the file; if the write fails, the differences remain."""
+        """Write the accepted mark to the file; if the write fails, `found` is unchanged."""
         if self._newest is None:
             return
         try:

@@ -143,7 +143,10 @@ class DeletedUntil:
         return self.of(SINGLE_S)
 
     def of(self, width_s: int) -> int:
-        """Return the time, ns since 1970 UTC, up to which data of a width were deleted, or 0."""
+        """Return the time up to which data of the width `width_s` were deleted.
+
+        The time is in ns since 1970 UTC; 0 if no data were deleted.
+        """
         return self.until_ns.get(width_s, 0)
 
     def kept_ns(self, time_ns: int) -> tuple[int, ...]:
@@ -168,5 +171,5 @@ def select_deleted(reader: Connection, series: int) -> DeletedUntil:
 
 
 def set_deleted(writer: Connection, series: int, width_s: int, until_ns: int) -> None:
-    """Write the time up to which data of a width are deleted, in the deleting transaction."""
+    """Write the time, ns since 1970 UTC, up to which data of a width are deleted."""
     writer.execute(SET_DELETED, (series, width_s, until_ns))
