@@ -100,6 +100,10 @@ class Context:
             found.append((news and news.reading.time_ns, baseline and baseline.origin.version))
         return tuple(found)
 
+    def past_revision(self, unit: str, times: tuple[int, int]) -> Hashable:
+        """Return a value that changes with a time range and with the stored results in it."""
+        return times, self.live.past_revision(unit, times[1])
+
     def unit(self, unit: str) -> UnitSettings:
         """Return the settings of a unit; raise a problem of status 404 for an unknown unit."""
         if unit not in self.units:

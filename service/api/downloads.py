@@ -6,6 +6,8 @@ from typing import Any, TypeVar
 
 from fastapi.responses import StreamingResponse
 
+from service.api.problems import ProblemError
+
 SLOTS = 2
 """Maximum number of evidence reports and download pieces that are produced concurrently."""
 
@@ -13,10 +15,6 @@ MAX_DOWNLOADS = 16
 """Maximum number of concurrent downloads; a download uses a slot only to produce a piece."""
 
 T = TypeVar("T")
-
-
-class TooManyDownloadsError(Exception):
-    """Raised if the maximum number of concurrent downloads is reached."""
 
 
 class Downloads:
@@ -36,11 +34,12 @@ class Downloads:
 
         Raises
         ------
-        TooManyDownloadsError
-            If `MAX_DOWNLOADS` downloads are in progress.
+        ProblemError
+            With status 503 if `MAX_DOWNLOADS` downloads are in progress.
         """
         if self._n >= MAX_DOWNLOADS:
-            raise TooManyDownloadsError(f"the maximum of {MAX_DOWNLOADS} downloads is reached")
+            detail = f"the maximum of {MAX_DOWNLOADS} downloads is reached; try again later"
+            raise ProblemError(503, "Busy", detail)
 
     async def download(self, pieces: Generator[bytes, None, None]) -> AsyncIterator[bytes]:
         """Return an iterator over the pieces of a download; the first piece is produced at once.
@@ -52,8 +51,8 @@ class Downloads:
 
         Raises
         ------
-        TooManyDownloadsError
-            If `MAX_DOWNLOADS` downloads are in progress.
+        ProblemError
+            With status 503 if `MAX_DOWNLOADS` downloads are in progress.
         """
         self.require_room()
         first = await self.worked(lambda: next(pieces, b""))  # the first piece opens all files

@@ -184,8 +184,3 @@ OnlyUnit = Annotated[
 def only(description: str, example: str, max_length: int | None = None) -> Any:
     """Return the declaration of a query parameter that selects entries by one property."""
     return Query(max_length=max_length, description=f"Only this {description}.", examples=[example])
-
-
-def before_number(description: str) -> Any:
-    """Return the declaration of a paging parameter that selects entries with smaller numbers."""
-    return Query(ge=1, le=10**15, description=description, examples=[117])

@@ -5,6 +5,7 @@ import socket
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 
 from acquisition.clock import Clock
 from service.api.auth.authenticator import Authenticator
@@ -17,7 +18,7 @@ from service.app.serving_process import context_of, references_of, serve_request
 from service.app.storage import open_access, open_store
 from service.app.web import access_desk
 from service.cluster.replica_metrics import replica_metrics
-from service.cluster.serving_side import DatabaseOperators, Feed, ReplicaDeliveries
+from service.cluster.serving_side import DatabaseOperators, Feed, replica_receivers
 from service.live.client import LiveClient
 from service.runtime.heartbeats import Heartbeats, Pulse
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
@@ -34,7 +35,8 @@ class Replica:
         self.live = LiveClient(plant, store.films, clock)
         self.feed = Feed(store, self.live, clock)
         self.references = references_of(plant, store, clock)
-        self.deliveries = ReplicaDeliveries(receivers_of(plant, Origin.LIVE, clock), store.outbox)
+        its = receivers_of(plant, Origin.LIVE, clock)
+        self.receivers = partial(asyncio.to_thread, replica_receivers, its, store.outbox)
 
     async def start(self) -> None:
         """Read the present state of the plant; call it before the first request.
@@ -60,7 +62,7 @@ class Replica:
 
     async def _metrics(self) -> bytes:
         kind = self._store.kind
-        return await replica_metrics(self._plant, self.live, self.deliveries, self._clock, kind)
+        return await replica_metrics(self._plant, self.live, self.receivers, self._clock, kind)
 
     def context(self, desk: Authenticator, beats: Heartbeats) -> Context:
         """Return the API context of this process."""
@@ -71,7 +73,7 @@ class Replica:
         )
         return replace(
             context,
-            receivers=self.deliveries.look,
+            receivers=self.receivers,
             metrics=self._metrics,
             loops=beats.look,
             checks=self.checks,

@@ -35,17 +35,14 @@ def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) ->
     last_start
         Audit entry of the previous start; None for the first start.
     """
-    before, now = _configuration_of(last_start), release[CONFIGURATION]
+    last = json.loads(last_start.after) if last_start and last_start.after else None
+    before = last.get(CONFIGURATION) if isinstance(last, dict) else None
+    now = release[CONFIGURATION]
     started = AuditAction(now_ns, PADWATCH, STARTED, SERVICE, after=release)
     if before is None or before == now:
         return [started]
     versions = ({CONFIGURATION: before}, {CONFIGURATION: now})
     return [AuditAction(now_ns, PADWATCH, CHANGED, CONFIGURATION, *versions), started]
-
-
-def _configuration_of(start: AuditEntry | None) -> str | None:
-    document = json.loads(start.after) if start and start.after else None
-    return document.get(CONFIGURATION) if isinstance(document, dict) else None
 
 
 log = structlog.get_logger()

@@ -1,11 +1,13 @@
 """Prometheus metrics of a replica, which is a process that only serves HTTP."""
 
+from collections.abc import Awaitable, Callable, Sequence
+
 from prometheus_client.process_collector import ProcessCollector
 
 from acquisition.clock import Clock
-from service.cluster.serving_side import ReplicaDeliveries
 from service.live.client import LiveClient
 from service.live.metrics import add_alarms, add_films, add_units
+from service.live.receivers import ReceiverView
 from service.notifications.metrics import add_deliveries
 from service.runtime.metrics import Families
 from service.settings.plant import PlantFile
@@ -22,15 +24,16 @@ REPORTS = {
 async def replica_metrics(
     plant: PlantFile,
     live: LiveClient,
-    deliveries: ReplicaDeliveries,
+    receivers: Callable[[], Awaitable[Sequence[ReceiverView]]],
     clock: Clock,
     store_kind: str,
 ) -> bytes:
     """Return the metrics of a replica and of the units reported to it, as Prometheus text."""
+    views: Sequence[ReceiverView] | None
     try:
-        receivers = await deliveries.look()
+        views = await receivers()
     except StoreError:
-        receivers = None
+        views = None
     bearings = {unit.id: [bearing.id for bearing in unit.bearing] for unit in plant.unit}
     families, units = Families(), live.units
     families.add_program(store_kind)
@@ -42,6 +45,6 @@ async def replica_metrics(
     add_units(families, units, bearings)
     add_films(families, units, live.films.newest, bearings)
     add_alarms(families, live.alarms.alarms, live.alarms.count(), list(bearings))
-    add_deliveries(families, receivers, clock.now_ns())
+    add_deliveries(families, views, clock.now_ns())
     families.include(ProcessCollector(registry=None))
     return families.text

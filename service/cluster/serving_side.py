@@ -161,30 +161,23 @@ class DatabaseOperators(Operators):
         return self._store.commands.look(command.id) or found
 
 
-class ReplicaDeliveries:
-    """State of the notification receivers in a replica, which reads the outbox without sending."""
+def replica_receivers(receivers: Sequence[Receiver], outbox: Outbox) -> list[ReceiverView]:
+    """Return the state of the notification receivers in a replica, which reads the outbox only.
 
-    def __init__(self, receivers: Sequence[Receiver], outbox: Outbox) -> None:
-        self._receivers, self._outbox = receivers, outbox
+    Raises `StoreError` if the outbox cannot be read.
+    """
+    statuses = [
+        ReceiverStatus(r.name, r.settings.kind, r.channel.address, _status(outbox, r.name))
+        for r in receivers
+    ]
+    return receiver_views(statuses, outbox)
 
-    async def look(self) -> list[ReceiverView]:
-        """Return the state of all receivers; raise `StoreError` if the outbox cannot be read."""
-        return await asyncio.to_thread(self._look)
 
-    def _look(self) -> list[ReceiverView]:
-        statuses = [
-            ReceiverStatus(
-                each.name, each.settings.kind, each.channel.address, self._status(each.name)
-            )
-            for each in self._receivers
-        ]
-        return receiver_views(statuses, self._outbox)
-
-    def _status(self, name: str) -> SenderStatus:
-        """Return the sender status of a receiver, from its oldest waiting message."""
-        for first in self._outbox.waiting(name, 1):
-            if not first.n_attempts:
-                return SenderStatus(SenderState.SENDING)
-            n_attempts, since_ns = first.n_attempts, first.queued_ns
-            return SenderStatus(SenderState.RETRYING, n_attempts, since_ns, first.answer)
-        return SenderStatus()
+def _status(outbox: Outbox, name: str) -> SenderStatus:
+    """Return the sender status of a receiver, from its oldest waiting message."""
+    for first in outbox.waiting(name, 1):
+        if not first.n_attempts:
+            return SenderStatus(SenderState.SENDING)
+        n_attempts, since_ns = first.n_attempts, first.queued_ns
+        return SenderStatus(SenderState.RETRYING, n_attempts, since_ns, first.answer)
+    return SenderStatus()

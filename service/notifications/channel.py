@@ -77,7 +77,11 @@ def read_secret(settings: SecretSettings) -> str:
     file = settings.file
     place = f"environment variable {settings.env}" if file is None else f"file {file}"
     try:
-        text = os.environ.get(settings.env or "", "") if file is None else _start_of(Path(file))
+        if file is None:
+            text = os.environ.get(settings.env or "", "")
+        else:
+            with Path(file).open("rb") as opened:
+                text = opened.read(MAX_SECRET_BYTES).decode()
     except OSError as error:
         raise SecretError(f"{place} cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
@@ -86,11 +90,6 @@ def read_secret(settings: SecretSettings) -> str:
     if not text or not text.isprintable():
         raise SecretError(f"{place} must hold a single line of printable text")
     return text
-
-
-def _start_of(path: Path) -> str:
-    with path.open("rb") as file:
-        return file.read(MAX_SECRET_BYTES).decode()
 
 
 class TrustedAuthorities:

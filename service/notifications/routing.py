@@ -14,6 +14,7 @@ ACTIVE = (AlarmState.UNACKNOWLEDGED, AlarmState.ACKNOWLEDGED)
 
 HIDING = (AlarmChange.SHELVED, AlarmChange.SUPPRESSED, AlarmChange.TAKEN_OUT_OF_SERVICE)
 SHOWING = (AlarmChange.UNSHELVED, AlarmChange.UNSUPPRESSED, AlarmChange.RETURNED_TO_SERVICE)
+BEGINNING = (AlarmChange.RAISED, AlarmChange.ESCALATED)
 ENDING = (AlarmChange.RETURNED, AlarmChange.RESET)
 
 LEVELS = {"alert": AlarmLevel.ALERT, "danger": AlarmLevel.DANGER}
@@ -82,13 +83,14 @@ class Router:
         now_ns = self._now_ns()
         message = self._composer.alarm(alarm, event, notice.is_active, now_ns)
         body = dumps(message)
+        is_danger = event.level is AlarmLevel.DANGER
         return [
             OutboxMessage(
                 receiver=name,
                 event_id=message["id"],
                 body=body,
                 queued_ns=now_ns,
-                is_urgent=_is_urgent(event, wanted),
+                is_urgent=is_danger and wanted.change in BEGINNING,
                 is_active=wanted.is_active,
                 closes=wanted.ends,
             )
@@ -120,8 +122,3 @@ def _shown(event: AlarmEvent) -> Notice | None:
     if event.state_after in ACTIVE:
         return Notice(AlarmChange.RAISED, is_active=True, ends=False)
     return Notice(AlarmChange.RETURNED, is_active=False, ends=True)
-
-
-def _is_urgent(event: AlarmEvent, notice: Notice) -> bool:
-    begins = notice.change in (AlarmChange.RAISED, AlarmChange.ESCALATED)
-    return begins and event.level is AlarmLevel.DANGER

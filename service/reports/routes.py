@@ -15,7 +15,7 @@ from acquisition.clock import Clock
 from service.api.auth.declared import needs
 from service.api.auth.gate import identity_of
 from service.api.context import Context
-from service.api.downloads import Downloads, TooManyDownloadsError, attachment, file_content
+from service.api.downloads import Downloads, attachment, file_content
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.alarms import AlarmId
 from service.api.values import ApiModel, ByName, Time
@@ -147,7 +147,7 @@ class EvidenceService:
         ------
         DamagedEvidenceError, TableError, LookupError, OSError
             If the bundle cannot be read, or does not exist.
-        TooManyDownloadsError
+        ProblemError
             If too many downloads are in progress.
         """
         self._downloads.require_room()
@@ -254,8 +254,6 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
         found = await _complete(context, held, alarm, occurrence)
         try:
             pieces = await held.bundle(found, has_configuration=not identity_of(request).units)
-        except TooManyDownloadsError as error:
-            raise ProblemError(503, "Busy", f"{error}; try again later") from error
         except (DamagedEvidenceError, TableError, OSError) as error:
             raise _damaged(error) from error
         name = quote(f"padwatch-{alarm.replace(':', '-')}-{occurrence}.zip")

@@ -64,8 +64,10 @@ def orbits_table(found: Iterable[Assessment]) -> bytes | None:
     return _written(pa.concat_tables(tables)) if tables else None
 
 
+OPERATION = ("speed_rpm", "power_mw", "eccentricity_ratio", "attitude_deg", "oil_temperature_c")
+MEASURED = ("u_random", "shaft_um_pk", "bearing_um_pk")
 CHANGES = ("change", "change_std", "deviation", "deviation_std")
-"""Columns of damping over stiffness, in rows after those of the stiffness."""
+"""Columns with two rows of stiffness, then two of damping over stiffness."""
 
 
 def trend_table(found: FilmHistory) -> bytes:
@@ -83,13 +85,8 @@ def _trend(found: FilmHistory) -> "pa.Table":
     shared: dict[str, AnyArray] = {
         "time_ns": history.time_ns,
         "operating_state": found.state,
-        "is_settled": found.is_settled,
-        "is_simulated": found.is_simulated,
-        "speed_rpm": history.speed_rpm,
-        "power_mw": history.power_mw,
-        "eccentricity_ratio": history.eccentricity_ratio,
-        "attitude_deg": history.attitude_deg,
-        "oil_temperature_c": history.oil_temperature_c,
+        **{name: getattr(found, name) for name in ("is_settled", "is_simulated")},
+        **{name: getattr(history, name) for name in OPERATION},
         "baseline_version": found.baseline_version,
     }
     pairs: dict[str, AnyArray] = {
@@ -97,15 +94,10 @@ def _trend(found: FilmHistory) -> "pa.Table":
         for row, axis in enumerate(AXES)
         for name, column in (
             ("stiffness", np.exp(history.ln_k)),
-            ("u_random", history.u_random),
-            ("shaft_um_pk", history.shaft_um_pk),
-            ("bearing_um_pk", history.bearing_um_pk),
+            *((name, getattr(history, name)) for name in MEASURED),
             ("verdict", WORDS[found.verdict]),
             ("level", found.level),
-            ("change", found.change),
-            ("change_std", found.change_std),
-            ("deviation", found.deviation),
-            ("deviation_std", found.deviation_std),
+            *((name, getattr(found, name)) for name in CHANGES),
             ("ck_s", np.exp(history.ln_ck)),
             ("u_ck", history.u_ck),
             *((f"ck_{name}", getattr(found, name)[2:]) for name in CHANGES),

@@ -212,10 +212,6 @@ class Authenticator:
         now_ns = self.clock.now_ns()
         return await self.work.run(lambda: self.service.offer_set_up(now_ns))
 
-    async def has_accounts(self) -> bool:
-        """Whether any account exists."""
-        return bool(await self.work.run(self.store.accounts.all))
-
     async def close(self) -> None:
         """Record the number of refused requests without an audit entry; shut down the threads."""
         await self.refusals.close()

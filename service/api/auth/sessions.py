@@ -210,7 +210,9 @@ async def session_model(caller: Caller, authenticator: Authenticator) -> Session
     """Return the API model of a caller with its identity and permissions."""
     identity = caller.identity
     may_all = identity is not None and (identity.is_proven or identity.role is Role.ADMIN)
-    needs_set_up = not may_all and not await authenticator.has_accounts()
+    needs_set_up = not may_all and not await authenticator.work.run(
+        authenticator.store.accounts.all
+    )
     return SessionModel(
         login_required=caller.must_log_in,
         set_up_needed=needs_set_up,

@@ -172,7 +172,11 @@ def alarm_rate_router(context: Context) -> APIRouter:
         end_ns = ns_from_datetime(end, "end") if end else now_ns
         default_ns = max(end_ns - DEFAULT_DAYS * DAY_NS, 0)
         start_ns = ns_from_datetime(start, "start") if start else default_ns
-        _check_span(start_ns, end_ns)
+        require_order(start_ns, end_ns)
+        if end_ns - start_ns > MAX_DAYS * DAY_NS:
+            days = (end_ns - start_ns) / DAY_NS
+            detail = f"the range is {days:g} days long; the maximum is {MAX_DAYS} days"
+            raise ProblemError(422, "Wrong parameter", detail, "start")
         if unit not in (None, PLANT):
             context.unit(unit)
         units = list(context.units) if unit is None else [unit]
@@ -183,11 +187,3 @@ def alarm_rate_router(context: Context) -> APIRouter:
         return AlarmRatesModel.of(stale=[alarm_model(engine, films, a) for a in stale], **found)
 
     return router
-
-
-def _check_span(start_ns: int, end_ns: int) -> None:
-    require_order(start_ns, end_ns)
-    if end_ns - start_ns > MAX_DAYS * DAY_NS:
-        days = (end_ns - start_ns) / DAY_NS
-        detail = f"the range is {days:g} days long; the maximum is {MAX_DAYS} days"
-        raise ProblemError(422, "Wrong parameter", detail, "start")

@@ -33,7 +33,6 @@ from service.api.parameters import (
     OnlyUnit,
     OptionalTimeRange,
     States,
-    before_number,
     only,
 )
 from service.api.problems import ProblemError, problem_responses
@@ -333,7 +332,12 @@ async def event_query(
     subject: OnlySubject = None,
     kind: Annotated[AlarmKindName | None, only("kind", "channel_not_ok")] = None,
     level: OnlyLevel = None,
-    before: Annotated[int | None, before_number("Return only events older than this id.")] = None,
+    before: Annotated[
+        int | None,
+        Query(
+            ge=1, le=10**15, description="Return only events older than this id.", examples=[117]
+        ),
+    ] = None,
     limit: Annotated[
         int, Query(ge=1, le=MAX_EVENTS, description="Maximum number of events in the answer.")
     ] = 100,

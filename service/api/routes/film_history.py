@@ -1,6 +1,7 @@
 """Route for the stiffness readings of an oil film over time, with their operating conditions."""
 
-from collections.abc import Hashable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
+from functools import partial
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -339,10 +340,7 @@ def film_history_router(context: Context) -> APIRouter:
             return film_table(*read())
 
         if wanted == "json":
-
-            def revision() -> Hashable:
-                return times, context.live.past_revision(unit, query.end_ns)
-
+            revision = partial(context.past_revision, unit, times)
             return await context.answers.of(request, revision, lambda: read()[0])
         return table_response(wanted, await in_thread(read_columns), f"film-{unit}-{bearing}")
 

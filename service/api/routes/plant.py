@@ -290,13 +290,8 @@ def plant_router(context: Context) -> APIRouter:
             raise ProblemError(404, "No configuration", "this service has no configuration")
         found = context.configuration
         document = json.loads(found.text)
-        return ConfigurationModel(
-            version=found.version,
-            padwatch=document["padwatch"],
-            commit=document["commit"],
-            json_schema=SCHEMA,
-            settings=document["settings"],
-        )
+        shown = {key: document[key] for key in ("padwatch", "commit", "settings")}
+        return ConfigurationModel(version=found.version, json_schema=SCHEMA, **shown)
 
     @router.get(
         "/configuration/schema",

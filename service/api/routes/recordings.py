@@ -12,7 +12,7 @@ from acquisition.errors import ConfigError
 from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import Context
-from service.api.downloads import TooManyDownloadsError, attachment, file_content
+from service.api.downloads import attachment, file_content
 from service.api.parameters import only
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.channels import UNITS, ChannelUnit
@@ -309,8 +309,6 @@ async def _download(
     await entry_of(context, recording)
     try:
         pieces = await context.downloads.download(await in_thread(lambda: make(recording)))
-    except TooManyDownloadsError as error:
-        raise ProblemError(503, "Busy", f"{error}; try again later") from error
     except (ConfigError, OSError) as error:
         raise damaged_recording(recording, error) from error
     return attachment(pieces, media_type, f"{recording}.{suffix}")

@@ -1,6 +1,6 @@
 """Routes for the amplitude spectra of a bearing: newest spectra, and stored spectra over time."""
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Annotated, Literal
 
@@ -34,11 +34,15 @@ from service.settings.core_values import machine_of
 from service.store.spectra import SpectraQuery, StoredSpectrum
 
 
-class PlaceSpectraModel(ApiModel):
-    """Amplitude spectra of one channel over time."""
+class AmplitudeModel(ApiModel):
+    """Base class of amplitude spectra."""
 
     unit: Literal["um_pk"]
-    """Unit of the amplitudes: µm of displacement, zero to peak."""
+    """Unit of the amplitudes: µm of displacement, zero to peak; of full spectra the radius."""
+
+
+class PlaceSpectraModel(AmplitudeModel):
+    """Amplitude spectra of one channel over time."""
 
     amplitude: list[list[float] | None]
     """Amplitudes as one list per time; null for a time at which the channel was not usable."""
@@ -98,21 +102,15 @@ class SpectraModel(BearingHistory):
     readings."""
 
 
-class SpectrumChannelModel(ApiModel):
+class SpectrumChannelModel(AmplitudeModel):
     """Amplitude spectrum of one channel."""
-
-    unit: Literal["um_pk"]
-    """Unit of the amplitudes: µm of displacement, zero to peak."""
 
     amplitude: list[float] | None
     """Amplitude at each frequency; null if the channel is not usable."""
 
 
-class FullSpectrumModel(ApiModel):
+class FullSpectrumModel(AmplitudeModel):
     """Full spectrum of a pair of channels: forward and backward amplitude at each frequency."""
-
-    unit: Literal["um_pk"]
-    """Unit of the amplitudes: µm of displacement, radius of the circle."""
 
     forward: list[float]
     """Amplitude in the direction of rotation of the shaft at each frequency."""
@@ -266,9 +264,7 @@ def spectra_router(context: Context) -> APIRouter:
         places = list(dict.fromkeys(channel or PLACES))
         query = SpectraQuery(unit, bearing, *times, max_spectra)
 
-        def revision() -> Hashable:
-            return times, context.live.past_revision(unit, times[1])
-
+        revision = partial(context.past_revision, unit, times)
         make = partial(_read, context, query, places, max_frequency_hz)
         return await context.answers.of(request, revision, make)
 

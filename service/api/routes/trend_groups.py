@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingState
+from service.api.problems import ProblemError
 from service.api.values import STATE_NAMES, bounds
 from service.store.port import Trend, TrendQuery, ValueRange
 from service.store.store import Store
@@ -19,10 +20,6 @@ SURVEY_POINTS = 5000
 
 BIN_TOLERANCE = 1e-9
 """If a value is closer to a bound than this, in bin widths, the bins on both sides are read."""
-
-
-class TooManyGroupsError(ValueError):
-    """Raised if a query has more than `MAX_GROUPS` groups; the message gives the limit."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +80,8 @@ def trend_groups(
 
     Raises
     ------
-    TooManyGroupsError
-        If there are more than `MAX_GROUPS` groups.
+    ProblemError
+        With status 422 if there are more than `MAX_GROUPS` groups.
     """
     if by == "state":
         found = _by_state(store, query)
@@ -122,5 +119,6 @@ def _bins(store: Store, query: TrendQuery, axis: _Axis) -> list[int]:
             last = math.floor(high / axis.width + BIN_TOLERANCE)
             bins |= set(range(first, min(last, first + MAX_GROUPS) + 1))
     if len(bins) > MAX_GROUPS:
-        raise TooManyGroupsError(f"more than {MAX_GROUPS} groups; request a narrower range")
+        detail = f"more than {MAX_GROUPS} groups; request a narrower range"
+        raise ProblemError(422, "Wrong parameter", detail, "group_by")
     return sorted(bins)

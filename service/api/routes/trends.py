@@ -1,6 +1,6 @@
 """Route for trends: quantities of a bearing over time."""
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Annotated, TypeVar
 
@@ -15,7 +15,7 @@ from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange
 from service.api.problems import ProblemError
-from service.api.routes.trend_groups import GroupName, TooManyGroupsError, TrendGroup, trend_groups
+from service.api.routes.trend_groups import GroupName, TrendGroup, trend_groups
 from service.api.tables import Column, Format, table_content, table_response
 from service.api.values import (
     ApiModel,
@@ -300,9 +300,7 @@ def trend_router(context: Context) -> APIRouter:
         grid = context.films.settings.baseline.settings().grid
         read = partial(_read, context, query, group_by, grid)
         if wanted == "json":
-
-            def revision() -> Hashable:
-                return times, context.live.past_revision(unit, query.end_ns)
+            revision = partial(context.past_revision, unit, times)
 
             def make() -> dict[str, object]:
                 return trend_answer(query, *read())
@@ -323,12 +321,8 @@ def _read(
     """Return the trend, its groups or None, and the end of the simulated readings or None."""
     past_end_ns = context.store.films.past_end_ns(query.unit, query.bearing)
     whole = context.store.trend(query)
-    if group_by is None:
-        return whole, None, past_end_ns
-    try:
-        return whole, trend_groups(context.store, query, group_by, grid), past_end_ns
-    except TooManyGroupsError as error:
-        raise ProblemError(422, "Wrong parameter", str(error), "group_by") from error
+    groups = None if group_by is None else trend_groups(context.store, query, group_by, grid)
+    return whole, groups, past_end_ns
 
 
 def _page_start_ns(cursor: str | None, group_by: GroupName | None, start_ns: int) -> int:

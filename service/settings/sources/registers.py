@@ -307,7 +307,8 @@ def require_apart(values: Sequence[MapValue], base: int) -> None:
         cell = value.cell
         for place in range(cell.start(base), cell.stop(base)):
             other = taken.setdefault((cell.function, place), value)
-            if other is not value and not _are_different_bits(cell, other.cell):
+            are_bits = NumberType.BIT is cell.type is other.cell.type
+            if other is not value and not (are_bits and None is not cell.bit != other.cell.bit):
                 raise MisfitError(
                     f"overlaps the registers of value {other.id!r} (address {other.cell.address},"
                     f" {other.cell.type}); correct one of the addresses",
@@ -315,7 +316,3 @@ def require_apart(values: Sequence[MapValue], base: int) -> None:
                 )
         if value.id in [other.id for other in values[:n]]:
             raise MisfitError(f"contains {value.id!r} twice; each value must be unique", "value")
-
-
-def _are_different_bits(one: Cell, other: Cell) -> bool:
-    return NumberType.BIT is one.type is other.type and None is not one.bit != other.bit
