@@ -363,7 +363,7 @@ class SlowChannelSettings(Settings):
         if self.quantity is None:
             for key in ("bearing", "position", "angle_deg", "limits"):
                 if getattr(self, key) is not None:
-                    raise MisfitError("requires quantity; add quantity or remove it", key)
+                    raise MisfitError("requires quantity; add quantity or remove this key", key)
             return self
         unit, is_pad = SLOW_QUANTITIES[self.quantity].setting, self.quantity == PAD_TEMPERATURE
         if self.unit != unit:

@@ -177,6 +177,6 @@ class CanSettings(Settings):
             for key in ("bitrate", "data_bitrate"):
                 if getattr(self, key) is not None:
                     raise MisfitError(
-                        f"set by the system, not here: ip link set {self.channel} type can {words}",
+                        f"must be set by the system: ip link set {self.channel} type can {words}",
                         key,
                     )

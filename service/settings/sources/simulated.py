@@ -46,7 +46,7 @@ class SimulatedDamageSettings(Settings):
         if (self.after_s is None) == (self.at is None):
             raise MisfitError("exactly one of after_s and at must be given")
         if self.size == 0.0 or (self.size < 0.0 and not self.kind.endswith("_gain")):
-            raise MisfitError("must be above 0, except for a gain", "size")
+            raise MisfitError("must be above 0, or not 0 for a gain", "size")
         return self
 
 

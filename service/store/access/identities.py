@@ -244,8 +244,8 @@ def account_name(written: str) -> str:
     name = written.strip().lower()
     if NAME.fullmatch(name) is None:
         raise NameRefusedError(
-            f"a name must have 1 to {MAX_NAME} of the characters a-z 0-9 . _ @ - and begin and end"
-            " with a letter or a digit"
+            f"a name must have 1 to {MAX_NAME} characters of a-z, 0-9 and . _ @ -, and begin and"
+            " end with a letter or a digit"
         )
     return name
 

@@ -269,7 +269,7 @@ def _require_other_admin(writer: Connection, name: str, role: Role) -> None:
 def _role(writer: Connection, name: str) -> Role:
     row = writer.execute("SELECT role FROM account WHERE name = ?", (name,)).fetchone()
     if row is None:
-        raise UnknownAccountError(f"account {name} does not exist")
+        raise UnknownAccountError(f"account {name} does not exist; check the name")
     return Role(row[0])
 
 

@@ -189,7 +189,7 @@ class CommitMarks:
             if in_file is None:
                 self._file.replace(mark)
                 return
-        lost = f"{self._file.path}: the high-water mark does not exist"
+        lost = f"{self._file.path}: the high-water mark file does not exist"
         self.found = compared(lost if in_file is None else in_file, mark, self._host)
 
     def count(self, writer: Connection) -> None:

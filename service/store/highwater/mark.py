@@ -97,9 +97,9 @@ class MarkFile:
             with _opened(self.path, os.O_RDONLY) as descriptor:
                 return self._newest(_slots(descriptor))
         except FileNotFoundError:
-            raise NoMarkError(f"{self.path}: the high-water mark does not exist") from None
+            raise NoMarkError(f"{self.path}: the high-water mark file does not exist") from None
         except OSError as error:
-            why = f"the high-water mark cannot be read: {error.strerror}"
+            why = f"the high-water mark file cannot be read: {error.strerror}"
             raise MarkError(f"{self.path}: {why}") from error
 
     def advance(self, mark: Mark) -> None:
@@ -124,7 +124,7 @@ class MarkFile:
                     os.pwrite(descriptor, encoded(mark), SLOTS[slots.index(newest) - 1])
                     os.fdatasync(descriptor)
         except FileNotFoundError:
-            raise NoMarkError(f"{self.path}: the high-water mark does not exist") from None
+            raise NoMarkError(f"{self.path}: the high-water mark file does not exist") from None
 
     def replace(self, mark: Mark) -> None:
         """Replace the file by a new file with this mark.
@@ -136,7 +136,7 @@ class MarkFile:
     def _newest(self, slots: list[Mark | None]) -> Mark:
         marks = [mark for mark in slots if mark is not None]
         if not marks:
-            raise MarkError(f"{self.path}: the high-water mark is damaged")
+            raise MarkError(f"{self.path}: the high-water mark file is damaged")
         return max(marks, key=lambda mark: mark.n_commits)
 
 

@@ -112,7 +112,7 @@ def test_a_life_is_no_fixed_scenario(tmp_path):
         ("life_seed = 2\n", "speed_rpm = 92.3\n", "held_load = 0.95: applies only with life_seed"),
         ("life_seed = 2\nheld_load = 0.95\n", "", "damage"),
         ("size = 0.2", "size = 1.2", "damage[1].size = 1.2"),
-        ("size = 0.2", "size = -0.2", "damage[1].size = -0.2: must be above 0, except for a gain"),
+        ("size = 0.2", "size = -0.2", "damage[1].size = -0.2: must be above 0"),
         ('"stiffness_loss"', '"rust"', "damage[1].kind = 'rust'"),
         ('"UJB"', '"XJB"', "damage[1].bearing = 'XJB'"),
         ("after_s = 120.0\n", "", "exactly one of after_s and at"),

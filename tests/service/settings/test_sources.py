@@ -239,7 +239,7 @@ def test_a_can_source_is_read_by_its_dbc_or_by_a_profile(tmp_path):
         ({"microseconds": "T.us"}, "seconds", "must be given together"),
         ({"data_bitrate": 2_000_000}, "data_bitrate", "set fd = true"),
         ({"stamps": "interface"}, "stamps", 'must be "host": slcan sends no time stamps'),
-        ({"interface": "socketcan"}, "bitrate", "set by the system, not here: ip link set"),
+        ({"interface": "socketcan"}, "bitrate", "must be set by the system: ip link set"),
         ({"counter_counts": "frames", "frame_samples": ["W.n"]}, "counter_counts", '"samples"'),
     ],
 )
