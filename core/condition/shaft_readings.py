@@ -133,7 +133,7 @@ def _gap(
     rows = [row for row, c in enumerate(unit.channels) if c.id == channel]
     if not rows or unit.channels[rows[0]].measurand is not Measurand.GAP_UM:
         return missing(Reason.NOT_MEASURED), np.empty(0)
-    gaps = [_segment_gap(segment, rows[0]) for segment in segments]
+    gaps = [segment.reading(rows, float(segment.mean[rows[0]])) for segment in segments]
     mean = current_mean(gaps, is_grazed=segments[-1].is_grazed(rows[0]))
     return mean, numbers(gaps)
 
@@ -143,12 +143,6 @@ def _gap_budget(gap: Reading, values_um: FloatArray, accuracy: GapAccuracy) -> B
         return None
     lines = (systematic_line(SHAFT_GAIN, accuracy.gain, gap.value),)
     return mean_budget(gap.value, values_um, lines)
-
-
-def _segment_gap(segment: Segment, row: int) -> Reading:
-    if not segment.usable[row]:
-        return missing(segment.channel_quality[row].reason)
-    return Reading(float(segment.mean[row]), segment.channel_quality[row])
 
 
 MEAN, EXCESS = "pad_temperature_mean_c", "pad_temperature_excess_k"

@@ -98,11 +98,9 @@ class OverallTransform:
         parts = phasors[:, self._band].view(np.float64)
         power = np.einsum("ij,ij->i", parts * parts, self._power_factor)
         power /= 2.0 * NOISE_BANDWIDTH_BINS
-        return Overall(span, self._orbits(centred), np.sqrt(power))
-
-    def _orbits(self, centred: FloatArray) -> FloatArray:
         pairs = zip(self._shafts, self._matrices, strict=True)
-        return np.array([self._orbit(centred, rows, matrix) for rows, matrix in pairs])
+        orbits = np.array([self._orbit(centred, rows, matrix) for rows, matrix in pairs])
+        return Overall(span, orbits, np.sqrt(power))
 
     def _orbit(self, centred: FloatArray, rows: Sequence[int], matrix: FloatArray | None) -> float:
         if not self._is_displacement[rows].all():

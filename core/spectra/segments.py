@@ -356,7 +356,7 @@ class SegmentTransform(KeptSegments):
         usable: npt.NDArray[np.bool_],
         key_phase: KeyPhase | None,
     ) -> Speed:
-        power = _power(bins, usable & self._is_shaft)
+        power: FloatArray = (np.abs(bins[usable & self._is_shaft]) ** 2).sum(axis=0)
         return running_speed(
             self._unit, window.slow, self.frequency_hz, power, self._settings, key_phase
         )
@@ -410,11 +410,6 @@ def usable_channels(qualities: Sequence[Quality]) -> npt.NDArray[np.bool_]:
 def _turned(phasors: ComplexArray, angle_rad: float) -> ComplexArray:
     factor = cmath.exp(1j * angle_rad)
     return np.array([phasor * factor for phasor in phasors.tolist()])
-
-
-def _power(phasors: ComplexArray, counted: npt.NDArray[np.bool_]) -> FloatArray:
-    power: FloatArray = (np.abs(phasors[counted]) ** 2).sum(axis=0)
-    return power
 
 
 def _factors(channels: Sequence[Channel], frequency_hz: FloatArray) -> ComplexArray:
