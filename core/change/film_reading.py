@@ -10,8 +10,7 @@ from core.condition.cells import BearingCondition, FilmConditions
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, NOT_MEASURED, Level, Quality, Reading, Reason, worst
-from core.stiffness.bracket_ratio import reported_name
-from core.stiffness.estimators import ESTIMATORS
+from core.stiffness.estimators import ESTIMATORS, reported_name
 
 
 @dataclass(frozen=True)

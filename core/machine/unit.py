@@ -148,7 +148,7 @@ class Bearing:
     ----------
     bracket_stiffness_n_per_m
         Radial stiffness k_b of the bracket that holds the bearing; None if unknown. Coefficients
-        are then reported as ratios to k_b (`core.stiffness.bracket_ratio`).
+        are then reported as ratios to k_b (`core.stiffness.estimators`).
     clearance_um
         Radial assembled clearance in operation: the radius within which the shaft centre moves.
     gap_reference_um, opposite_reference_um

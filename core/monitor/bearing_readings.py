@@ -37,12 +37,11 @@ from core.spectra.resolution import Resolution
 from core.spectra.runout import RunoutVerdict
 from core.spectra.segments import ORDER1, VORTEX, Evidence, KeptSegments
 from core.stiffness.agreement import contradicting
-from core.stiffness.bracket_ratio import as_ratios, ratio_name
 from core.stiffness.channel_budget import frequency_budget
 from core.stiffness.dynamic import DynamicStiffness, FilmSpectrum, films
 from core.stiffness.dynamic_readings import NAMES as DYNAMIC_NAMES
 from core.stiffness.dynamic_readings import dynamic_readings
-from core.stiffness.estimators import preferred_stiffness, signs_checked
+from core.stiffness.estimators import as_ratios, preferred_stiffness, ratio_name, signs_checked
 from core.stiffness.order_line import OrderLine, other_line_hz
 from core.uncertainty import Budget, Budgeted, Found, with_budgets
 

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from core.machine.channel import SLOW_QUANTITIES
 from core.quality import AXES
-from core.stiffness.bracket_ratio import absolute_name
+from core.stiffness.estimators import absolute_name
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from core.quality import worst
 from core.samples.ring import Window
 from core.spectra.resolution import shaft_matrix
 from core.spectra.segments import ORDER1, KeptSegments, Segment
-from core.stiffness.bracket_ratio import reported_name
+from core.stiffness.estimators import reported_name
 from core.stiffness.order_line import AMPLITUDES
 from core.uncertainty import Found
 from core.units import hz_from_rpm, ns_from_s

@@ -16,8 +16,7 @@ from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import quantity_of
 from core.quality import Reading
-from core.stiffness.bracket_ratio import reported_name
-from core.stiffness.estimators import ESTIMATORS
+from core.stiffness.estimators import ESTIMATORS, reported_name
 from core.uncertainty import Budget, BudgetLine
 from core.units import NS_PER_S
 from service.reports.parts import (

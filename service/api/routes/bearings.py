@@ -8,8 +8,7 @@ from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
 from core.monitor.catalogue import quantity_named, quantity_of
-from core.stiffness.bracket_ratio import reported_name
-from core.stiffness.estimators import ESTIMATORS
+from core.stiffness.estimators import ESTIMATORS, reported_name
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, QuantityName, UnitId
 from service.api.problems import ProblemError, problem_responses

@@ -7,8 +7,7 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
 from core.quality import Level, Reading
-from core.stiffness.bracket_ratio import reported_name
-from core.stiffness.estimators import is_reversed
+from core.stiffness.estimators import is_reversed, reported_name
 from service.api.answers import Make
 from service.api.auth.declared import subject_router
 from service.api.context import Context

@@ -9,7 +9,7 @@ from core.monitor.monitor import UnitMonitor
 from core.monitor.refresh import Refresh
 from core.quality import Level, Reason
 from core.samples.calibration import UnitCalibration
-from core.stiffness.bracket_ratio import reported_name
+from core.stiffness.estimators import reported_name
 from service.api.values import QualityModel, reading_model, window_model
 from service.runtime.times import rfc3339
 

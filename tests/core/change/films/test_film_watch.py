@@ -18,7 +18,7 @@ from core.change.film_watch import FilmWatch
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
 from core.quality import Reading, Reason, missing, uncertain
-from core.stiffness.bracket_ratio import as_ratios
+from core.stiffness.estimators import as_ratios
 
 S = 1_000_000_000
 
