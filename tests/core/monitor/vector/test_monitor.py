@@ -175,7 +175,7 @@ def test_a_block_of_something_else_is_refused(rack):
         rack().ingest(of_unit(block, rate_hz=1.0))
     with pytest.raises(ValueError, match="6 channels, got 4"):
         rack(AMPLITUDES + GAPS).ingest(block)
-    with pytest.raises(ValueError, match="no channel of unit"):
+    with pytest.raises(ValueError, match="has no channel"):
         rack((VectorRow("nowhere", VectorPart.GAP),))
     with pytest.raises(ValueError, match="rows must be unique"):
         rack((AMPLITUDES[0], AMPLITUDES[0]))
