@@ -93,7 +93,9 @@ def _require_lengths(recording: Recording) -> None:
         except ConfigError as error:
             raise ConfigError(f"{path}: {error}") from error
     if progress.n_samples != manifest.n_samples:
-        found = f"blocks have {progress.n_samples} samples, expected {manifest.n_samples}"
+        found = (
+            f"{progress.n_samples} samples in all blocks, but {manifest.n_samples} in the manifest"
+        )
         raise ConfigError(f"{path}: {found}")
 
 

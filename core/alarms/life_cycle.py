@@ -109,7 +109,7 @@ def next_level(held: AlarmLevel | None, timers: Iterable[Timers]) -> AlarmLevel 
 
 
 def standing_level(timers: Timers) -> AlarmLevel | None:
-    """Return the highest level whose delay timer is on, or None; the latch is disregarded."""
+    """Return the highest level whose on-delay has elapsed, or None; the latch is disregarded."""
     return max((n for n, t in zip(AlarmLevel, timers, strict=True) if t.is_on), default=None)
 
 

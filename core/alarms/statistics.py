@@ -66,9 +66,9 @@ HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 
 @dataclass(frozen=True)
 class Frequent:
-    """Frequent alarm: its id, how often it was announced, and its share of all announcements.
+    """Frequent alarm: its id, number of announcements, and fraction of all announcements, 0 to 1.
 
-    An alarm is announced if it is raised or escalated, or is active when no longer hidden.
+    An alarm is announced when it is raised or escalated, or if it is active when its hiding ends.
     """
 
     alarm: str

@@ -79,7 +79,7 @@ class LineFinding:
 
     @property
     def words(self) -> str:
-        """Distance and standard uncertainty as text; empty if unknown."""
+        """Distance from the line of the shaft ± standard uncertainty as text; empty if unknown."""
         if self.distance_um is None:
             return ""
         return f"{self.distance_um:.2f} ± {self.std_um:.2f} µm off the line of the shaft"

@@ -96,7 +96,7 @@ def channel_verdicts(
 
 
 def worst_qualities(verdicts: VerdictArray) -> tuple[Quality, ...]:
-    """Return the worst quality of each channel over its cells; the first of equally bad ones."""
+    """Return the worst quality in each row of verdicts (n_channels, n_cells of its samples)."""
     if not verdicts.any():
         return (GOOD,) * len(verdicts)
     first = _LEVELS[verdicts].argmax(axis=1)

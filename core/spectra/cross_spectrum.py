@@ -136,7 +136,7 @@ def phasor_power_per_density(bin_hz: float) -> float:
 
 @lru_cache(maxsize=32)
 def independent_segments(n_segments: int, overlap: float) -> float:
-    """Return the number of independent segments equivalent to overlapping ones.
+    """Return the number of independent segments equivalent to overlapping, Hann-tapered segments.
 
     `overlap` is the overlapping fraction of consecutive segments, from 0 to below 1. The formula is
     equation 12 of Welch (1967).

@@ -131,7 +131,7 @@ class FilmInputs:
 
     @property
     def size(self) -> FloatArray:
-        """Factor from the inverse of normal equations to the covariance of estimates, (n, 1)."""
+        """Factors (n, 1): times the inverse normal matrix, they are covariances of estimates."""
         return CORRELATED_LINES / (2.0 * self.n_segments)
 
     def terms(self, deviation: FloatArray) -> FilmTerms:

@@ -78,7 +78,10 @@ class Window:
         self._seen: deque[_Seen] = deque()
 
     def note(self, sequence: int, block: SampleBlock, state: MonitorState) -> None:
-        """Add the message of a block, and remove those that no replay to `state` needs."""
+        """Add the message of a block by its stream sequence number.
+
+        Messages that are no longer needed to restore `state` by replay are removed.
+        """
         self._seen.append(_Seen(sequence, state.epoch, block.stop_index))
         while len(self._seen) > 1 and not self._is_needed(self._seen[0], state):
             self._seen.popleft()

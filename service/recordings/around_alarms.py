@@ -196,7 +196,7 @@ class Captures(WriterThread):
         self._listener = listener
 
     def expects(self, event: AlarmEvent) -> bool:
-        """Return whether samples around an event are recorded."""
+        """Return whether the samples around an event are going to be recorded."""
         return is_captured(event) and event.identity.unit in self._histories
 
     @property

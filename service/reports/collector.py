@@ -259,7 +259,7 @@ class EvidenceCollector:
             self._n_store_attempts += isinstance(error, StoreError)
             self.n_failed += 1
             if str(error) != self.error:
-                log.error("evidence of alarms is not written", reason=str(error))
+                log.error("the evidence of an alarm could not be written", reason=str(error))
             self.error = str(error)
             return False
         if self.error is not None:

@@ -144,7 +144,7 @@ def value_words(case: Case) -> str:
 
 
 def quantity_words(found: FindingPart) -> str:
-    """Return the direction of a finding as text, marked if it is about damping over stiffness."""
+    """Return the direction of a finding as text, with "c/k" if it is about that ratio."""
     return f"{found.direction}, damping over stiffness c/k" if found.is_damping else found.direction
 
 

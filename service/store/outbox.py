@@ -33,13 +33,13 @@ class OutboxMessage:
     body
         Content of the message as JSON.
     queued_ns
-        Time of queueing by the host clock.
+        Host time of queueing, ns since 1970 UTC.
     is_urgent
-        Whether the message is sent in quiet hours, together with all waiting messages.
+        Whether the message is sent even in quiet hours; all waiting messages are sent with it.
     is_active
         Whether the receiver regards the alarm as active after the message.
     closes
-        Whether the message is sent only to a receiver that regards the alarm as active.
+        Whether the message reports an end; it is sent only to receivers that were told the start.
     """
 
     receiver: str

@@ -69,7 +69,10 @@ def bearing_at(
 def channels_at(
     truth: BearingMoments, row: int, bearing: Bearing
 ) -> Iterator[tuple[str, ChannelScenario]]:
-    """Yield id and true transducer properties of each channel and opposite probe of a bearing."""
+    """Yield the id and the true properties of each transducer of a bearing at row `row` of `truth`.
+
+    Opposite probes are included.
+    """
     probe_gain, accelerometer_gain = _probe_gain(truth, row), _accelerometer_gain(truth, row)
     near, far = bearing.channels[:2], (bearing.opposite_x, bearing.opposite_y)
     for axis in range(2):

@@ -83,7 +83,10 @@ def mark_path(database: Path) -> Path:
 
 
 class MarkFile:
-    """File with the high-water mark of a database; several processes may write it."""
+    """File with the commit count that a database has reached, to detect that an older copy is used.
+
+    Several processes may write it.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -40,7 +40,7 @@ def floored(time_ns: int, width_ns: int) -> int:
 
 
 def select_mark(reader: Connection, series: int) -> int:
-    """Return the time, ns since 1970 UTC, up to which readings are aggregated; 0 without any."""
+    """Return the time, ns since 1970 UTC, before which all readings are aggregated; 0 if none."""
     found = reader.execute(
         "SELECT until_ns FROM rollup_mark WHERE series = ?", (series,)
     ).fetchone()

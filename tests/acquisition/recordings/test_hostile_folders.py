@@ -207,7 +207,7 @@ def change_block(folder: Path, number: int, **changes: Any) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"n_samples": 51}, "blocks have 1001 samples, expected 1000"),
+        ({"n_samples": 51}, "1001 samples in all blocks, but 1000 in the manifest"),
         ({"n_samples": 0}, "block 3: n_samples must be 1 to"),
         ({"n_samples": -50}, "to 131072, got -50"),
         ({"n_samples": 2**31 - 1}, "to 131072, got 2147483647"),
