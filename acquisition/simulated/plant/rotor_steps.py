@@ -58,8 +58,8 @@ def discretize(
     """Discretize the rotor exactly, for forces that are linear between samples.
 
     The spectrum of a force held over each step has an image near the sampling rate, which aliases.
-    It is negligible in displacement and velocity, but at 1.5 Hz, sampled at 600 Hz, it shifts the phase of
-    the acceleration of a stiff bracket by 1.5° and more. Linear interpolation avoids this image.
+    It is negligible in displacement and velocity, but for 1.5 Hz sampled at 600 Hz it shifts the
+    phase of the acceleration of a stiff bracket by 1.5° or more. Linear interpolation avoids this.
 
     Parameters
     ----------
