@@ -18,13 +18,14 @@ import numpy as np
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingState
 from core.monitor.catalogue import CATALOGUE
+from core.units import NS_PER_S
 from service.api.answers import json_of
 from service.api.routes.trend_groups import trend_groups
 from service.api.routes.trends import trend_answer, trend_columns
 from service.store.buckets import Summaries
 from service.store.port import TrendQuery, ValueRange
 from service.store.rollups.gathering import SET_MARK
-from service.store.rollups.rows import HOUR_NS, NS_PER_S, WIDTHS_NS, Cells, Conditions
+from service.store.rollups.rows import HOUR_NS, WIDTHS_NS, Cells, Conditions
 from service.store.rollups.writing import insert_cells
 from service.store.series import Layout, columns_of, remember_layout, series_of
 from service.store.sqlite import SqliteStore

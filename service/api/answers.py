@@ -287,9 +287,10 @@ class AnswerHeaders:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 headers[TIME_HEADER] = rfc3339(self._clock.now_ns())
-                if scope["method"] == "GET" and "etag" in headers:
+                is_get, is_json = scope["method"] == "GET", headers.get("content-type") == JSON
+                if is_get and "etag" in headers:
                     _add_cache_headers(headers)
-                elif scope["method"] == "GET" and _is_whole_json(message):
+                elif is_get and is_json and message["status"] == 200:
                     head = message  # its tag depends on the body
                     return
             elif head is not None:
@@ -318,11 +319,6 @@ def _tagged(head: Message, message: Message, asked: Headers) -> Message:
     body, added = encoded(body, encoding_of(asked))
     headers.update(added | {"Content-Length": str(len(body))})
     return {"type": "http.response.body", "body": body}
-
-
-def _is_whole_json(head: Message) -> bool:
-    headers = Headers(scope=head)
-    return head["status"] == 200 and headers.get("content-type") == JSON
 
 
 ORIGIN_HEADER, EDITION_HEADER = "Padwatch-Origin", "Padwatch-Edition"

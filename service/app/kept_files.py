@@ -23,7 +23,7 @@ from service.recordings.continuous_recorder import ContinuousRecorder, DropReaso
 from service.recordings.folders import place_of
 from service.recordings.index import Index
 from service.recordings.keeper import RecordingIndexer, RecordingLock
-from service.recordings.retention import RecordingRetention, RetentionRules, RoomLimits, SpaceGauge
+from service.recordings.retention import RecordingRetention, RetentionRules, SpaceGauge
 from service.recordings.segment import SegmentSettings
 from service.reports.collector import EvidenceCollector, SnapshotTaker
 from service.reports.document import Maker
@@ -138,18 +138,15 @@ def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> RecordingIn
 def retention_rules(plant: PlantFile) -> RetentionRules:
     """Return the retention rules of the recordings of a plant: folders, limits of size and age."""
     data = Path(plant.service.data_folder)
-    room = RoomLimits(
-        continuous_bytes=round(plant.recording.max_gb * BYTES_PER_GB),
-        capture_bytes=round(plant.capture.max_gb * BYTES_PER_GB),
-        continuous_days=plant.recording.max_days,
-    )
     roots = {
         WaveformKind.CAPTURE: data / CAPTURES,
         WaveformKind.CONTINUOUS: recordings_folder(plant),
     }
     return RetentionRules(
         roots=roots,
-        room=room,
         gauge=SpaceGauge(roots, plant.space, measure_disk),
         in_use=partial(captures_in_use, data / EVIDENCE),
+        continuous_bytes=round(plant.recording.max_gb * BYTES_PER_GB),
+        capture_bytes=round(plant.capture.max_gb * BYTES_PER_GB),
+        continuous_days=plant.recording.max_days,
     )

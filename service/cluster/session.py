@@ -24,6 +24,7 @@ from core.samples.blocks import SampleBlock
 from service.cluster.frames import UnitIdentity, fingerprint
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
+from service.settings.storage import BYTES_PER_GB
 from service.settings.units import UnitSettings
 
 
@@ -270,7 +271,6 @@ def _token(settings: StreamSettings) -> str | None:
         raise StreamMisfitError(words) from None
 
 
-BYTES_PER_GB = 1e9
 S_PER_H = 3600.0
 
 PLANT, FORMAT = "padwatch-plant", "padwatch-format"

@@ -3,12 +3,11 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from pydantic import ConfigDict
-
 from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmState
 from core.alarms.statistics import HIDDEN, ChatterRule
 from core.limits import AlarmLevel
 from service.live.snapshot import UnitSnapshot
+from service.runtime.models import ValueModel
 from service.settings.alarm_kinds import ANALYSIS_GONE, SAMPLES_LOST
 
 
@@ -16,9 +15,7 @@ from service.settings.alarm_kinds import ANALYSIS_GONE, SAMPLES_LOST
 class AlarmCount:
     """Numbers of alarms by state; an alarm may be counted in several states."""
 
-    __pydantic_config__ = ConfigDict(
-        extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    __pydantic_config__ = ValueModel.model_config  # the API shows the counts
 
     n_active: int
     """Number of active alarms that are not hidden (shelved, suppressed or out of service)."""

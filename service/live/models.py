@@ -33,13 +33,7 @@ class FilmCauseModel(ValueModel):
     """Cause of a change, inferred from damping over stiffness and the motion of the shaft."""
 
     cause: Literal[
-        "film",
-        "oil",
-        "clearance",
-        "bracket",
-        "transducer",
-        "bracket_or_transducer",
-        "unknown",
+        "film", "oil", "clearance", "bracket", "transducer", "bracket_or_transducer", "unknown"
     ]
     """Cause: film of this bearing, oil, clearance or wear, bracket, transducer, bracket or
     transducer, or unknown."""

@@ -73,18 +73,6 @@ def _time_ns(file: WaveformFile) -> int:
     return max(file.stop_ns, file.changed_ns)
 
 
-@dataclass(frozen=True)
-class RoomLimits:
-    """Limits of the size of all recordings of a kind, bytes, and age of continuous ones, days.
-
-    Captures, the recordings around alarms, have no limit of age.
-    """
-
-    continuous_bytes: int = 100_000_000_000
-    capture_bytes: int = 10_000_000_000
-    continuous_days: float = 30.0
-
-
 InUse = Callable[[], frozenset[str]]
 """Function that returns the names of the captures to which the evidence of alarms refers."""
 
@@ -92,24 +80,30 @@ Remove = Callable[[WaveformFile, str], bool]
 """Function (recording, reason) that removes a recording and returns whether this succeeded."""
 
 
+@dataclass(frozen=True)
+class RetentionRules:
+    """Folder of each kind of recordings, free space on their disks, limits of size and age.
+
+    `in_use` returns the names of the captures to which the evidence of alarms refers. Captures, the
+    recordings around alarms, have no limit of age.
+    """
+
+    roots: Mapping[WaveformKind, Path]
+    gauge: "SpaceGauge"
+    in_use: InUse
+    continuous_bytes: int = 100_000_000_000
+    capture_bytes: int = 10_000_000_000
+    continuous_days: float = 30.0
+
+
 def make_room(
-    files: Iterable[WaveformFile],
-    limits: RoomLimits,
-    now_ns: int,
-    short_bytes: Mapping[WaveformKind, int],
-    in_use: InUse,
-    remove: Remove,
+    files: Iterable[WaveformFile], rules: RetentionRules, now_ns: int, remove: Remove
 ) -> None:
     """Remove the oldest recordings until the limits are met, continuous recordings first.
 
-    Parameters
-    ----------
-    short_bytes
-        Disk space to free, in bytes, by kind. To free it, captures are removed only if the removal
-        of continuous recordings frees too little, and never if evidence refers to the captures.
-    in_use, remove
-        Function that returns the names of the captures to which evidence refers, and function
-        that removes a recording for a reason and returns whether it succeeded.
+    To free disk space, captures are removed only if the removal of continuous recordings frees too
+    little, and never if evidence refers to the captures. `remove` removes a recording for a reason
+    and returns whether it succeeded.
 
     Raises
     ------
@@ -119,9 +113,9 @@ def make_room(
     by_age = sorted(files, key=lambda file: (file.stop_ns or file.changed_ns, file.name))
     continuous = [file for file in by_age if file.kind is WaveformKind.CONTINUOUS]
     captures = [file for file in by_age if file.kind is WaveformKind.CAPTURE]
-    over = sum(file.n_bytes for file in continuous) - limits.continuous_bytes
-    age_limit = AgeLimit(continuous, now_ns, ns_from_s(limits.continuous_days * S_PER_DAY))
-    n_freed = 0
+    over = sum(file.n_bytes for file in continuous) - rules.continuous_bytes
+    age_limit = AgeLimit(continuous, now_ns, ns_from_s(rules.continuous_days * S_PER_DAY))
+    n_freed, short_bytes = 0, rules.gauge.short_bytes
     for file in continuous:
         if over > n_freed:
             why = "continuous recordings exceed max_gb"
@@ -132,10 +126,10 @@ def make_room(
         else:
             continue
         n_freed += file.n_bytes if remove(file, why) else 0
-    over = sum(file.n_bytes for file in captures) - limits.capture_bytes
+    over = sum(file.n_bytes for file in captures) - rules.capture_bytes
     short = short_bytes[WaveformKind.CAPTURE] - n_freed
     if over > 0 or short > 0:
-        _remove_captures(captures, over, short, in_use(), remove)
+        _remove_captures(captures, over, short, rules.in_use(), remove)
 
 
 def _remove_captures(
@@ -247,19 +241,6 @@ class RetentionCounts:
     """Number of removed recordings by kind."""
 
 
-@dataclass(frozen=True)
-class RetentionRules:
-    """Folder of each kind of recordings, limits of size and age, and free space on their disks.
-
-    `in_use` returns the names of the captures to which the evidence of alarms refers.
-    """
-
-    roots: Mapping[WaveformKind, Path]
-    room: RoomLimits
-    gauge: SpaceGauge
-    in_use: InUse
-
-
 class RecordingRetention:
     """Maintenance of recordings: updates the index from the folders, checks and removes recordings.
 
@@ -365,8 +346,7 @@ class RecordingRetention:
                 return True
             return False
 
-        short_bytes, now_ns = rules.gauge.short_bytes, self._clock.now_ns()
-        make_room(self._index.on_disk, rules.room, now_ns, short_bytes, rules.in_use, remove)
+        make_room(self._index.on_disk, rules, self._clock.now_ns(), remove)
 
     def _note_removed(self, file: WaveformFile, reason: str) -> None:
         self.found.n_removed[file.kind.value] += 1

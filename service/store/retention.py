@@ -15,10 +15,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from core.units import DAY_NS
+from core.units import DAY_NS, NS_PER_S
 from service.settings.storage import RetentionSettings
 from service.store.database import Connect, Connection, Reading, Tables
-from service.store.rollups.rows import HOUR_NS, NS_PER_S, WIDTHS_NS, Cells, select_cells
+from service.store.rollups.rows import HOUR_NS, WIDTHS_NS, Cells, select_cells
 from service.store.rollups.writing import (
     DELETE_READINGS,
     NEXT_TIMES,

@@ -336,12 +336,10 @@ def film_history_router(context: Context) -> APIRouter:
             rows = rows_shown(len(found), max_points, thin)
             return film_readings_model(query, found, rows), found, rows.tolist()
 
-        def read_columns() -> list[Column]:
-            return film_table(*read())
-
         if wanted == "json":
             revision = partial(context.past_revision, unit, times)
             return await context.answers.of(request, revision, lambda: read()[0])
-        return table_response(wanted, await in_thread(read_columns), f"film-{unit}-{bearing}")
+        columns = await in_thread(lambda: film_table(*read()))
+        return table_response(wanted, columns, f"film-{unit}-{bearing}")
 
     return router

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from core.arrays import FloatArray
 from core.condition.cells import CellGrid
 from core.quality import Level
+from core.units import NS_PER_S
 from service.store.buckets import IntArray, Summaries
 from service.store.database import Connection
 from service.store.seals import select_whole, unchecked
@@ -228,7 +229,6 @@ A late reading, whose time is already aggregated, is inserted together with a ro
 ``rollup_redo``. Roll-ups of that hour are not read until the hour is aggregated again."""
 
 
-NS_PER_S = 1_000_000_000
 WIDTHS_S = (60, 600, 3600)
 """Roll-up widths in seconds, finest first. Each width divides the next one; hours with late
 readings are aggregated again as a whole."""

@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from core.units import NS_PER_S
 from service.store.database import Connection
 from service.store.rollups.rows import (
     NO_STATE,
-    NS_PER_S,
     WIDTHS_NS,
     Cells,
     Conditions,

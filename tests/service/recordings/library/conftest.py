@@ -1,8 +1,8 @@
 """Recordings in folders, and a caretaker over a real store who looks when a test says so."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from acquisition.recordings.writer import RecordingWriter
 from core.machine.channel import Measurand
 from service.recordings.index import Index
 from service.recordings.keeper import RecordingIndexer, RecordingLock
-from service.recordings.retention import RecordingRetention, RetentionRules, RoomLimits, SpaceGauge
+from service.recordings.retention import RecordingRetention, RetentionRules, SpaceGauge
 from service.runtime.disk import DiskSpace
 from service.settings.storage import SpaceSettings
 from service.store.sqlite import SqliteStore
@@ -63,14 +63,15 @@ class Rig:
         for folder in self.roots.values():
             folder.mkdir()
         self.clock, self.store = Clock(), SqliteStore(root / "padwatch.sqlite3")
-        self.room, self.bound = RoomLimits(), frozenset[str]()
+        self.room: dict[str, Any] = {}
+        self.bound = frozenset[str]()
         self.space = DiskSpace(1, 10**12, 10**12)
         self.hire()
 
     def hire(self) -> RecordingRetention:
         """Begin anew, as after a restart."""
         self.gauge = SpaceGauge(self.roots, SPACE, self.measured)
-        custody = RetentionRules(self.roots, self.room, self.gauge, lambda: self.bound)
+        custody = RetentionRules(self.roots, self.gauge, lambda: self.bound, **self.room)
         self.caretaker = RecordingRetention(
             custody, Index(self.store.waveforms, "here"), self.clock
         )
@@ -101,7 +102,7 @@ class Rig:
         return sorted(path.name for path in self.roots[kind].iterdir())
 
     def limit(self, **limits: float) -> None:
-        self.room = replace(self.room, **limits)  # type: ignore[arg-type]
+        self.room |= limits
         self.hire()
 
 
