@@ -52,8 +52,12 @@ broken."""
 GAIN_SPREAD, GAIN_STD = 0.25, 0.012
 """Standard uncertainty of the gain that a change of stiffness predicts: relative, and absolute."""
 
-FITS = 3.0
-"""Largest distance of a broken line from that of a changed gain, in standard uncertainties."""
+PHASE_SPREAD = 0.1
+"""Standard uncertainty of the direction in which a changed gain moves the sum, rad."""
+
+FITS, CLEAR = 3.0, 3.0
+"""Largest distance of a broken line from that of a changed gain, in standard uncertainties, and
+smallest difference of the log likelihoods of both gains."""
 
 
 class LineVerdict(StrEnum):
@@ -141,17 +145,20 @@ class ShaftLine:
 def _verdict(
     off: complex, std: float, gains: Mapping[LineVerdict, tuple[float, complex]]
 ) -> LineVerdict:
-    distance, spread = {}, {}
+    distance, score = {}, {}
     for which, (ln_gain, signal) in gains.items():
         step = -math.expm1(-ln_gain) * signal  # of a signal that already has the gain
-        spread[which] = math.hypot(std, abs(signal) * math.hypot(GAIN_SPREAD * ln_gain, GAIN_STD))
-        distance[which] = abs(off - step) / spread[which]
+        along = math.hypot(std, abs(signal) * math.hypot(GAIN_SPREAD * ln_gain, GAIN_STD))
+        across = math.hypot(std, PHASE_SPREAD * abs(step))
+        rest = (off - step) * signal.conjugate() / abs(signal)  # a gain moves along its signal
+        distance[which] = math.hypot(rest.real / along, rest.imag / across)
+        score[which] = distance[which] ** 2 / 2.0 + math.log(along * across)
     if abs(off) < BROKEN * std:
         shows = min(abs(math.expm1(gain) * signal) for gain, signal in gains.values())
         is_sure = abs(off) <= HOLDS * std and shows >= BROKEN * std
         return LineVerdict.HOLDS if is_sure else LineVerdict.UNKNOWN
-    best, other = sorted(distance, key=distance.__getitem__)
-    is_clear = distance[best] <= FITS and distance[other] > FITS
+    best, other = sorted(score, key=score.__getitem__)
+    is_clear = distance[best] <= FITS and score[other] - score[best] >= CLEAR
     return best if is_clear else LineVerdict.BROKEN
 
 
