@@ -191,7 +191,7 @@ def cause_by_damping(
     bearings = {bearing for bearing, _ in evidence} - {film[0]}
     others = [_bearing(evidence, bearing, own.time_scale_h) for bearing in bearings]
     known = [each for each in others if each is not None]
-    has_company = bool(known) and all(each.follows(own) for each in known)
+    has_company = len(known) == len(bearings) > 0 and all(each.follows(own) for each in known)
     if has_company:
         own = _mean([own, *known])
     holds = all(line.verdict is LineVerdict.HOLDS for line in lines.values())
@@ -212,9 +212,7 @@ def _cause(
     is_bracket = holds and found.cause is Cause.BRACKET_OR_TRANSDUCER and not has_company
     if is_bracket and own.is_alike and own.mean_k > 0.0:
         return Cause.BRACKET, "shaft motion agrees with a changed bracket, and no gain changed"
-    if not own.is_unmoved:
-        return None, ""
-    if not own.is_alike:
+    if not (own.is_unmoved and own.is_alike):
         return None, ""
     if has_company:
         return Cause.OIL, "k of all bearings changed alike, and c/k did not"

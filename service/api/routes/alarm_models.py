@@ -147,6 +147,9 @@ class AlarmModel(ApiModel):
     """State that the alarm takes if the present condition is certain and lasts for its delay; null
     if no change is pending."""
 
+    evidence: str | None
+    """For a film with an active level, the evidence on its cause, with its numbers; else null."""
+
     film: FilmConditionModel | None
     """Operating condition at the newest film reading, for alarms of film stiffness; null for other
     alarms, and before the first reading."""
@@ -287,6 +290,7 @@ def alarm_model(engine: LiveAlarms, films: LiveFilms, alarm: Alarm) -> AlarmMode
         condition_reason=condition.reason if is_judged else unseen,
         value_unit=value_unit(identity.kind),
         waits_for=_awaited(alarm, films) if is_judged else None,
+        evidence=_evidence(films, identity),
         film=_film(films, identity),
     )
 
@@ -331,6 +335,13 @@ def _film(films: LiveFilms, identity: AlarmIdentity) -> FilmConditionModel | Non
     if news is None or rules is None:
         return None
     return condition_model(news.reading.time_ns, news.reading.condition, rules.grid)
+
+
+def _evidence(films: LiveFilms, identity: AlarmIdentity) -> str | None:
+    """Return the reason for the cause of the film's largest change; None without a cause."""
+    news = _film_news(films, identity)
+    found = news.findings[news.worst].attribution if news is not None else None
+    return None if found is None else found.reason
 
 
 def _film_news(films: LiveFilms, identity: AlarmIdentity) -> FilmNews | None:

@@ -130,10 +130,10 @@ export function raisedWords({ raised_at: at }) {
 }
 
 /** What an alarm watches, now; what is not known is said to be unknown, never to be well. */
-export function conditionWords({ condition, condition_reason: reason }) {
+export function conditionWords({ condition, condition_reason: reason, evidence }) {
   if (condition === "unknown") return `Unknown: ${alarmReasonWords(reason)}`;
   if (condition === "within_limits") return WITHIN[reason] ?? "Within limits";
-  return `Active: ${alarmReasonWords(reason)}`;
+  return `Active: ${alarmReasonWords(reason)}${evidence ? ` (${evidence})` : ""}`;
 }
 
 /** What an alarm becomes if its condition lasts; nothing where no delay is running. */

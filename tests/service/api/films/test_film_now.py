@@ -80,6 +80,7 @@ async def test_a_softer_film_is_told_with_interval_time_scale_and_cause(service,
     ratio = softer["stiffness_n_per_m"] / softer["expected_n_per_m"]
     assert 100.0 * (ratio - 1.0) == pytest.approx(deviation["percent"])
     [alarm] = [one for one in alarms if one["id"] == "U1:UJB:film_stiffness"]
+    assert alarm["evidence"] == softer["cause"]["reason"]
     assert alarm["value_unit"] == "%"
     assert softer["cause"]["cause"] == "unknown"  # nobody has learned how the shaft answers
     assert "response" in softer["cause"]["reason"]
