@@ -30,7 +30,7 @@ class Scale:
     divisor: float = 1.0
 
     def at(self, value: float) -> float:
-        """Return the position of a value on the axis: 0 at `low`, 1 at `high`; it may be beyond."""
+        """Return the position of a value on the axis: 0 at `low`, 1 at `high`, or beyond."""
         if self.is_log:
             value = max(value, 1e-300)
             return math.log(value / self.low) / math.log(self.high / self.low)

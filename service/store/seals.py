@@ -211,7 +211,7 @@ class Seals:
         self.tables: dict[str, SealedTable] = {}
 
     def begin(self, writer: sqlite3.Connection) -> None:
-        """Create or recompute checksums if needed; add triggers and views to the connection."""
+        """Create missing and outdated checksums; add triggers and views to the connection."""
         self.tables = {table.name: table for table in _tables(writer)}
         self.register_functions(writer)
         (schema,) = writer.execute("PRAGMA main.user_version").fetchone()

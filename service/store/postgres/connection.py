@@ -240,7 +240,7 @@ def cancelled_when_gone(session: Session) -> Iterator[None]:
             yield
     finally:
         if asker.has_gone:
-            raise StoreError("the query was cancelled: the client has disconnected")
+            raise StoreError("the query was interrupted: the client has disconnected")
 
 
 BY_STATE = {

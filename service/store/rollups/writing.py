@@ -154,7 +154,7 @@ class DeletedUntil:
         return tuple(width for width in WIDTHS_NS if self.of(width // NS_PER_S) <= time_ns)
 
     def finest_ns(self, start_ns: int) -> int | None:
-        """Return the finest roll-up width, ns, at a time; None if single readings exist."""
+        """Return the finest roll-up width, ns, that exists at a time; None for single readings."""
         return self.kept_ns(start_ns)[0] if start_ns < self.readings_ns else None
 
     def stretches(self, span: tuple[int, int]) -> list[tuple[int, int]]:

@@ -32,7 +32,7 @@ HAS_TRAIL = "SELECT 1 FROM sqlite_master WHERE name = 'audit'"
 
 
 class SqliteReading:
-    """SQLite database that another process writes; used by several threads, without writing.
+    """SQLite database that another process writes; several threads of this process read it.
 
     Parameters
     ----------
