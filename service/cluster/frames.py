@@ -271,10 +271,7 @@ def encoded_link(news: LinkNews, identity: UnitIdentity) -> bytes:
 def decoded(message: bytes, identity: UnitIdentity) -> Taken | LinkNews:
     """Decode a stream message of the unit `identity` to a block or a link state.
 
-    Raises
-    ------
-    WireError
-        If the message cannot be used. Invalid bytes raise no other exception.
+    Raises `WireError` if the message cannot be used. Invalid bytes raise no other exception.
     """
     frame = unframed(message, identity)
     if frame.kind is Kind.LINK:

@@ -161,10 +161,7 @@ class UnitRecorder:
     def end(self) -> None:
         """End the open segment, if any, and add its folder to `ended`.
 
-        Raises
-        ------
-        RecordingError
-            If the last part of the segment cannot be written.
+        Raises `RecordingError` if the last part of the segment cannot be written.
         """
         segment, self._segment = self._segment, None
         if segment is not None:

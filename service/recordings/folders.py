@@ -97,10 +97,7 @@ def remove_recording(folder: Path) -> None:
 def finished(root: Path) -> Iterator[str]:
     """Yield the names of finished recordings in a folder, including damaged recordings.
 
-    Raises
-    ------
-    OSError
-        If the folder cannot be read.
+    Raises `OSError` if the folder cannot be read.
     """
     if not root.is_dir():
         return
@@ -144,10 +141,7 @@ def begin_removal(folder: Path) -> None:
 def delete_files(folder: Path) -> None:
     """Delete the files of a recording after `begin_removal`; a repeated call has no effect.
 
-    Raises
-    ------
-    OSError
-        If the disk cannot be read or written.
+    Raises `OSError` if the disk cannot be read or written.
     """
     for name in FILES:
         (_removed(folder) / name).unlink(missing_ok=True)
@@ -203,10 +197,7 @@ PLACE_FILE = "place.txt"
 def place_of(data_folder: Path) -> str:
     """Return the permanent identifier of a data folder; create it if it is missing or invalid.
 
-    Raises
-    ------
-    OSError
-        If the disk cannot be read or written.
+    Raises `OSError` if the disk cannot be read or written.
     """
     path = data_folder / PLACE_FILE
     try:

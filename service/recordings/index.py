@@ -55,10 +55,7 @@ class Index:
     def put(self, files: Iterable[WaveformFile]) -> None:
         """Write entries to the index and the store; replace entries of the same kind and name.
 
-        Raises
-        ------
-        StoreError
-            If the store cannot be written; the index is unchanged.
+        Raises `StoreError` if the store cannot be written; the index is unchanged.
         """
         found = {(file.kind, file.name): file for file in files}
         if found:
@@ -76,10 +73,7 @@ class Index:
     def store_removals(self) -> None:
         """Write the removals of entries to the store; after an error they can be written again.
 
-        Raises
-        ------
-        StoreError
-            If the store cannot be written.
+        Raises `StoreError` if the store cannot be written.
         """
         if self._removed:
             self._store.put(list(self._removed.values()))
@@ -220,10 +214,7 @@ class RecordingCheck:
     def results(self) -> Iterator[CheckResult]:
         """Read all recordings and yield the results, also for missing and unfinished recordings.
 
-        Raises
-        ------
-        OSError
-            If a folder cannot be read.
+        Raises `OSError` if a folder cannot be read.
         """
         for kind, name in self._there:
             yield self._read(kind, name)

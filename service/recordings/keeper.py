@@ -34,10 +34,7 @@ class RecordingLock:
     def acquire(self) -> bool:
         """Acquire the lock if it is free; return whether this process holds it.
 
-        Raises
-        ------
-        OSError
-            If the lock file cannot be created.
+        Raises `OSError` if the lock file cannot be created.
         """
         if self._descriptor is not None:
             return True

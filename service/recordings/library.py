@@ -183,10 +183,7 @@ class RecordingWindow:
 def window_of(recording: Recording, start_s: float, seconds: float) -> RecordingWindow:
     """Return the blocks that overlap ``start_s`` to ``start_s + seconds`` after the first sample.
 
-    Raises
-    ------
-    ConfigError
-        If the recording can no longer be read.
+    Raises `ConfigError` if the recording can no longer be read.
     """
     rate_hz = recording.manifest.rate_hz
     heads = np.concatenate([some for some, _ in recording.heads()])

@@ -195,10 +195,7 @@ class SpaceGauge:
     def measure(self) -> None:
         """Update `is_full` and `short_bytes` for all disks; the latter is 0 for an unreadable disk.
 
-        Raises
-        ------
-        OSError
-            If a disk cannot be measured.
+        Raises `OSError` if a disk cannot be measured.
         """
         short, errors = dict.fromkeys(WaveformKind, 0), FirstError()
         for kind, root in self._roots.items():

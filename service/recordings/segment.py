@@ -65,10 +65,7 @@ class CaptureFile:
     def write(self, blocks: Sequence[SampleBlock]) -> None:
         """Append sample blocks; no effect on a closed capture.
 
-        Raises
-        ------
-        CaptureError
-            If writing fails; the capture is then removed and closed.
+        Raises `CaptureError` if writing fails; the capture is then removed and closed.
         """
         if self.is_closed:
             return
