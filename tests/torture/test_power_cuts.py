@@ -3,7 +3,7 @@
 import pickle
 import shutil
 import sqlite3
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from itertools import pairwise
 from pathlib import Path
@@ -23,22 +23,17 @@ DATABASE = "padwatch.sqlite3"
 
 
 pytestmark = pytest.mark.skipif(shutil.which("strace") is None, reason="needs strace")
-Record = Callable[[], list[Step]]
 
 
-@pytest.fixture(scope="session")
-def recorded(tmp_path_factory, torture_seed, assessment) -> Record:
-    """Records what a store asks of its disk while transactions are appended to it."""
-
-    def run() -> list[Step]:
-        folder = tmp_path_factory.mktemp("tape")
-        (folder / "data").mkdir()
-        with (folder / "deeds").open("wb") as file:
-            pickle.dump([deed(torture_seed, n, assessment) for n in range(N_DEEDS)], file)
-        command = python("-m", "harness.enduring", folder / "deeds", folder)
-        return record(command, folder / "data", folder / "tape", environment())
-
-    return run
+@pytest.fixture
+def recorded(tmp_path_factory, torture_seed, assessment) -> list[Step]:
+    """What a store asks of its disk while transactions are appended to it."""
+    folder = tmp_path_factory.mktemp("tape")
+    (folder / "data").mkdir()
+    with (folder / "deeds").open("wb") as file:
+        pickle.dump([deed(torture_seed, n, assessment) for n in range(N_DEEDS)], file)
+    command = python("-m", "harness.enduring", folder / "deeds", folder)
+    return record(command, folder / "data", folder / "tape", environment())
 
 
 def cuts(steps: Sequence[Step], n: int, seed: int) -> Iterator[tuple[int, dict[str, bytes]]]:
@@ -76,7 +71,7 @@ def damage(path: Path) -> list[str]:
 @pytest.mark.timeout(3600)
 def test_nothing_acknowledged_is_lost_by_a_power_cut(recorded, tmp_path, assessment, torture):
     n_cuts = N_CUTS if torture.is_whole else N_FEW
-    for acknowledged, files in cuts(recorded(), n_cuts, torture.seed):
+    for acknowledged, files in cuts(recorded, n_cuts, torture.seed):
         path = left_in(tmp_path / "data", files)
         lost, mark = found_after(path, torture.seed, acknowledged, assessment)
         assert not lost, acknowledged

@@ -54,20 +54,6 @@ def test_a_healthy_machine_meets_a_four_fold_range_of_stiffness(two_years, seed)
         assert 3.5 <= np.exp(np.max(high - low)) <= 16.0
 
 
-@pytest.mark.parametrize("n_lives", fast_and_long(3, 6))
-def test_healthy_films_have_no_trend(two_years, n_lives):
-    # condition wanders for weeks: the slope of 18 films is zero within its own scatter
-    slopes = [
-        np.polyfit(life.operation.time_ns / 3.15576e16, ln_k, 1)[0]
-        for life in map(two_years, range(n_lives))
-        for truth in life.truth.values()
-        for ln_k in truth.ln_k
-    ]
-
-    lives = np.array(slopes).reshape(n_lives, 6).mean(axis=1)  # films of one life are alike
-    assert abs(np.mean(lives)) < 3.0 * np.std(lives) / np.sqrt(n_lives) + 0.02
-
-
 def test_in_the_same_condition_a_healthy_film_is_the_same_in_both_years(two_years):
     for name, truth in two_years(0).truth.items():
         eccentricity, oil_c = truth.eccentricity_ratio, truth.oil_temperature_c

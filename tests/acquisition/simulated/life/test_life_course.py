@@ -77,14 +77,6 @@ def test_the_vortex_is_there_at_part_load_only(inputs):
     assert part.hydraulic.rms_n > 0.0
 
 
-def test_between_readings_everything_runs_in_straight_lines(inputs):
-    course = LifeCourse(inputs, (), UNIT, running_ns(inputs))
-    first, middle, last = (course.at(s).bearings["UJB"] for s in (0.0, 300.0, 600.0))
-    for name in ("centre_x_um", "oil_temperature_c", "gap_growth_um"):
-        mean = (getattr(first, name) + getattr(last, name)) / 2.0
-        assert getattr(middle, name) == pytest.approx(mean, abs=1e-9), name
-
-
 def test_damage_sets_in_to_the_second_and_grows_as_told(inputs):
     now_ns = running_ns(inputs)
     loss = Damage(DamageKind.STIFFNESS_LOSS, "UJB", now_ns + 100 * NS_PER_S, 0.2, 60.0 / 86_400.0)

@@ -184,13 +184,6 @@ def test_the_rotor_moves_on_tilting_pads_as_their_dynamic_stiffness_demands():
         np.testing.assert_allclose(response, relative @ expected, rtol=0.003)
 
 
-def test_a_film_without_lags_is_the_same_at_all_frequencies():
-    constant = Film.proportional(1.0e9, 0.7e9, 0.1e9)
-
-    assert constant.at(3.0) == constant
-    assert film("TJB", 425.0, 0.3).at(60.0).k_xx_n_per_m < 1.4e9
-
-
 def test_a_rotor_follows_films_of_tilting_pads_from_one_moment_to_the_next():
     def scenario(eccentricity: float) -> Scenario:
         places = (("UJB", 500.0), ("LJB", 615.0), ("TJB", 425.0))

@@ -45,17 +45,6 @@ def test_the_samples_have_the_response_of_the_transducer(name, rate_hz):
     assert np.abs(off / response.at(frequency_hz)).max() < 5e-4
 
 
-@pytest.mark.parametrize("name", RESPONSES)
-def test_a_filter_joins_from_piece_to_piece_without_a_seam(name):
-    signal: FloatArray = np.random.default_rng(1).standard_normal(3000)
-    whole = ResponseFilter(RESPONSES[name], RATE_HZ).advance(signal)
-    stream = ResponseFilter(RESPONSES[name], RATE_HZ)
-
-    pieces = [stream.advance(piece) for piece in np.split(signal, [1, 3, 100, 2048])]
-
-    assert np.array_equal(np.concatenate(pieces), whole)
-
-
 def test_a_standing_gap_leaves_no_transient():
     passed = ResponseFilter(Resonance(60.0, 0.1), RATE_HZ).advance(np.full(500, 2000.0))
     blocked = ResponseFilter(HighPass(0.5), RATE_HZ).advance(np.full(500, 2000.0))
@@ -132,15 +121,6 @@ STREAMS: dict[str, Callable[[], Excitation]] = {
     "white": lambda: HydraulicForce(np.random.default_rng(2), 1.0, None, RATE_HZ),
     "band": lambda: HydraulicForce(np.random.default_rng(3), 1.0, 20.0, RATE_HZ),
 }
-
-
-@pytest.mark.parametrize("name", STREAMS)
-def test_a_force_joins_from_piece_to_piece_without_a_seam(name):
-    whole = STREAMS[name]().advance(1000)
-    stream = STREAMS[name]()
-    pieces = [stream.advance(n) for n in (1, 2, 97, 400, 500)]
-
-    assert np.array_equal(np.concatenate(pieces, axis=1), whole)
 
 
 def test_unbalance_turns_forward_once_per_revolution_with_constant_force():

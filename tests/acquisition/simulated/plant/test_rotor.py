@@ -7,9 +7,7 @@ from acquisition.simulated.plant.rotor import (
     RotorParameters,
     bearing_response,
     force_map,
-    forward_force,
     rotor_matrices,
-    unbalance_force_n,
 )
 
 PARAMETERS = RotorParameters()
@@ -72,15 +70,6 @@ def test_a_pull_at_the_runner_moves_the_turbine_bearing_most_unless_the_seals_ho
     assert all(np.abs(motion).max() < 1e-7 for motion in response.values())
 
 
-def test_an_isotropic_machine_whirls_forward_in_circles_under_unbalance():
-    matrices = rotor_matrices(PARAMETERS, ISOTROPIC, 92.3)
-    force = forward_force(PARAMETERS, ForcePlane.MASS_CENTRE, 75.6e3)
-
-    for u_x, u_y, x_b, y_b in bearing_response(PARAMETERS, matrices, 1.538, force).values():
-        assert u_y == pytest.approx(-1j * u_x)
-        assert y_b == pytest.approx(-1j * x_b)
-
-
 def test_an_excited_generator_pulls_the_shaft_further_off_centre():
     excited = RotorParameters(magnetic_stiffness_n_per_m=-0.6e9)
     force = force_map(PARAMETERS, ForcePlane.GENERATOR) @ np.array([1.0e5 + 0j, 0.0])
@@ -92,15 +81,3 @@ def test_an_excited_generator_pulls_the_shaft_further_off_centre():
     }
 
     assert deflection[-0.6e9] > deflection[0.0] > 0.0
-
-
-def test_unbalance_force_grows_with_the_grade_and_the_square_of_speed():
-    assert unbalance_force_n(4.25, 92.3) == pytest.approx(75.6e3)
-    assert unbalance_force_n(8.5, 92.3) == pytest.approx(2 * 75.6e3)
-    assert unbalance_force_n(4.25, 46.15) == pytest.approx(75.6e3 / 4)
-
-
-def test_effective_stiffness_is_the_magnitude_of_spring_and_dashpot_together():
-    film = Film.proportional(3.0e9, 1.0e9, damping_over_stiffness_s=0.75)
-
-    assert film.effective_stiffness_n_per_m(1.0) == pytest.approx((3.75e9, 1.25e9))

@@ -58,17 +58,6 @@ def test_stiffness_grows_with_viscosity_and_speed_and_falls_with_the_cube_of_cle
     assert k_xx(RING, ratio, 30.0, clearance_um=400.0) == pytest.approx(usual / 8.0)
 
 
-@pytest.mark.parametrize("ratio", [0.2, 0.4, 0.6])
-def test_many_pads_come_to_the_integral_around_the_shaft(ratio):
-    # (1/π) ∫ cos²θ / (1 − ε cos θ)³ dθ and the same with sin²θ, over a full turn
-    pushed = film(MANY, ratio)
-
-    left = 1.0 - ratio**2
-    along, across = (1.0 + 2.0 * ratio**2) / left**2.5, left**-1.5
-    assert pushed.k_xx_n_per_m[0] / 6.67e9 == pytest.approx(along, rel=1e-6)
-    assert pushed.k_yy_n_per_m[0] / 6.67e9 == pytest.approx(across, rel=1e-6)
-
-
 def test_stiffness_of_uneven_pads_is_how_their_force_grows():
     pads_um: FloatArray = 200.0 + 20.0 * np.random.default_rng(5).standard_normal(16)
     angles, step_um = RING.pad_angles_rad, 1e-3

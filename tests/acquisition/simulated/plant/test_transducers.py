@@ -9,7 +9,7 @@ from acquisition.simulated.plant.chain import KeyPhasePulses
 from acquisition.simulated.plant.faults import to_counts
 from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.plant import SimulatedPlant
-from acquisition.simulated.plant.scenario import KeyPhasePulse, Scenario, TransducerNoise
+from acquisition.simulated.plant.scenario import KeyPhasePulse, Scenario
 from core.arrays import FloatArray
 from core.checks.channels import COUNTS_FULL_SCALE
 from core.machine.channel import Channel, Measurand
@@ -71,16 +71,6 @@ def test_a_wandering_shaft_leaves_no_step_in_the_gap(machine, quiet):
 
     assert np.ptp(gap_um) > 30.0
     assert np.abs(np.diff(gap_um)).max() < 0.1
-
-
-def test_each_kind_of_transducer_has_its_own_noise(machine, quiet):
-    noisy = replace(quiet, noise=TransducerNoise(gap_um_rms=0.5, velocity_mm_s_rms=0.02))
-
-    noise = readings(machine, noisy, 20) - readings(machine, quiet, 20)
-
-    # 41,000 samples: the rms scatters by 0.35 %.
-    assert noise.std(axis=1) == pytest.approx([0.5, 0.5, 0.02, 0.02] * 3, rel=0.02)
-    assert np.abs(np.corrcoef(noise) - np.eye(12)).max() < 0.03
 
 
 def test_the_converter_rounds_to_counts_and_clips_at_its_rails(calibration):
@@ -169,16 +159,6 @@ def test_pulses_that_fall_are_those_that_rise_upside_down(with_key_phase, quiet)
     assert up.max() == pytest.approx(5.5)
     # six degrees of a turn
     assert np.mean(up - 0.5) == pytest.approx(5.0 * 6.0 / 360.0, rel=0.05)
-
-
-def test_a_key_phase_has_noise_of_its_own_and_leaves_the_other_channels_as_they_are(
-    machine, with_key_phase, quiet
-):
-    noisy = replace(quiet, noise=TransducerNoise(key_phase_v_rms=0.05))
-    silent, found = (readings(with_key_phase, scenario, N_CHUNKS) for scenario in (quiet, noisy))
-    assert (found - silent)[-2].std() == pytest.approx(0.05, rel=0.05)
-    for signal in (silent, found):
-        assert np.array_equal(signal[:-2], readings(machine, quiet, N_CHUNKS))
 
 
 @pytest.mark.parametrize(("mark_turns", "is_under"), [(0.5, False), (1e-3, True)])

@@ -188,11 +188,6 @@ def readings(plant: SimulatedPlant, n_chunks: int) -> FloatArray:
     return np.concatenate([plant.advance().readings for _ in range(n_chunks)], axis=1)
 
 
-def test_a_course_that_stands_still_is_a_scenario(machine, quiet):
-    steady, course = (SimulatedPlant(machine, s, 3) for s in (quiet, Told(lambda _: quiet)))
-    assert readings(course, 4) == pytest.approx(readings(steady, 4), abs=1e-9)
-
-
 def test_a_film_that_softens_within_a_minute_leaves_no_click(machine, quiet):
     course = Told(lambda s: softened(quiet, 0.2 * min(max(s - 7.0, 0.0) / 60.0, 1.0)))
     seen = readings(SimulatedPlant(machine, course, 3), 24)[BEARING]

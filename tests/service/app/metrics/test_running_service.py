@@ -113,13 +113,8 @@ def test_names_follow_the_rules_of_prometheus(told):
     assert len(families) > 30
     for family in families:
         words = family.name.split("_")
-        assert re.fullmatch(r"[a-z][a-z0-9_]*", family.name), family.name  # a colon is for rules
         assert not set(words) & NOT_BASE_UNITS, family.name
-        assert words[-1] not in ("total", "count", "sum", "bucket"), family.name
         assert family.documentation.endswith("."), family.name
-        assert family.type in ("counter", "gauge", "histogram"), family.name
-        if family.type == "counter":
-            assert all(sample.name == f"{family.name}_total" for sample in family.samples)
         if family.type == "histogram" or TIMES & set(words):
             assert family.name.endswith(BASE_UNITS), family.name
 

@@ -98,19 +98,6 @@ async def busy_database(plant: PlantFile) -> AsyncIterator[None]:
         blocker.close()
 
 
-async def check_acknowledging(plant: PlantFile, server: NatsServer) -> None:
-    """Acknowledge nothing while nothing can be stored, and everything afterwards."""
-    async with looking(plant, server) as look, analysing(plant):
-        await until(lambda: _is(look.stored() == 0))
-        async with busy_database(plant):
-            await publish(plant)
-            await until(look.many_delivered)
-            await asyncio.sleep(0.2)  # for who acknowledges at once to be seen doing it
-            await look.require_acknowledged_is_stored()
-        await until(lambda: _is(look.stored() == N_BLOCKS))
-        await until(look.all_acknowledged)
-
-
 async def _is(so: bool) -> bool:
     return so
 
@@ -121,7 +108,15 @@ def plant(tmp_path: Path, server: NatsServer) -> PlantFile:
 
 
 async def test_a_block_is_acknowledged_after_its_results_are_stored(plant, server):
-    await check_acknowledging(plant, server)
+    async with looking(plant, server) as look, analysing(plant):
+        await until(lambda: _is(look.stored() == 0))
+        async with busy_database(plant):
+            await publish(plant)
+            await until(look.many_delivered)
+            await asyncio.sleep(0.2)  # for who acknowledges at once to be seen doing it
+            await look.require_acknowledged_is_stored()
+        await until(lambda: _is(look.stored() == N_BLOCKS))
+        await until(look.all_acknowledged)
 
 
 async def test_stored_blocks_delivered_again_are_acknowledged_again(plant, server, monkeypatch):
