@@ -7,15 +7,22 @@ import numpy as np
 import numpy.typing as npt
 
 from acquisition.simulated.life.damage import Damage, DamageKind
+from acquisition.simulated.life.excitation import rotor_of
 from acquisition.simulated.life.life import live
-from acquisition.simulated.life.moment import scenario_at
+from acquisition.simulated.life.moment import (
+    TRANSDUCER_NOISE,
+    bearing_at,
+    channels_at,
+    hydraulic_noise,
+    vortex_rope,
+)
 from acquisition.simulated.life.truth import UnitLife
+from acquisition.simulated.plant.scenario import Scenario
 from benchmarks.chain_unit import UNIT, Window
 from benchmarks.detection_cases import four_fold
 from benchmarks.detection_unit import (
     BRACKETS_N_PER_M,
     DAY_NS,
-    LIMITS,
     SETTINGS,
     START_NS,
     YEARS,
@@ -24,7 +31,7 @@ from benchmarks.detection_unit import (
 from core.baseline.history import ReadingOutcome
 from core.change.film_judge import FilmJudge, FilmNews
 from core.change.film_reading import FilmReading, FilmValue
-from core.change.settings import FilmRules
+from core.change.settings import ChangeLimits, FilmRules
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import (
     UNKNOWN_OPERATION,
@@ -97,8 +104,31 @@ class Story:
 def windows(life: UnitLife, rows: npt.NDArray[np.int64]) -> Iterator[Window]:
     """What is sampled for each reading."""
     for row in rows.tolist():
-        time_ns = int(life.operation.time_ns[row])
-        yield Window(time_ns, scenario_at(life, time_ns, UNIT), row)
+        yield Window(int(life.operation.time_ns[row]), scenario_at(life, row), row)
+
+
+def scenario_at(life: UnitLife, row: int) -> Scenario:
+    """Steady operation at a reading, with the transducer errors of the reading."""
+    load = float(life.operation.load[row])
+    grow = {b.id for b in UNIT.bearings if b.opposite_reference_um is not None}
+    return Scenario(
+        bearings={
+            id_: bearing_at(truth, row, id_ in grow, float(np.median(truth.clearance_um)))
+            for id_, truth in life.truth.items()
+        },
+        speed_rpm=float(life.operation.speed_rpm[row]),
+        active_power_mw=float(life.operation.power_mw[row]),
+        unbalance_grade_mm_s=float(life.grade_mm_s[row]),
+        hydraulic=hydraulic_noise(load),
+        rope=vortex_rope(load),
+        noise=TRANSDUCER_NOISE,
+        channels={
+            channel: one
+            for bearing in UNIT.bearings
+            for channel, one in channels_at(life.truth[bearing.id], row, bearing)
+        },
+        rotor=rotor_of(tuple(life.truth)),
+    )
 
 
 def from_readings(life: UnitLife, row: int) -> list[FilmReading]:
@@ -166,7 +196,7 @@ class Watch:
             dict.fromkeys(learned.baselines, Estimator.DYNAMIC),
             SETTINGS.grid,
             self._limits,
-            LIMITS,
+            ChangeLimits(),
             ns_from_s(operation.step_s),
         )
         self._judge = FilmJudge(rules, BRACKETS_N_PER_M)

@@ -119,6 +119,8 @@ class GatheredEvidence:
 
     def findings(self, baseline: QuantityBaseline) -> list[Finding]:
         """Return the mean deviation over each time scale that has fully elapsed."""
+        if not self.n_counted:
+            return []
         return [
             sums.finding(time)
             for sums, time in zip(self.scales, baseline.time_scatter, strict=True)

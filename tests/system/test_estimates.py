@@ -154,7 +154,7 @@ def test_a_budget_adds_up_to_the_uncertainty_that_is_stated(part_load):
         and assessment.readings[name].value is not None
         and not name.startswith(("stiffness_", "gap_growth_"))
     }
-    assert len(assessment.budgets) == 53
+    assert len(assessment.budgets) == 55
     for name, budget in assessment.budgets.items():
         reading = assessment.readings[name]
         assert reading.value == budget.value
