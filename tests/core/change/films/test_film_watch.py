@@ -64,6 +64,16 @@ def test_a_restart_in_the_middle_changes_no_verdict(films, rules):
     assert [n.findings[0] for n in first + second] == [n.findings[0] for n in through]
 
 
+def test_a_softer_film_is_an_alarm_though_its_damping_is_never_read(films):
+    stiffness = films.baseline.quantities
+    damping = tuple(replace(each, quantity=f"c{each.quantity}") for each in stiffness)
+    watch = films.watch(has_baseline=False)
+    learned = replace(films.baseline, quantities=(*stiffness, *damping))
+    watch.judge.activate_baseline("UJB", learned)
+    news = films.watched(films.later(change=loss(0.2, 106.0)), watch)
+    assert news[-1].findings[0].level is not None
+
+
 def test_a_baseline_of_stiffness_is_not_compared_with_ratios_to_an_unknown_bracket(films, rules):
     ratios = FilmWatch(rules, FilmJudge(rules, {"UJB": None}))
     ratios.judge.activate_baseline("UJB", films.baseline)

@@ -138,8 +138,6 @@ class Told:
     scrapes: Mapping[str, Scrape]
     blind: Scrape
     sources: list[dict[str, Any]]
-    document: dict[str, Any]
-    below_the_api: int
 
     @property
     def plain(self) -> Scrape:
@@ -209,8 +207,6 @@ async def asked(client: httpx2.AsyncClient, folder: Path) -> Told:
         scrapes=scrapes,
         blind=blind,
         sources=(await client.get("/api/v1/sources")).json(),
-        document=(await client.get("/api/v1/openapi.json")).json(),
-        below_the_api=(await client.get("/api/v1/metrics")).status_code,
     )
 
 

@@ -89,14 +89,6 @@ def test_requests_are_timed_by_route_and_status(told):
     assert told.blind.value("padwatch_serving_process_cpu_seconds_total") > 0.0
 
 
-def test_metrics_are_described_with_the_api(told):
-    operation = told.document["paths"]["/metrics"]["get"]
-
-    assert operation["summary"]
-    assert set(operation["responses"]["200"]["content"]) == {"text/plain"}
-    assert told.below_the_api == 404
-
-
 def test_an_outbox_that_cannot_be_read_is_a_metric_and_no_failed_scrape(told):
     waiting = "padwatch_delivery_waiting_messages"
 
