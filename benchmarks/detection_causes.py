@@ -1,4 +1,4 @@
-"""Which cause is told of films that changed, a week of running after."""
+"""Causes that are named for changed films after a week of running."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

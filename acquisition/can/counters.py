@@ -67,7 +67,7 @@ class CounterFollower:
         self._left: tuple[int, int, int, int | None] | None = None
 
     def place(self, part: Part, data: bytes, arrived_ns: int) -> list[PlacedFrame]:
-        """Add a frame of `part`; return the frames whose sample index it makes known.
+        """Add a frame of `part`; return the frames whose sample index it determines.
 
         These are the frame itself, and earlier frames that it confirms; possibly none.
 

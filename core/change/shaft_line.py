@@ -49,6 +49,10 @@ HOLDS, BROKEN = 3.5, 6.0
 """Distance from the line, in standard uncertainties, up to which it holds, and from which it is
 broken."""
 
+MIN_PROBE_RISE = 0.2
+"""Smallest change of ln k per change of ln of a probe's gain that is assumed. A learned surface may
+fall with eccentricity by chance, and then no gain would be too large to explain a change."""
+
 GAIN_SPREAD, GAIN_STD = 0.25, 0.012
 """Standard uncertainty of the gain that a change of stiffness predicts: relative, and absolute."""
 
@@ -136,7 +140,10 @@ class ShaftLine:
         std = self.std_um * max(MEANS_OF / int(usable.sum()), LASTING) ** 0.5
         row = self.bearings.index(bearing)
         gains = {
-            LineVerdict.PROBE: (-ln_k / (1.0 + rise), self.probe[row] * shaft[row]),
+            LineVerdict.PROBE: (
+                -ln_k / max(1.0 + rise, MIN_PROBE_RISE),
+                self.probe[row] * shaft[row],
+            ),
             LineVerdict.ACCELEROMETER: (ln_k, self.accelerometer[row] * motion[row]),
         }
         return LineFinding(_verdict(off, std, gains), abs(off), std)

@@ -125,7 +125,7 @@ def _ck_budgets(
             (
                 random_line(STATISTICS, math.sqrt(float(per @ found.covariance[row] @ per))),
                 *map(systematic_line, names, widths, (found.changes[:, row] @ per).tolist()),
-                systematic_line("spectral resolution", RESOLUTION, math.hypot(c / k, c / k)),
+                systematic_line("spectral resolution", RESOLUTION, math.sqrt(2.0) * abs(c / k)),
                 systematic_line("film over frequency", model, 1.0),
             ),
         )

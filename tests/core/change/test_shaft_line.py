@@ -109,3 +109,4 @@ def test_without_a_stiff_shaft_three_bearings_and_phases_there_is_no_line():
     [line, _] = lines(motion(1))
     nothing = np.full((3, 4), np.nan + 0j)
     assert line.judge("UJB", nothing, nothing, -0.1, 0.0).verdict is LineVerdict.UNKNOWN
+    assert line.judge("UJB", *np.ones((2, 3, 4)), 0.3, -1.0).std_um  # the surface falls

@@ -38,7 +38,7 @@ Exposed = dict[str, tuple[str, set[frozenset[tuple[str, str]]]]]
 def check(expr: str, exposed: Exposed) -> tuple[set[str], set[str]]:
     """Compare an expression with what is told; return its metrics and the labels of its result."""
     names = set(re.findall(r"\b(?:padwatch|process)_\w+|\bup\b", expr))
-    assert names <= set(exposed), f"{expr}: nobody tells one of {names}"
+    assert names <= set(exposed), f"{expr}: not all of {names} are exposed"
     label_sets = [labels for name in names for labels in exposed[name][1]]
     known = TARGET | {label for labels in label_sets for label, _ in labels}
     for name in names:
