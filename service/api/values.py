@@ -13,13 +13,16 @@ from core.condition.operating_state import OperatingState
 from core.monitor.assessment import AveragingWindow
 from core.quality import Level, Reading
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
+from service.api.meanings import describe_fields
 from service.runtime.models import ByName as ByName
 from service.runtime.models import Time as Time
 from service.runtime.models import ValueModel
 
 
 class ApiModel(ValueModel):
-    """Base class of API models."""
+    """Base class of API models; `MEANINGS` explains the fields that have no docstring."""
+
+    model_config = ConfigDict(json_schema_extra=describe_fields)
 
 
 class RequestModel(ApiModel):
@@ -45,7 +48,7 @@ ReasonText = Annotated[
     str,
     StringConstraints(strip_whitespace=True, min_length=1, max_length=500),
     AfterValidator(_printable),
-    Field(examples=["probe is being changed"]),
+    Field(description="Reason, on one line.", examples=["probe is being changed"]),
 ]
 
 NoteText = Annotated[
@@ -78,10 +81,7 @@ class BearingAnswer(ApiModel):
     """Base class of answers about one bearing."""
 
     unit: str
-    """Identifier of the unit."""
-
     bearing: str
-    """Identifier of the bearing."""
 
 
 class BearingHistory(BearingAnswer):
@@ -98,13 +98,8 @@ class SampleRange(ApiModel):
     """Base class of answers with consecutive samples of a unit."""
 
     epoch: int
-    """Epoch of the sample index; it changes when the device restarts its count."""
-
     first_index: int
-    """Index of the first sample."""
-
     rate_hz: float
-    """Sampling rate, Hz."""
 
 
 class QualityModel(ApiModel):
@@ -120,17 +115,14 @@ class QualityModel(ApiModel):
 class UncertaintyModel(ApiModel):
     """Uncertainty of a value according to the GUM, in the unit of the value."""
 
+    low_95: float
+    high_95: float
+
     random: float | None
     """Random standard uncertainty; null if unknown."""
 
     systematic: float | None
     """Systematic standard uncertainty, due to transducers and bracket; null if unknown."""
-
-    low_95: float
-    """Lower end of the 95 % coverage interval."""
-
-    high_95: float
-    """Upper end of the 95 % coverage interval."""
 
 
 class ReadingModel(ApiModel):
@@ -153,10 +145,8 @@ class WindowModel(ApiModel):
     """Averaging window of a result: range of samples and number of segments."""
 
     epoch: int
-    """Epoch of the sample index; it changes when the device restarts its count."""
-
     first_index: int
-    """Index of the first sample."""
+    duration_s: float
 
     last_index: int
     """Index of the last sample."""
@@ -173,9 +163,6 @@ class WindowModel(ApiModel):
     coverage: float
     """Fraction of the segments in the window that are averaged, 0 to 1."""
 
-    duration_s: float
-    """Time from the first to the last sample, s."""
-
 
 OperatingStateName = Literal[
     "unknown", "standstill", "run_up", "speed_no_load", "part_load", "full_load", "run_down"
@@ -186,38 +173,22 @@ class CellModel(ApiModel):
     """Cell of the grid of operating conditions; film readings in one cell are comparable."""
 
     eccentricity_low: Annotated[float, Field(examples=[0.35])]
-    """Lower bound of the eccentricity ratio."""
-
     eccentricity_high: Annotated[float, Field(examples=[0.4])]
-    """Upper bound of the eccentricity ratio."""
-
     oil_temperature_low_c: Annotated[float, Field(examples=[45.0])]
-    """Lower bound of the oil temperature, °C."""
-
     oil_temperature_high_c: Annotated[float, Field(examples=[47.5])]
-    """Upper bound of the oil temperature, °C."""
-
     attitude_low_deg: float | None
-    """Lower bound of the attitude angle, degrees; null if cells do not depend on this angle."""
-
     attitude_high_deg: float | None
-    """Upper bound of the attitude angle, degrees; null if cells do not depend on this angle."""
 
 
 class FilmConditionModel(ApiModel):
     """Operating condition of a bearing."""
 
+    operating_state: Annotated[OperatingStateName, ByName]
+    is_settled: bool
+    cell: CellModel | None
+
     time: Time
     """Time to which the operating condition refers."""
-
-    operating_state: Annotated[OperatingStateName, ByName]
-    """Operating state of the unit."""
-
-    is_settled: bool
-    """Whether the state, and with it the warm-up, has lasted long enough to judge the film."""
-
-    cell: CellModel | None
-    """Cell of the grid that contains the condition; null if a coordinate is unknown."""
 
 
 PlaceName = Literal["shaft_x", "shaft_y", "bearing_x", "bearing_y"]

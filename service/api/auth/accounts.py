@@ -27,7 +27,14 @@ from service.store.access.tables import AccessRefusedError, Account, UnknownAcco
 RoleName = Literal["viewer", "operator", "engineer", "admin"]
 
 
-LoginName = Annotated[str, Field(max_length=4 * MAX_NAME, examples=["anna"])]
+LoginName = Annotated[
+    str,
+    Field(
+        max_length=4 * MAX_NAME,
+        description="Name, of the characters a-z 0-9 . _ @ -.",
+        examples=["anna"],
+    ),
+]
 
 
 Password = Annotated[
@@ -41,14 +48,11 @@ UnitName = Annotated[str, Field(max_length=32, examples=["U1"])]
 class AccountModel(ApiModel):
     """Account of a person."""
 
+    role: Annotated[RoleName, Field(examples=["operator"])]
+    created: Time
+
     name: Annotated[str, Field(examples=["anna"])]
     """Login name."""
-
-    role: Annotated[RoleName, Field(examples=["operator"])]
-    """Role of the person, which determines the permissions."""
-
-    created: Time
-    """Time of creation of the account."""
 
     password_set: Time
     """Time when the password was last set."""
@@ -57,11 +61,10 @@ class AccountModel(ApiModel):
 class NewAccountModel(RequestModel):
     """Request to add an account of a person."""
 
+    role: Annotated[RoleName, Field(examples=["operator"])]
+
     name: LoginName
     """Login name, of the characters a-z 0-9 . _ @ -."""
-
-    role: Annotated[RoleName, Field(examples=["operator"])]
-    """Role of the person, which determines the permissions."""
 
     password: Password
     """Initial password: 12 to 256 characters, at least 6 of them different."""
@@ -71,7 +74,6 @@ class SetRoleModel(RequestModel):
     """Request to change the role of an account."""
 
     role: Annotated[RoleName, Field(examples=["engineer"])]
-    """New role, effective from the next request of the account."""
 
 
 class SetPasswordModel(RequestModel):
@@ -84,23 +86,20 @@ class SetPasswordModel(RequestModel):
 class KeyModel(ApiModel):
     """API key of a machine, without its secret."""
 
+    role: Annotated[RoleName, Field(examples=["viewer"])]
+    created: Time
+
     id: Annotated[str, Field(examples=["5f0c6f3a9b1e"])]
     """Public part of the key, which identifies it."""
 
     name: Annotated[str, Field(examples=["historian"])]
     """Name of the key, such as that of the machine."""
 
-    role: Annotated[RoleName, Field(examples=["viewer"])]
-    """Role of the machine that uses the key."""
-
     units: Annotated[list[str], Field(examples=[["U1", "U2"]])]
     """Units for which the key is valid; empty if it is valid for all units."""
 
     state: Literal["valid", "expired", "revoked"]
     """State of the key."""
-
-    created: Time
-    """Time of creation of the key."""
 
     expires: Time
     """Time of expiry of the key."""
@@ -115,11 +114,10 @@ class KeyModel(ApiModel):
 class NewKeyModel(RequestModel):
     """Request to create an API key for a machine."""
 
+    role: Annotated[RoleName, Field(examples=["viewer"])]
+
     name: LoginName
     """Name of the key, of the characters a-z 0-9 . _ @ -."""
-
-    role: Annotated[RoleName, Field(examples=["viewer"])]
-    """Role of the machine that uses the key."""
 
     units: Annotated[list[UnitName], FailFast(), Field(max_length=200, default_factory=list)]
     """Units for which the key is valid; empty if it is valid for all units."""

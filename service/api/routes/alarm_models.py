@@ -48,10 +48,7 @@ class HoldModel(ApiModel):
     """Period in which an alarm is shelved or out of service."""
 
     actor: str
-    """Person who shelved the alarm or took it out of service."""
-
     reason: str
-    """Reason given by the person."""
 
     since: Time
     """Start of the period."""
@@ -64,19 +61,10 @@ class RaisedAtModel(ApiModel):
     """Operating condition under which an occurrence of an alarm was raised."""
 
     operating_state: Annotated[OperatingStateName, ByName]
-    """Operating state of the unit."""
-
     eccentricity_ratio: Annotated[float | None, Field(examples=[0.37])]
-    """Eccentricity ratio; null if unknown, and for alarms that concern no bearing."""
-
     attitude_deg: Annotated[float | None, Field(examples=[47.0])]
-    """Attitude angle, degrees; null if unknown."""
-
     oil_temperature_c: Annotated[float | None, Field(examples=[46.2])]
-    """Oil temperature, °C; null if unknown."""
-
     cell: CellModel | None
-    """Cell of the grid of operating conditions; null if a coordinate of the cell is unknown."""
 
 
 class AlarmModel(ApiModel):
@@ -168,10 +156,7 @@ class AlarmListModel(ApiModel):
     """List of alarms that are not normal, and of normal alarms whose condition is unknown."""
 
     origin: OriginName
-    """Origin of the data: live, or replay of a recording."""
-
     count: AlarmCount
-    """Counts of alarms by state."""
 
     alarms: list[AlarmModel]
     """Alarms that are not normal: unacknowledged first, danger before alert, newest first."""
@@ -187,10 +172,7 @@ class AlarmEventModel(ApiModel):
     """Number of the event in the history of all alarms; later events have higher numbers."""
 
     alarm: AlarmIdText
-    """Identifier of the alarm."""
-
     unit: str
-    """Identifier of the unit."""
 
     subject: str
     """Subject of the alarm, such as the identifier of a channel or bearing."""
@@ -202,7 +184,6 @@ class AlarmEventModel(ApiModel):
     """Number of the event in the history of the alarm, from 1 without gaps."""
 
     change: AlarmChangeName
-    """Kind of event."""
 
     level: Annotated[AlarmLevelName, ByName] | None
     """Level after the event; for a return to normal, the level before the return; null if none."""
@@ -217,7 +198,6 @@ class AlarmEventModel(ApiModel):
     """Time of the event: sample time if samples caused it, otherwise time of the host clock."""
 
     occurrence: int
-    """Number of the occurrence of the alarm to which the event belongs."""
 
     value: float | None
     """Value compared with the limit; null without a value."""
@@ -245,13 +225,10 @@ class AlarmEventsModel(ApiModel):
     """One page of the list of alarm events."""
 
     origin: OriginName
-    """Origin of the data: live, or replay of a recording."""
+    next_before: int | None
 
     events: list[AlarmEventModel]
     """Alarm events, newest first."""
-
-    next_before: int | None
-    """Value of the parameter ``before`` for the next page; null on the last page."""
 
 
 def alarm_list_model(alarms: LiveAlarms, films: LiveFilms, origin: Origin) -> AlarmListModel:

@@ -29,7 +29,6 @@ class FrequentModel(ApiModel):
     """Frequently announced alarm, with its number of announcements."""
 
     alarm: AlarmIdText
-    """Identifier of the alarm."""
 
     n_alarms: int
     """Number of announcements of the alarm."""

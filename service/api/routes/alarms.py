@@ -78,7 +78,6 @@ class OutageModel(ActorModel):
     """Request to take an alarm out of service."""
 
     reason: ReasonText
-    """Reason, 1 to 500 printable characters."""
 
 
 class ShelveModel(OutageModel):

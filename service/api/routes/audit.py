@@ -23,6 +23,9 @@ SourceName = Literal["api", "command_line", "padwatch"]
 class AuditEntryModel(ApiModel):
     """Entry of the audit trail: one action with its actor and object."""
 
+    actor: Annotated[str, Field(examples=["A. Name"])]
+    reason: str
+
     chain: Annotated[str, Field(examples=["access"])]
     """Chain of the entry. With SQLite, `access` has logins, accounts, keys and refused requests,
     and `padwatch` has everything else; with PostgreSQL, the only chain is `postgresql`."""
@@ -32,9 +35,6 @@ class AuditEntryModel(ApiModel):
 
     time: Time
     """Time of the action."""
-
-    actor: Annotated[str, Field(examples=["A. Name"])]
-    """Name of the person or API key that acted; empty if unknown."""
 
     source: SourceName
     """Source of the action: API, command line, or padwatch itself."""
@@ -54,9 +54,6 @@ class AuditEntryModel(ApiModel):
     after: Annotated[dict[str, Any] | None, Field(examples=[{"state": "shelved"}])]
     """State of the object after the action; null without a state."""
 
-    reason: str
-    """Reason given by the actor; may be empty."""
-
     previous_hash: str
     """Hash of the previous entry of the chain, 64 hexadecimal digits."""
 
@@ -67,11 +64,10 @@ class AuditEntryModel(ApiModel):
 class AuditModel(ApiModel):
     """One page of the audit trail."""
 
+    next_before: Annotated[str | None, Field(examples=["padwatch:117,access:45"])]
+
     entries: list[AuditEntryModel]
     """Entries of all chains of the audit trail, newest first."""
-
-    next_before: Annotated[str | None, Field(examples=["padwatch:117,access:45"])]
-    """Value of the parameter ``before`` for the next page; null on the last page."""
 
     head_error: str | None
     """Reason why a file with the newest hash could not be written; null if all were written. The

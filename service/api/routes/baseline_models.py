@@ -25,11 +25,10 @@ BaselineStepName = Literal[
 SupportName = Literal["own", "borrowed", "none"]
 
 
-class BaselineVersionModel(BaselineOriginModel):
+class BaselineVersionModel(BaselineOriginModel, ApiModel):
     """Version of the learned baseline of a bearing, without its cells."""
 
     estimator: EstimatorName
-    """Estimator of the learned stiffness."""
 
     status: BaselineStatusName
     """Status: in force; rejected by an engineer; superseded by another version or by a machine
@@ -45,6 +44,9 @@ class BaselineVersionModel(BaselineOriginModel):
 class BaselineStepModel(ApiModel):
     """Step in the history of the baselines of a bearing."""
 
+    actor: str
+    reason: str
+
     step: BaselineStepName
     """Kind of step."""
 
@@ -54,12 +56,6 @@ class BaselineStepModel(ApiModel):
     time: Time
     """Time of the step."""
 
-    actor: str
-    """Person or program that took the step."""
-
-    reason: str
-    """Reason for the step."""
-
     event_time: Time | None
     """For "renewed", time of the machine event; earlier readings are not used."""
 
@@ -68,7 +64,6 @@ class BaselinesModel(BearingAnswer):
     """All baseline versions of a bearing, and their history."""
 
     estimator: EstimatorName | None
-    """Estimator of the watched stiffness; null if the bearing is not watched."""
 
     in_force: int | None
     """Number of the version in force; null if no version is in force."""
@@ -97,22 +92,12 @@ class BaselineCellsModel(ApiModel):
     """Cells of a baseline in the grid of operating conditions, one value per cell in each list."""
 
     eccentricity_low: list[float]
-    """Lower bound of the eccentricity ratio."""
-
     eccentricity_high: list[float]
-    """Upper bound of the eccentricity ratio."""
-
     oil_temperature_low_c: list[float]
-    """Lower bound of the oil temperature, °C."""
-
     oil_temperature_high_c: list[float]
-    """Upper bound of the oil temperature, °C."""
-
     attitude_low_deg: list[float] | None
-    """Lower bound of the attitude angle, degrees; null if cells do not depend on this angle."""
-
     attitude_high_deg: list[float] | None
-    """Upper bound of the attitude angle, degrees; null if cells do not depend on this angle."""
+    stiffness_of_kb: list[float | None]
 
     eccentricity_ratio: list[float]
     """Median eccentricity ratio of the readings in the cell."""
@@ -130,9 +115,6 @@ class BaselineCellsModel(ApiModel):
     """Median stiffness of the readings, or of the fitted surface without readings, N/m; null if the
     bracket stiffness was unknown."""
 
-    stiffness_of_kb: list[float | None]
-    """The same stiffness as a ratio to the bracket stiffness; null if the latter was known."""
-
     scatter_percent: list[float]
     """Robust standard deviation of single readings about the fitted stiffness surface, %."""
 
@@ -148,7 +130,6 @@ class TimeScatterModel(ApiModel):
     """Scatter of the mean stiffness of a healthy film for one averaging time."""
 
     time_scale_h: float
-    """Averaging time, running hours."""
 
     share: float
     """Standard deviation of means over this time, divided by that of single readings."""
@@ -157,11 +138,10 @@ class TimeScatterModel(ApiModel):
 class BaselineDirectionModel(ApiModel):
     """Learned stiffness of an oil film in one direction, x or y."""
 
+    scatter_percent: float
+
     cells: BaselineCellsModel
     """Cells with readings, and cells between them."""
-
-    scatter_percent: float
-    """Typical standard deviation of single readings about the fitted stiffness surface, %."""
 
     u_random_percent: float
     """Typical random standard uncertainty of single readings, %, a part of their scatter."""
@@ -177,7 +157,8 @@ class BaselineModel(BearingAnswer):
     """Baseline of a bearing: learned stiffness by cell of the operating-condition grid."""
 
     about: BaselineVersionModel
-    """Origin and status of the baseline."""
+    x: BaselineDirectionModel | None
+    y: BaselineDirectionModel | None
 
     eccentricity_width: float | None
     """Width of the cells in eccentricity ratio; null if nothing was learned."""
@@ -185,18 +166,11 @@ class BaselineModel(BearingAnswer):
     oil_temperature_width_c: float | None
     """Width of the cells in oil temperature, K; null if nothing was learned."""
 
-    x: BaselineDirectionModel | None
-    """Baseline in x; null if there were too few readings."""
-
-    y: BaselineDirectionModel | None
-    """Baseline in y; null if there were too few readings."""
-
 
 class BaselineActionModel(ActorModel):
     """Request to change baselines, with a reason."""
 
     reason: ReasonText
-    """Reason, 1 to 500 printable characters."""
 
 
 class RenewModel(BaselineActionModel):

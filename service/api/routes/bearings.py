@@ -43,17 +43,12 @@ Note = Annotated[str, Field(description="Note of the author.", examples=["after 
 class ReferenceModel(ApiModel):
     """Origin of the gap reference in force: source, time and author."""
 
+    set: SetTime | None
+    author: Author | None
+    note: Note | None
+
     source: Literal["plant_file", "given", "measured"]
     """Source: plant file, values entered by hand ("given"), or mean measured gaps ("measured")."""
-
-    set: SetTime | None
-    """Time when the reference was set; null for the plant file."""
-
-    author: Author | None
-    """Person who set the reference; null for the plant file."""
-
-    note: Note | None
-    """Note of the author; null without a note."""
 
 
 PLANT_FILE = ReferenceModel(source="plant_file", set=None, author=None, note=None)
@@ -64,20 +59,13 @@ class BearingModel(ApiModel):
     """Configuration of a guide bearing, with the gap reference in force."""
 
     unit: str
-    """Identifier of the unit."""
-
     id: str
-    """Identifier of the bearing."""
-
     name: str | None
-    """Display name of the bearing; null without a name."""
+    clearance_um: float
 
     bracket_stiffness_n_per_m: float | None
     """Radial stiffness of the bearing bracket, N/m; null if unknown. Film coefficients are then
     reported as ratios to it."""
-
-    clearance_um: float
-    """Radial clearance in operation, µm."""
 
     gap_reference_um: MicrometrePair
     """Gap reference in force: probe gaps [x, y] with the shaft centred, µm."""
@@ -96,14 +84,10 @@ class ResultModel(ApiModel):
     """Newest result of a bearing; if it is not current, its readings are null and give a reason."""
 
     bearing: str
-    """Identifier of the bearing."""
+    received: Time | None
 
     time: Time | None
     """End of the samples of the newest result, even if it is not current; null without a result."""
-
-    received: Time | None
-    """Arrival time of these samples by the clock of the service, from which the age of the result
-    counts; null without a result."""
 
     quality: QualityModel
     """Quality of the result: the worst of its 1× amplitudes and its preferred stiffness."""
@@ -144,11 +128,11 @@ class LatestModel(ResultModel, BearingAnswer):
 class BudgetModel(ApiModel):
     """Uncertainty budget of one result (JCGM 100:2008, "GUM")."""
 
+    label: Annotated[str, Field(examples=["Film stiffness, broadband estimate, xx"])]
+    uncertainty: UncertaintyModel
+
     quantity: Annotated[str, Field(examples=["dynamic_k_xx_n_per_m"])]
     """Name of the quantity in the catalogue."""
-
-    label: Annotated[str, Field(examples=["Film stiffness, broadband estimate, xx"])]
-    """Description of the quantity in words."""
 
     unit: Annotated[str, Field(examples=["N/m"])]
     """Unit of the value and of the uncertainties."""
@@ -158,9 +142,6 @@ class BudgetModel(ApiModel):
 
     value: float
     """Value of the result."""
-
-    uncertainty: UncertaintyModel
-    """Combined uncertainty of the result."""
 
     lines: list[BudgetLineModel]
     """Contributions to the uncertainty, largest first."""

@@ -38,7 +38,8 @@ class WaveformChannelModel(ApiModel):
     """Settings and current state of a waveform channel."""
 
     id: Annotated[str, Field(examples=["ujb_shaft_x"])]
-    """Identifier of the channel within the unit."""
+    used_by: Annotated[list[str], Field(examples=[["UJB shaft_x"]])]
+    quality: QualityModel
 
     transducer: TransducerName
     """Kind of transducer."""
@@ -79,12 +80,6 @@ class WaveformChannelModel(ApiModel):
     probe: str | None
     """Serial number or label of the probe; null if unknown."""
 
-    used_by: Annotated[list[str], Field(examples=[["UJB shaft_x"]])]
-    """Uses of the channel: bearing identifier with key of the bearing, or "key_phase"."""
-
-    quality: QualityModel
-    """Quality of the newest block of samples."""
-
     minimum: float | None
     """Lowest sample of the newest block; null for a bad channel, or a device without samples."""
 
@@ -99,7 +94,8 @@ class SlowChannelModel(ApiModel):
     """Settings and newest reading of a slow channel, such as an oil temperature."""
 
     id: Annotated[str, Field(examples=["ujb_oil_temperature"])]
-    """Identifier of the channel within the unit."""
+    used_by: Annotated[list[str], Field(examples=[["UJB oil_temperature"]])]
+    quality: QualityModel
 
     unit: SlowUnit
     """Unit of the readings."""
@@ -116,30 +112,19 @@ class SlowChannelModel(ApiModel):
     maximum: float
     """Highest valid reading, in the unit of the readings."""
 
-    used_by: Annotated[list[str], Field(examples=[["UJB oil_temperature"]])]
-    """Uses of the channel: bearing identifier with key of the bearing, or key of the unit."""
-
     value: float | None
     """Newest reading; null if and only if its quality level is bad."""
-
-    quality: QualityModel
-    """Quality of the newest reading."""
 
 
 class ChannelsModel(ApiModel):
     """All channels of a unit with their current state."""
 
     unit: str
-    """Identifier of the unit."""
-
     rate_hz: float
-    """Sampling rate, Hz."""
+    received: Time | None
 
     time: Time | None
     """End of the newest block of samples, even if it is not current; null without a block."""
-
-    received: Time | None
-    """Arrival time of this block by the clock of the service; null without a block."""
 
     waveform: list[WaveformChannelModel]
     """Waveform channels, in the order of the plant file."""
@@ -151,11 +136,10 @@ class ChannelsModel(ApiModel):
 class ChannelSamplesModel(ApiModel):
     """Samples of one waveform channel."""
 
+    quality: QualityModel
+
     unit: ChannelUnit
     """Engineering unit of the samples."""
-
-    quality: QualityModel
-    """Worst quality of the channel in the blocks that contain the samples."""
 
     sample: list[float | None]
     """Samples at consecutive indices; null if a sample is missing or the channel was bad."""
@@ -165,16 +149,11 @@ class WaveformModel(SampleRange):
     """Newest samples of the requested channels of a unit."""
 
     unit: str
-    """Identifier of the unit."""
+    received: Time
+    n_samples: int
 
     time: Time
     """Time of the first sample."""
-
-    received: Time
-    """Arrival time of the newest sample by the clock of the service."""
-
-    n_samples: int
-    """Number of samples per channel."""
 
     channels: dict[str, ChannelSamplesModel]
     """Samples of the requested channels, by identifier of the channel."""

@@ -43,10 +43,7 @@ class FilmSeriesModel(ApiModel):
     """Readings of a film in x or y; every list has one value per time, null if unknown."""
 
     stiffness_n_per_m: list[float | None]
-    """Stiffness, N/m; null while the bracket stiffness was unknown."""
-
     stiffness_of_kb: list[float | None]
-    """Stiffness as a ratio to the bracket stiffness; null while the latter was known."""
 
     u_random_n_per_m: list[float | None]
     """Random standard uncertainty of the stiffness, N/m."""
@@ -70,13 +67,8 @@ class FilmSeriesModel(ApiModel):
     """Alarm level in force when the reading was made; null without a level."""
 
     change_percent: list[float | None]
-    """Most significant mean change of stiffness when the reading was made, %; null if unknown."""
-
     deviation_percent: list[float | None]
-    """Deviation of the reading from the baseline, %; null if the reading was not compared."""
-
     ck_s: list[float | None]
-    """Damping over stiffness, s."""
 
     u_random_ck_s: list[float | None]
     """Random standard uncertainty of damping over stiffness, s."""
@@ -85,10 +77,7 @@ class FilmSeriesModel(ApiModel):
     """Verdict on damping over stiffness when the reading was made."""
 
     ck_level: list[Annotated[AlarmLevelName, ByName] | None]
-    """Alarm level of damping over stiffness; null without a level."""
-
     ck_change_percent: list[float | None]
-    """Most significant mean change of damping over stiffness, %; null if unknown."""
 
     ck_deviation_percent: list[float | None]
     """Deviation of damping over stiffness from the baseline, %; null if it was not compared."""
@@ -98,10 +87,17 @@ class FilmReadingsModel(BearingHistory):
     """Stiffness readings of an oil film with their operating conditions, oldest first."""
 
     estimator: EstimatorName
-    """Estimator of the stiffness."""
-
     n_found: int
-    """Number of matching readings in the range, also of readings that the answer omits."""
+    operating_state: list[Annotated[OperatingStateName, ByName]]
+    is_settled: list[bool]
+    speed_rpm: list[float | None]
+    power_mw: list[float | None]
+    eccentricity_ratio: list[float | None]
+    attitude_deg: list[float | None]
+    oil_temperature_c: list[float | None]
+    baseline_version: list[int | None]
+    x: FilmSeriesModel
+    y: FilmSeriesModel
 
     next_end: Time | None
     """Without thinning, parameter ``end`` for the page of older readings; null if there is none."""
@@ -111,36 +107,6 @@ class FilmReadingsModel(BearingHistory):
 
     provenance: list[ProvenanceName]
     """Origin of the readings: "measured" on the machine, or "simulated"."""
-
-    operating_state: list[Annotated[OperatingStateName, ByName]]
-    """Operating state of the unit."""
-
-    is_settled: list[bool]
-    """Whether the operating state had lasted long enough for a comparison with the baseline."""
-
-    speed_rpm: list[float | None]
-    """Running speed, r/min."""
-
-    power_mw: list[float | None]
-    """Active power, MW."""
-
-    eccentricity_ratio: list[float | None]
-    """Eccentricity ratio: eccentricity divided by clearance."""
-
-    attitude_deg: list[float | None]
-    """Attitude angle, degrees."""
-
-    oil_temperature_c: list[float | None]
-    """Oil temperature, °C."""
-
-    baseline_version: list[int | None]
-    """Version of the baseline in force; null without a baseline in force."""
-
-    x: FilmSeriesModel
-    """Readings in x."""
-
-    y: FilmSeriesModel
-    """Readings in y."""
 
 
 Rows = npt.NDArray[np.int64]

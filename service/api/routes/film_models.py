@@ -31,12 +31,11 @@ VerdictName = Literal[
 class FilmChangeModel(ApiModel):
     """Mean deviation from the baseline over the averaging time at which it is most significant."""
 
+    time_scale_h: Annotated[float, Field(examples=[4.0])]
+
     percent: Annotated[float, Field(examples=[-19.2])]
     """Mean change, % of the expected value; negative if softer. The alarm limits apply to it.
     After a sudden change, it follows the deviation of the newest reading with delay."""
-
-    time_scale_h: Annotated[float, Field(examples=[4.0])]
-    """Averaging time of this change, running hours."""
 
     significance: Annotated[float, Field(examples=[12.4])]
     """Absolute value of the change, divided by its standard uncertainty."""
@@ -52,14 +51,11 @@ class FilmChangeModel(ApiModel):
 class FilmDeviationModel(ApiModel):
     """Deviation of one reading from the baseline."""
 
+    low_95: float
+    high_95: float
+
     percent: float
     """Deviation, % of the expected stiffness."""
-
-    low_95: float
-    """Lower end of the 95 % interval of the deviation, %."""
-
-    high_95: float
-    """Upper end of the 95 % interval of the deviation, %."""
 
 
 class FilmVerdictModel(ApiModel):
@@ -80,14 +76,11 @@ class FilmStiffnessModel(ApiModel):
     """Stiffness of a film in one direction, and the stiffness that its baseline expects."""
 
     stiffness_n_per_m: float | None
-    """Stiffness of the newest reading, N/m; null if it could not be determined."""
+    stiffness_of_kb: float | None
 
     expected_n_per_m: float | None
     """Stiffness that the baseline expects under the condition of the newest reading, N/m; null if
     this reading was not compared."""
-
-    stiffness_of_kb: float | None
-    """Stiffness as a ratio to the bracket stiffness; null if the latter is known."""
 
     expected_of_kb: float | None
     """Expected stiffness as such a ratio; null if the bracket stiffness is known."""
@@ -114,7 +107,6 @@ class FilmDampingModel(FilmQuantityModel):
     """Verdict on the ratio c/k of damping to stiffness of an oil film, with its change."""
 
     ck_s: float | None
-    """Damping over stiffness of the newest reading, s; null if it could not be determined."""
 
     expected_s: float | None
     """Damping over stiffness that the baseline expects, s; null if it was not compared."""
@@ -124,7 +116,6 @@ class FilmDirectionModel(FilmQuantityModel, FilmStiffnessModel):
     """State of an oil film in one direction, x or y: stiffness, and damping over stiffness."""
 
     damping: FilmDampingModel
-    """Damping over stiffness, of the estimator "dynamic"."""
 
 
 class FilmLimitsModel(ApiModel):
@@ -140,14 +131,16 @@ class FilmLimitsModel(ApiModel):
 class FilmModel(BearingAnswer):
     """Current state of the oil film of a bearing."""
 
+    estimator: EstimatorName | None
+    baseline_version: int | None
+    x: FilmDirectionModel | None
+    y: FilmDirectionModel | None
+
     is_watched: bool
     """Whether the film is watched: its stiffness is compared with a baseline."""
 
     why_not: str | None
     """Reason why the film is not watched; null if it is watched."""
-
-    estimator: EstimatorName | None
-    """Fixed estimator of the stiffness, so that readings are comparable; null if not watched."""
 
     time: Time | None
     """Time of the newest reading; null without a reading since the service started."""
@@ -161,51 +154,30 @@ class FilmModel(BearingAnswer):
     condition: FilmConditionModel | None
     """Operating condition of the bearing at the newest result; null without current data."""
 
-    baseline_version: int | None
-    """Version of the baseline in force; null if no baseline is in force."""
-
     limits: FilmLimitsModel | None
     """Alarm limits of the stiffness; null if the film is not watched."""
 
     damping_limits: FilmLimitsModel | None
     """Alarm limits of damping over stiffness; null if the film is not watched."""
 
-    x: FilmDirectionModel | None
-    """State in x; null if the film is not watched."""
-
-    y: FilmDirectionModel | None
-    """State in y; null if the film is not watched."""
-
 
 class FilmWordModel(FilmVerdictModel, FilmStiffnessModel):
     """Verdict, alarm level, stiffness and change of a film in one direction."""
 
     change_percent: float | None
-    """Most significant mean change of stiffness, % of the expected stiffness; null if `change` of
-    the film is null."""
-
     deviation_percent: float | None
-    """Deviation of the newest reading alone, % of the expected stiffness; null if this reading was
-    not compared."""
-
     ck_level: AlarmLevelName | None
-    """Alarm level of damping over stiffness in force; null without a level."""
-
     ck_change_percent: float | None
-    """Most significant mean change of damping over stiffness, %; null if unknown."""
 
 
 class FilmBriefModel(ApiModel):
     """Summary of the oil film of a bearing."""
+
+    x: FilmWordModel | None
+    y: FilmWordModel | None
 
     why_not: str | None
     """Reason why the film is not watched; null if it is watched."""
 
     limits: FilmLimitsModel | None
     """Alarm limits; null if the film is not watched."""
-
-    x: FilmWordModel | None
-    """State in x; null if the film is not watched."""
-
-    y: FilmWordModel | None
-    """State in y; null if the film is not watched."""

@@ -43,6 +43,8 @@ class ReadingCountsModel(ApiModel):
 class LearningModel(ApiModel):
     """Progress of learning the baseline of a bearing."""
 
+    recent: ReadingCountsModel
+
     since: Time | None
     """Start of the learning period: first reading or last machine event; null without readings."""
 
@@ -60,9 +62,6 @@ class LearningModel(ApiModel):
 
     n_days_wanted: Annotated[int, Field(examples=[20])]
     """Number of days with usable readings that the first baseline requires."""
-
-    recent: ReadingCountsModel
-    """Counts of the readings of the last days, for diagnosis."""
 
 
 def learning_model(

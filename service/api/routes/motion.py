@@ -61,6 +61,8 @@ class EllipseModel(ApiModel):
 class MotionOrder1Model(ApiModel):
     """1× component of the motion, from a tapered window of eight turns around each sample."""
 
+    ellipse: EllipseModel
+
     frequency_hz: float
     """Running speed, Hz."""
 
@@ -70,18 +72,19 @@ class MotionOrder1Model(ApiModel):
     shaft_y_um: list[float | None]
     """1× displacement in y for each sample, µm; null with too few neighbouring samples."""
 
-    ellipse: EllipseModel
-    """Ellipse of the 1× orbit."""
-
 
 class MotionModel(SampleRange, BearingAnswer):
     """Motion of a shaft relative to its bearing, at the full sampling rate."""
 
+    start: Time
+    received: Time | None
+    n_samples: int
+    shaft_x_um: list[float | None]
+    shaft_y_um: list[float | None]
+    clearance_um: float
+
     recording: Annotated[str | None, Field(examples=["U1-20261121T090312.400Z-shaft_x"])]
     """Name of the recording; null for the newest samples."""
-
-    start: Time
-    """Time of the first sample."""
 
     offset_s: float | None
     """Time of the first sample after the start of the recording, s; null for the newest samples."""
@@ -89,24 +92,9 @@ class MotionModel(SampleRange, BearingAnswer):
     total_s: float | None
     """Duration of the recording including gaps, s; null for the newest samples."""
 
-    received: Time | None
-    """Arrival time of the newest sample by the clock of the service; null for a recording."""
-
-    n_samples: int
-    """Number of samples in each direction."""
-
-    shaft_x_um: list[float | None]
-    """Displacement in x without its mean, µm; null if the sample is missing or bad."""
-
-    shaft_y_um: list[float | None]
-    """Displacement in y without its mean, µm; null if the sample is missing or bad."""
-
     centre_um: Annotated[list[float] | None, Field(examples=[[-12.5, -61.0]])]
     """Mean position [x, y] of the shaft centre in the clearance circle, µm, from the gap reference
     in force; null if unknown."""
-
-    clearance_um: float
-    """Radius of the clearance circle, µm."""
 
     speed_rpm: float | None
     """Running speed, r/min, from the key-phase, else from the slow channel; null if unknown."""
@@ -122,20 +110,13 @@ class MotionModel(SampleRange, BearingAnswer):
 class OrbitModel(ApiModel):
     """Orbit of the shaft relative to its bearing in the newest turns, about its mean position."""
 
+    rate_hz: float
+    duration_s: float
+    shaft_x_um: list[float]
+    shaft_y_um: list[float]
+
     time: Time
     """Time of the first sample."""
-
-    rate_hz: float
-    """Sampling rate, Hz."""
-
-    duration_s: float
-    """Duration of the samples, s."""
-
-    shaft_x_um: list[float]
-    """Displacement in x without its mean, µm."""
-
-    shaft_y_um: list[float]
-    """Displacement in y without its mean, µm."""
 
 
 DECIMALS = 3

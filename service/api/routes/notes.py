@@ -20,7 +20,7 @@ class NoteModel(ApiModel):
     """Note about a unit or a bearing at a time."""
 
     bearing: str | None
-    """Identifier of the bearing; null for a note about the whole unit."""
+    author: str
 
     time: Time
     """Time to which the note refers."""
@@ -28,21 +28,17 @@ class NoteModel(ApiModel):
     text: str
     """Text of the note."""
 
-    author: str
-    """Person or key that added the note."""
-
 
 class AddNoteModel(ActorModel):
     """Request to add a note."""
+
+    bearing: Annotated[str | None, Field(examples=["UJB"])] = None
 
     text: ReasonText
     """Text, 1 to 500 printable characters."""
 
     time: Annotated[Moment, Field(strict=False, examples=["2026-11-21T08:00:00Z"])]
     """Time to which the note refers, RFC 3339 with offset."""
-
-    bearing: Annotated[str | None, Field(examples=["UJB"])] = None
-    """Identifier of the bearing; null for a note about the whole unit."""
 
 
 def note_router(context: Context) -> APIRouter:

@@ -37,6 +37,8 @@ class DeadLetterModel(ApiModel):
 class ReceiverModel(ApiModel):
     """Receiver of alarm messages, with waiting, failed and undeliverable messages."""
 
+    n_waiting: int
+
     id: Annotated[str, Field(examples=["control-room"])]
     """Name of the receiver in the plant file; for mail, followed by the recipient."""
 
@@ -64,9 +66,6 @@ class ReceiverModel(ApiModel):
     next_attempt: Time | None
     """Time of the next attempt after a failure; null if no retry is due."""
 
-    n_waiting: int
-    """Number of messages waiting for delivery."""
-
     waiting_since: Time | None
     """Time when the oldest waiting message was queued; null without waiting messages."""
 
@@ -84,10 +83,7 @@ class DeliveryModel(ApiModel):
     """State of all receivers of alarm messages."""
 
     origin: Literal["live", "replay"]
-    """Origin of the data; a replay sends no messages."""
-
     n_waiting: int
-    """Number of messages waiting for delivery, of all receivers."""
 
     n_failing: int
     """Number of receivers whose newest delivery attempt failed."""

@@ -61,10 +61,7 @@ class PlantModel(ApiModel):
     """Name of the plant and origin of the data."""
 
     name: str
-    """Display name of the plant."""
-
     origin: Literal["live", "replay"]
-    """"live" or "replay" of a recording; every answer repeats it in the header Padwatch-Origin."""
 
 
 class StoreModel(ApiModel):
@@ -98,7 +95,7 @@ class TileModel(ResultModel):
     """
 
     name: Annotated[str | None, Field(examples=["upper guide"])]
-    """Display name of the bearing; null without a name."""
+    film: FilmBriefModel
 
     bad_reasons: Annotated[list[str], Field(examples=[["no_vortex"]])]
     """Distinct reasons of all readings of the bearing whose level is bad."""
@@ -107,21 +104,13 @@ class TileModel(ResultModel):
     """Channels of a direction in which stiffness or damping reads negative: the sign of one of them
     is wrong."""
 
-    film: FilmBriefModel
-    """Summary of the film of the bearing."""
-
 
 class UnitTileModel(BasicUnitModel):
     """Generating unit as shown on a tile."""
 
     source: LinkModel
-    """State of the link to the data source of the unit."""
-
     operating_state: OperatingStateName | None
-    """Operating state of the unit; null without current data."""
-
     is_settled: bool | None
-    """Whether the operating state has lasted long enough to judge films; null without a state."""
 
     bearings: list[TileModel]
     """Newest results of the guide bearings."""
@@ -130,26 +119,19 @@ class UnitTileModel(BasicUnitModel):
 class OverviewModel(ApiModel):
     """Overview of the plant: units, alarms, and state of the service."""
 
+    plant: PlantModel
+    store: StoreModel
+    alarms: AlarmCount
+    captures: CapturesModel
+
     revision: Revision
     """Parameter ``since`` with which the next request obtains only the units that changed."""
 
     since: Revision | None
     """Revision after which the listed units changed; null if all units are listed."""
 
-    plant: PlantModel
-    """Name of the plant and origin of the data."""
-
     refresh_s: float
     """Time between successive results, s."""
-
-    store: StoreModel
-    """State of the database."""
-
-    alarms: AlarmCount
-    """Counts of alarms by state."""
-
-    captures: CapturesModel
-    """State of the recordings around alarms."""
 
     evidence: EvidenceStatusModel | None
     """State of the evidence of alarms; null if no evidence is kept."""

@@ -59,8 +59,7 @@ class SourceModel(LinkModel):
     """State of the data source of a unit, and counts of its samples."""
 
     received: Time | None
-    """Arrival time of the newest samples by the clock of the service, from which the age of the
-    data counts; null without a sample."""
+    rejected: dict[str, int]
 
     last_sample_time: Time | None
     """Time of the newest sample by the device clock; null without a sample."""
@@ -82,9 +81,6 @@ class SourceModel(LinkModel):
 
     n_restarts: int
     """Number of times the device restarted its sample index."""
-
-    rejected: dict[str, int]
-    """Number of rejected samples, by reason."""
 
     clock: DeviceClockModel | None
     """Offset and drift of the device clock; null if unknown."""
@@ -112,16 +108,13 @@ class SourceHealthModel(SourceModel):
     """Data source of a unit: kind, state, and counts of its samples."""
 
     unit: Annotated[str, Field(examples=["U1"])]
-    """Identifier of the unit."""
+    rate_hz: float
 
     kind: SourceKind
     """Kind of source: protocol of the device, or simulation."""
 
     n_failed: int
     """Number of failed connection attempts and lost links since the service started."""
-
-    rate_hz: float
-    """Sampling rate, Hz."""
 
     poll_period_s: float | None
     """Poll period, s; null for a device that is not polled."""
@@ -154,7 +147,6 @@ class GapModel(ApiModel):
     """Gap in the samples of a unit, also a gap because the service was stopped."""
 
     epoch: int
-    """Epoch of the sample index; it changes when the device restarts its count."""
 
     first_index: int
     """Index of the first missing sample."""
@@ -177,10 +169,7 @@ class BasicUnitModel(ApiModel):
     """Generating unit."""
 
     id: str
-    """Stable identifier of the unit."""
-
     name: str
-    """Name of the unit for display."""
 
     rated_speed_rpm: float
     """Rated speed, r/min."""
@@ -190,7 +179,6 @@ class UnitModel(BasicUnitModel):
     """Generating unit with the state of its data source and its guide bearings."""
 
     source: SourceModel
-    """State of the data source of the unit."""
 
     bearing_ids: list[str]
     """Identifiers of the guide bearings of the unit."""
@@ -199,14 +187,13 @@ class UnitModel(BasicUnitModel):
 class QuantityModel(ApiModel):
     """Measured quantity of a bearing, from the catalogue of quantities."""
 
+    label: str
+
     name: str
     """Name of the quantity in readings and trends."""
 
     unit: str
     """Unit of the values; for an amplitude, also the detector."""
-
-    label: str
-    """Description of the quantity in words."""
 
 
 class ConfigurationModel(ApiModel):

@@ -25,17 +25,13 @@ class RunningRecordingModel(ApiModel):
     """Recording in progress, identified by the alarm that caused it."""
 
     alarm: Annotated[str, Field(examples=["U1:UJB:shaft_x"])]
-    """Identifier of the alarm."""
-
     occurrence: int
-    """Number of the occurrence of the alarm."""
 
 
 class RecordingAlarmModel(RunningRecordingModel):
     """Alarm event that caused a recording."""
 
     change: Annotated[str, Field(examples=["raised"])]
-    """Kind of alarm event."""
 
     level: str | None
     """Level of the alarm at the time of the event; null without a level."""
@@ -46,6 +42,10 @@ class RecordingAlarmModel(RunningRecordingModel):
 
 class RecordingModel(ApiModel):
     """Finished recording of samples."""
+
+    start: Time | None
+    rate_hz: float | None
+    n_samples: int | None
 
     id: Annotated[str, Field(examples=["U1-20261121T090312.400Z-shaft_x"])]
     """Name of the recording."""
@@ -62,17 +62,8 @@ class RecordingModel(ApiModel):
     unit: str | None
     """Identifier of the unit. This and all nullable fields below are null without a manifest."""
 
-    start: Time | None
-    """Time of the first sample."""
-
     duration_s: float | None
     """Duration without gaps, s."""
-
-    rate_hz: float | None
-    """Sampling rate, Hz."""
-
-    n_samples: int | None
-    """Number of samples per channel."""
 
     n_bytes: int
     """Size of all files of the recording, bytes."""
@@ -104,7 +95,6 @@ class RecordedChannelModel(ApiModel):
     """Waveform channel in a recording."""
 
     id: str
-    """Identifier of the channel within the unit."""
 
     unit: ChannelUnit
     """Engineering unit of the samples."""
@@ -117,7 +107,6 @@ class RecordedSlowModel(ApiModel):
     """Slow channel in a recording, such as an oil temperature."""
 
     id: str
-    """Identifier of the channel within the unit."""
 
     unit: str
     """Unit of the readings."""
@@ -137,7 +126,7 @@ class RecordingInfoModel(ApiModel):
     """Description of a recording, made from a full check of its files."""
 
     recording: RecordingModel
-    """The recording as in the list of recordings."""
+    rejected: dict[str, int]
 
     made_by: str
     """Program that made the recording, and its purpose."""
@@ -153,9 +142,6 @@ class RecordingInfoModel(ApiModel):
 
     n_gap_samples: int
     """Number of missing samples per channel."""
-
-    rejected: dict[str, int]
-    """Number of rejected samples, by reason."""
 
     epochs: list[int]
     """Epochs of the sample index; several if the device restarted its count meanwhile."""

@@ -29,6 +29,10 @@ from service.store.references import GapReference, SetVectorReference
 class SetReferenceModel(ApiModel):
     """Stored gap reference of a bearing: probe gaps with the shaft centred."""
 
+    set: Time
+    author: Author
+    note: Note | None
+
     gap_reference_um: MicrometrePair
     """Probe gaps [x, y] with the shaft centred, µm."""
 
@@ -37,15 +41,6 @@ class SetReferenceModel(ApiModel):
 
     source: Literal["given", "measured"]
     """Source: values entered by hand ("given"), or mean measured gaps ("measured")."""
-
-    set: Time
-    """Time when the reference was set."""
-
-    author: Author
-    """Person who set the reference."""
-
-    note: Note | None
-    """Note of the author; null without a note."""
 
 
 class VectorModel(ApiModel):
@@ -62,20 +57,15 @@ class VectorModel(ApiModel):
 class Order1ReferenceModel(BearingAnswer):
     """Stored 1× reference of a bearing: vibration vectors in the healthy state."""
 
+    set: Time
+    author: str
+    note: str | None
+
     state: Annotated[OperatingStateName, ByName]
     """Operating state to which the reference applies."""
 
     vectors: dict[PlaceName, VectorModel]
     """Reference vectors of 1×, by channel."""
-
-    set: Time
-    """Time when the reference was set."""
-
-    author: str
-    """Person who set the reference."""
-
-    note: str | None
-    """Note of the author; null without a note."""
 
 
 class TakeReferenceModel(ActorModel):

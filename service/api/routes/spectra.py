@@ -52,22 +52,15 @@ class SpectraModel(BearingHistory):
     """Averaged amplitude spectra of a bearing over time, oldest first."""
 
     frequency_hz: Annotated[list[float], Field(examples=[[0.073, 0.146, 0.22]])]
-    """Frequencies of the spectral lines of all spectra, Hz."""
+    duration_s: list[float]
+    speed_rpm: list[float | None]
+    power_mw: list[float | None]
+    operating_state: list[OperatingStateName]
+    n_found: int
+    simulated_until: Time | None
 
     time: list[Time]
     """End of the samples of each spectrum."""
-
-    duration_s: list[float]
-    """Duration of the samples averaged for each spectrum, s."""
-
-    speed_rpm: list[float | None]
-    """Running speed, r/min; null if unknown."""
-
-    power_mw: list[float | None]
-    """Active power, MW; null if unknown."""
-
-    operating_state: list[OperatingStateName]
-    """Operating state of the unit at each time."""
 
     level: list[LevelName]
     """Worst quality level of the 1× amplitudes at each time."""
@@ -84,9 +77,6 @@ class SpectraModel(BearingHistory):
     channels: dict[PlaceName, PlaceSpectraModel]
     """Spectra of the requested channels, by channel."""
 
-    n_found: int
-    """Number of spectra stored in the range; if above `max_spectra`, they are thinned evenly."""
-
     n_other_resolution: int
     """Number of spectra left out because their frequencies differ from those of the newest
     spectrum, after a change of the settings."""
@@ -96,10 +86,6 @@ class SpectraModel(BearingHistory):
 
     first: Time | None
     """Time of the oldest stored spectrum of this bearing; null without stored spectra."""
-
-    simulated_until: Time | None
-    """End of the simulated readings of this bearing, which have no spectra; null without simulated
-    readings."""
 
 
 class SpectrumChannelModel(AmplitudeModel):
@@ -122,11 +108,10 @@ class FullSpectrumModel(AmplitudeModel):
 class SpectrumModel(ApiModel):
     """Averaged amplitude spectra of a bearing; all amplitudes are displacements."""
 
+    frequency_hz: list[float]
+
     time: Time
     """End of the averaged samples."""
-
-    frequency_hz: list[float]
-    """Frequencies of the spectral lines, Hz."""
 
     channels: dict[str, SpectrumChannelModel]
     """Spectra by channel: shaft_x, shaft_y, bearing_x and bearing_y."""

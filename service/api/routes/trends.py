@@ -137,7 +137,6 @@ class TrendModel(TrendColumns, BearingHistory):
     """Trends of quantities of one bearing in a time range."""
 
     simulated_until: Time | None
-    """End of the simulated readings; null if all readings in this range are measured."""
 
     coarse_until: Time | None
     """End of the part of the range whose single readings were deleted by retention, so that only
