@@ -51,7 +51,7 @@ class ConfinedProcess:
         ours, theirs = socket.socketpair()  # unlike pipes, with a time-out
         with ours, theirs:
             self._process = subprocess.Popen(  # noqa: S603  our own module
-                [sys.executable, "-m", module, *arguments],
+                [sys.executable, "-P", "-m", module, *arguments],
                 stdin=theirs.fileno(),
                 stdout=theirs.fileno(),
                 stderr=self._log,

@@ -185,7 +185,7 @@ def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
     Raises `CommandError` if the child ends before it serves; it has printed the reason.
     """
     with subprocess.Popen(  # noqa: S603  our own program
-        [sys.executable, "-m", "service.cli.main", "daq", *arguments, "--control"],
+        [sys.executable, "-P", "-m", "service.cli.main", "daq", *arguments, "--control"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         start_new_session=True,  # Ctrl-C is for this process, which stops the DAQ last

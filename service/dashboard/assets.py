@@ -7,7 +7,6 @@ pictures are below the edition, a hash of all of them; a library is below the ha
 import gzip
 import hashlib
 import json
-import posixpath
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.api.problems import ProblemError, problem_answer
+from service.dashboard.bundle import script_bundle
 from service.settings.alarm_kinds import ALARM_KINDS
 
 MEDIA_TYPES = {
@@ -71,9 +71,16 @@ def libraries() -> Mapping[str, tuple[str, Asset]]:
     return found
 
 
+STYLES = (
+    *("base", "overview", "bearing", "estimates", "alarms", "film", "door", "explorer", "listing"),
+    *("unit", "motion"),
+)
+"""Style sheets in the order in which the page applies them."""
+
+
 @cache
 def pages() -> dict[str, Asset]:
-    """Read the files of the dashboard, and generate ``alarm_kinds.js`` and ``libraries.js``.
+    """Read the files of the dashboard, generate modules of tables, and bundle what the page loads.
 
     Returns
     -------
@@ -85,9 +92,16 @@ def pages() -> dict[str, Asset]:
         for name, kind in ALARM_KINDS.items()
     }
     paths = {name: path for name, (path, _) in libraries().items()}
-    return dict(_below(files("service.dashboard") / "static", "")) | {
+    found = dict(_below(files("service.dashboard") / "static", "")) | {
         "alarm_kinds.js": _module("ALARM_KINDS", kinds),
         "libraries.js": _module("LIBRARIES", paths),
+    }
+    modules = {path: asset.body.decode() for path, asset in found.items() if path.endswith(".js")}
+    script = script_bundle("app.js", modules).encode()
+    style = b"".join(found[f"{name}.css"].body for name in STYLES)
+    return found | {
+        "all.js": Asset(script, MEDIA_TYPES["js"]),
+        "all.css": Asset(style, MEDIA_TYPES["css"]),
     }
 
 
@@ -121,37 +135,13 @@ def edition() -> str:
     return f"{version('padwatch')}-{hashlib.sha256(digests.encode()).hexdigest()[:8]}"
 
 
-IMPORT = re.compile(rb'(?:from|import) "(\.{1,2}/[^"]+)"')
-"""Pattern of a static import of a JavaScript module of the dashboard."""
-
-
-def imported(module: str, found: dict[str, None] | None = None) -> list[str]:
-    """Return the paths of a JavaScript module and of all modules that it imports, importers first.
-
-    Indirect imports are included. `found` holds the paths found so far, for the recursion.
-    """
-    found = {} if found is None else found
-    if module not in found:
-        found[module] = None
-        for match in IMPORT.finditer(pages()[module].body):
-            near = posixpath.join(posixpath.dirname(module), match[1].decode())
-            imported(posixpath.normpath(near), found)
-    return list(found)
-
-
 LINK = re.compile(rb'"/static/([^"]+)"')
-FIRST_SCRIPT = b'<script type="module"'
 
 
 def _page(name: str) -> Asset:
-    """Return a page with links to the files of the running edition, and to all its modules."""
+    """Return a page with links to the files of the running edition."""
     page = pages()[name]
-    preloads = b"".join(
-        b'<link rel="modulepreload" href="/static/%s">\n  ' % path.encode()
-        for path in imported("app.js")
-    )
-    body = page.body.replace(FIRST_SCRIPT, preloads + FIRST_SCRIPT)
-    return Asset(LINK.sub(_hashed, body), page.media_type)
+    return Asset(LINK.sub(_hashed, page.body), page.media_type)
 
 
 def _hashed(link: re.Match[bytes]) -> bytes:

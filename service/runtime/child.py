@@ -36,7 +36,7 @@ def start_child() -> Child:
     ours, theirs = socket.socketpair()
     with theirs:
         process = subprocess.Popen(  # noqa: S603  this program itself
-            [sys.executable, "-m", PROGRAM, str(theirs.fileno())],
+            [sys.executable, "-P", "-m", PROGRAM, str(theirs.fileno())],
             pass_fds=[theirs.fileno()],
             start_new_session=True,
         )

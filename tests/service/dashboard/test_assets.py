@@ -3,6 +3,7 @@
 import asyncio
 import gzip
 import json
+import posixpath
 import re
 import socket
 from collections import Counter
@@ -19,11 +20,11 @@ from service.dashboard.assets import (
     StaticFiles,
     compress_all,
     edition,
-    imported,
     libraries,
     pages,
     served,
 )
+from service.dashboard.bundle import IMPORT
 from service.settings.processes import HttpLimitSettings
 
 FILES = f"/static/{edition()}/"
@@ -63,12 +64,19 @@ def test_a_page_is_asked_for_each_time_and_its_files_once_for_each_hash(client, 
         assert file.headers["cache-control"] == "public, max-age=31536000, immutable"
 
 
-def test_a_browser_learns_all_modules_of_the_first_page_from_the_page(client):
-    preloaded = re.findall(r'rel="modulepreload" href="([^"]+)"', client.get("/").text)
-    modules = {path for path in pages() if path.endswith(".js")}
-    assert {path.removeprefix(FILES) for path in preloaded} == modules - {"docs.js"}
-    assert len(preloaded) == len(set(preloaded))
-    assert imported("edition.js") == ["edition.js"]
+def test_the_page_loads_one_script_of_all_modules_and_one_style_sheet(client):
+    page = client.get("/").text
+    named = re.findall(r'(?:href|src)="/static/[^/]+/([^"]+)"', page)
+    assert named == ["padwatch.svg", "all.css", "recover.js", "all.js"]
+    script, modules = (found := pages())["all.js"].body.decode(), set()
+    for path in re.findall("^// (.+[.]js)$", script, re.MULTILINE):
+        text = found[path].body.decode()
+        used = {posixpath.join(posixpath.dirname(path), link) for _, link in IMPORT.findall(text)}
+        assert {posixpath.normpath(link) for link in used} <= modules, path
+        modules.add(path)
+    assert modules == {path for path in found if path.endswith(".js")} - {"docs.js", "all.js"}
+    sheets = [found[path].body for path in found if path.endswith(".css") and path != "all.css"]
+    assert len(found["all.css"].body) == sum(map(len, sheets))
 
 
 SIX = httpx2.Limits(max_connections=6)
@@ -103,7 +111,7 @@ async def test_twenty_browsers_that_open_the_dashboard_at_once_all_get_every_fil
         await serving
 
     assert found.keys() == {200}
-    assert found[200] > 20 * 130
+    assert found[200] == 20 * 5
 
 
 def test_a_page_of_another_edition_gets_no_file_of_this_one(client):
