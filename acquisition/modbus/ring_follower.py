@@ -1,5 +1,6 @@
 """`RingFollower`: reader of the new slots of a block ring; counts refused samples."""
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 
@@ -45,6 +46,11 @@ class RingReader:
         """Address of the device in error messages: host and port, or path of the serial port."""
         return self._client.where
 
+    @property
+    def reads_ahead(self) -> bool:
+        """Whether slots are read together with the header, because requests need not wait."""
+        return self._client.requests_in_flight > 1
+
     async def header(self) -> RingHeader:
         """Read and decode the header.
 
@@ -64,6 +70,22 @@ class RingReader:
         kind = ConfigError if isinstance(fault, ConfigError) else LinkError
         raise kind(f"{self.where}: {fault}") from fault
 
+    async def header_and_slots(
+        self, layout: RingLayout, sequences: Sequence[int]
+    ) -> tuple[RingHeader, SlotRecords | None]:
+        """Read the header and then slots of a known layout in one exchange; see `slots`.
+
+        The slots are None if the header is invalid or the device has no such registers; the header
+        is then read again, with the errors of `header`.
+        """
+        spans = [self._header, *self._slot_spans(layout, sequences)]
+        try:
+            content = await self._client.read_spans(spans)
+            header = decode_header(content)
+        except (ConfigError, FrameError):
+            return await self.header(), None
+        return header, slot_records(content[self._header.n_bytes :], layout)
+
     async def slots(self, layout: RingLayout, sequences: Sequence[int]) -> SlotRecords:
         """Read the slots at the ring positions of sequence numbers, without checking the slots.
 
@@ -72,21 +94,25 @@ class RingReader:
         (n_sequences,)
             Slot found at the ring position of each sequence number; it may be another slot.
         """
+        spans = self._slot_spans(layout, sequences)
+        return slot_records(await self._client.read_spans(spans), layout)
+
+    def _slot_spans(self, layout: RingLayout, sequences: Sequence[int]) -> list[Span]:
         spans: list[Span] = []
         for sequence in sequences:
             start, count = layout.slot_address(sequence), layout.slot_registers
             if spans and spans[-1].stop == start:  # no padding between slots
                 start, count = spans[-1].address, spans.pop().count + count
             spans.append(Span(start, count, self._header.function))
-        return slot_records(await self._client.read_spans(spans), layout)
+        return spans
 
 
 _N_REREADS = 3
 """Maximum number of repeated reads of a torn slot; a slot is written in milliseconds."""
 
-_MAX_READ_S = 0.5
-"""Maximum duration of the samples in one poll, s. On a slow line, reading a full ring takes
-seconds; after a failure, only the slots of the last poll are read again."""
+_MAX_READ_S = 1.5
+"""Maximum duration of the samples in one poll, s; halved after each failure in succession, so that
+a bad line is not lost again and again at the last slot."""
 
 
 class RingFollower:
@@ -112,14 +138,18 @@ class RingFollower:
             "n_slow": len(calibration.slow),
         }
         self._header: RingHeader | None = None
+        self._asked_s, self._max_read_s = 0.0, _MAX_READ_S
         self._timeline: Timeline
         self._epochs = Epochs(begun_ns, trusts_device=True)
         self._handled = 0
         self._rejected: Counter[Refusal] = Counter()
 
     async def header(self) -> RingHeader:
-        """Read the header; raise ConfigError if its channels or rate are not those calibrated."""
-        header = await self._reader.header()
+        """Read the header, with the errors of `RingReader.header` and `_required`."""
+        return self._required(await self._reader.header())
+
+    def _required(self, header: RingHeader) -> RingHeader:
+        """Return a header; raise ConfigError if its channels or rate are not those calibrated."""
         ring = header.layout
         found = (ring.n_channels, ring.rate_mhz, ring.n_slow)
         for (name, expected), value in zip(self._expected.items(), found, strict=True):
@@ -134,18 +164,37 @@ class RingFollower:
         """Number of unread slots up to the newest slot of the last header."""
         return 0 if self._header is None else max(0, ahead(self._header.newest, self._handled))
 
-    async def poll(self) -> list[SampleBlock]:
-        """Read new slots, oldest first, up to 0.5 s of samples; return the accepted samples.
+    async def poll(self, now_s: float) -> list[SampleBlock]:
+        """Read new slots at a monotonic time, oldest first; return the accepted samples.
 
         Each block is a run of consecutive slots, with one cell per slot; the list may be empty.
         After an error of `RingReader`, the next call reads the same slots again.
         """
-        header = await self.header()
+        max_read_s, self._max_read_s = self._max_read_s, self._max_read_s / 2.0
+        blocks = await self._blocks(now_s, self._due(now_s, max_read_s), max_read_s)
+        self._max_read_s = min(_MAX_READ_S, 2.0 * max_read_s)
+        return blocks
+
+    async def _blocks(
+        self, now_s: float, due: Sequence[int], max_read_s: float
+    ) -> list[SampleBlock]:
+        before, records = self._header, None
+        self._asked_s = now_s
+        if before is not None and due:
+            found, records = await self._reader.header_and_slots(before.layout, due)
+            header = self._required(found)
+            records = records if header.layout == before.layout else None
+        else:
+            header = await self.header()
         await self._enter(header)
-        wanted = self._unread(header)
+        wanted = self._unread(header, max_read_s)
         if not wanted:
             return []
-        records = await self._reader.slots(header.layout, wanted)
+        if records is not None and due[0] == wanted[0]:
+            wanted = wanted[: len(due)]
+            records = records[: len(wanted)]
+        else:
+            records = await self._reader.slots(header.layout, wanted)
         block = self._block_of_sound(records, wanted, header)
         if block is not None:
             self._handled = wanted[-1]
@@ -153,6 +202,21 @@ class RingFollower:
         records, slots = await self._reread(records, header.layout, wanted)
         self._handled = wanted[-1]
         return self._placed(records, list(zip(wanted, slots, strict=True)), header)
+
+    def _due(self, now_s: float, max_read_s: float) -> list[int]:
+        """Return the slots that may have been written by now, if they can be read with the header.
+
+        The header is read first: slots that it does not contain are not used. Where polls are
+        shorter than slots, only slots of the last header are due; others would be read in vain.
+        """
+        if self._header is None or not self._reader.reads_ahead:
+            return []
+        layout = self._header.layout
+        n_new = (now_s - self._asked_s) / layout.slot_duration_s
+        n_due = self.n_waiting + (math.ceil(n_new) if n_new >= 1.0 else 0)
+        if n_due >= layout.n_slots:  # the oldest of them may be overwritten
+            return []
+        return [(self._handled + 1 + n) % U32 for n in range(_n_read(n_due, layout, max_read_s))]
 
     def _block_of_sound(
         self, records: SlotRecords, wanted: Sequence[int], header: RingHeader
@@ -224,10 +288,10 @@ class RingFollower:
             n_before = newest.first_index // header.layout.samples_per_slot
         self._handled = header.newest - 1 - min(n_before, header.layout.n_slots - 2)
 
-    def _unread(self, header: RingHeader) -> list[int]:
+    def _unread(self, header: RingHeader, max_read_s: float) -> list[int]:
         n_behind = ahead(header.newest, self._handled)
         n_there = min(n_behind, header.layout.n_slots - 1)
-        n_wanted = min(n_there, max(1, round(_MAX_READ_S / header.layout.slot_duration_s)))
+        n_wanted = _n_read(n_there, header.layout, max_read_s)
         return [(header.newest - n_there + 1 + n) % U32 for n in range(n_wanted)]
 
     async def _newest_slot(self, header: RingHeader) -> Slot | None:
@@ -309,6 +373,11 @@ class RingFollower:
             ),
             rejected=tuple(Rejection(str(reason), n) for reason, n in rejected.items()),
         )
+
+
+def _n_read(n_slots: int, layout: RingLayout, max_read_s: float) -> int:
+    """Return how many of `n_slots` slots are read, at least one of them."""
+    return min(n_slots, max(1, round(max_read_s / layout.slot_duration_s)))
 
 
 def _overwritten_or_old(slot: Slot, sequence: int, layout: RingLayout) -> bool:

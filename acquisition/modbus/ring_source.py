@@ -15,6 +15,9 @@ from acquisition.modbus.transport import LinkSettings
 from core.samples.blocks import SampleBlock
 from core.samples.calibration import UnitCalibration
 
+_MIN_POLLS_PER_RING = 4
+"""Lower limit of the number of polls in the time span of the ring."""
+
 _MIN_STALE_SLOTS = 3
 """Lower limit of the effective `RingSettings.stale_after_s`, in slot durations."""
 
@@ -30,7 +33,7 @@ class RingSettings(LinkSettings):
     base_address
         Register address of the header, counted from 0.
     poll_period_s
-        Longest time between polls, above 0; much shorter than the time span of the ring.
+        Longest time between polls, above 0; at most a quarter of the time span of the ring is used.
     stale_after_s
         Longest time without a new usable sample before the link counts as lost; above 0. At least
         three slot durations are used.
@@ -38,7 +41,7 @@ class RingSettings(LinkSettings):
 
     function: int = READ_HOLDING_REGISTERS
     base_address: int = 0
-    poll_period_s: float = 0.5
+    poll_period_s: float = 1.0
     stale_after_s: float = 5.0
 
 
@@ -59,22 +62,24 @@ class RingSource:
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
         """Open the link, check the header of the ring, and yield an iterator of sample blocks."""
         async with self._client.connected():
-            slot_s = (await self._follower.header()).layout.slot_duration_s
+            layout = (await self._follower.header()).layout
+            slot_s, ring_s = layout.slot_duration_s, layout.n_slots * layout.slot_duration_s
             if self._freshness is None:
                 stale_after_s = max(self._settings.stale_after_s, _MIN_STALE_SLOTS * slot_s)
                 self._freshness = Freshness("the newest usable slot", stale_after_s)
             self._freshness.opened(self._clock.monotonic_s())
-            async with aclosing(self._blocks(slot_s, self._freshness)) as blocks:
+            longest_s = min(self._settings.poll_period_s, ring_s / _MIN_POLLS_PER_RING)
+            period_s = incommensurate_period_s(longest_s, slot_s)
+            async with aclosing(self._blocks(period_s, slot_s, self._freshness)) as blocks:
                 yield blocks
 
     async def _blocks(
-        self, slot_s: float, freshness: Freshness
+        self, period_s: float, slot_s: float, freshness: Freshness
     ) -> AsyncGenerator[SampleBlock, None]:
-        period_s = incommensurate_period_s(self._settings.poll_period_s, slot_s)
         due_s = self._clock.monotonic_s()
         while True:
             begun_s = self._clock.monotonic_s()
-            found = await self._follower.poll()
+            found = await self._follower.poll(begun_s)
             arrived = Arrival.now(self._clock)
             n_waiting = self._follower.n_waiting
             read_for_s = arrived.steady_s - begun_s + n_waiting * slot_s

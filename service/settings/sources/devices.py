@@ -288,9 +288,9 @@ class ModbusRingSettings(ModbusLinkSettings):
     function: Literal[3, 4] = 3
     """Modbus function code of the registers: 3 (holding) or 4 (input)."""
 
-    poll_period_s: Annotated[float, Field(ge=0.01, le=60.0)] = 0.5
-    """Maximum time between polls of the ring, s; the ring must hold the samples of several poll
-    periods. The actual period is slightly shorter and asynchronous to the slots, in order to
+    poll_period_s: Annotated[float, Field(ge=0.01, le=60.0)] = 1.0
+    """Maximum time between polls of the ring, s; a ring of a shorter time span is polled four times
+    in this span. The actual period is slightly shorter and asynchronous to the slots, in order to
     measure the sampling rate."""
 
     stale_after_s: Annotated[float, Field(ge=0.1, le=3600.0)] = 3.0

@@ -76,7 +76,9 @@ async def test_input_registers_bring_the_same_samples(device, server, source_at,
     assert set(server.function_codes) == {4}
 
 
-async def test_a_source_waits_a_period_and_piles_no_polls(device, server, source_at, stepped_clock):
+async def test_a_source_polls_four_times_a_ring_and_piles_no_polls(
+    device, server, source_at, stepped_clock
+):
     source = source_at(server.port, clock=stepped_clock, poll_period_s=1.0)
     polled_at_s = []
 
@@ -91,7 +93,7 @@ async def test_a_source_waits_a_period_and_piles_no_polls(device, server, source
         device.memory.before_read = note
         for _ in range(6):
             await anext(stream)
-    pace_s = incommensurate_period_s(1.0, device.layout.slot_duration_s)
+    pace_s = incommensurate_period_s(2 * device.layout.slot_duration_s, 1 / 12)
     assert np.diff(polled_at_s) == pytest.approx([pace_s, pace_s, pace_s, 7.3, pace_s])
 
 
@@ -115,7 +117,7 @@ async def test_samples_that_a_ring_has_kept_come_bit_by_bit(counting_feed, sourc
             n_read = sum(address >= device.layout.ring_address for address in asked)
             rest = await read_until(stream, 50 * 31)
     reads_per_slot = -(-device.layout.slot_registers // 125)
-    assert n_read <= 6 * reads_per_slot  # of thirty
+    assert n_read <= 18 * reads_per_slot  # of thirty
     starts = [block.first_index + block.side.starts for block in [first, *rest]]
     assert np.concatenate(starts).tolist() == list(range(50, 50 * 31, 50))
 
