@@ -102,6 +102,7 @@ async def output_of(*command: str, folder: Path) -> str:
     return said.decode()
 
 
+@pytest.mark.long
 async def test_every_line_on_the_page_about_the_api_works(address, tmp_path):
     lines = "\n".join(fences("sh")).replace(ADDRESS, address)
     before, wrong, after = re.split(r"(curl -s \$API/units/U9.*\n)", lines)

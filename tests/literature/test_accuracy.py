@@ -103,6 +103,7 @@ def _at_vortex(row: Row) -> Estimate:
     return next(e for e in given if e.name == "transfer vortex k_xx")
 
 
+@pytest.mark.long
 def test_intervals_hold_the_truth_when_gains_and_brackets_are_off():
     drawn, exact = run_some("coverage", 3), run_some("coverage-random", 3)
     names = [key for key in drawn if key[1].endswith(("k_xx", "k_yy"))]

@@ -111,6 +111,7 @@ async def manager(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncItera
         await asyncio.wait([manager.listening])
 
 
+@pytest.mark.long
 async def test_the_service_manager_is_told_from_start_to_end(start, write_plant, tmp_path, manager):
     program = await start("run", str(write_plant(tmp_path)), "--port", "0")
     await program.wait_for_url()
@@ -132,6 +133,7 @@ def tls(certificate: tuple[Path, Path]) -> str:
     return f'[service.tls]\ncertificate = "{certificate[0]}"\nkey = "{certificate[1]}"\n'
 
 
+@pytest.mark.long
 async def test_over_tls_a_trusted_service_lets_the_first_account_be_made_with_what_it_prints(
     start, write_plant, tmp_path, certificate, tls
 ):
@@ -159,6 +161,7 @@ async def test_over_tls_a_trusted_service_lets_the_first_account_be_made_with_wh
     assert token not in service.errors
 
 
+@pytest.mark.long
 async def test_on_a_socket_all_log_in_and_the_proxy_names_its_client(start, write_plant, tmp_path):
     path = tmp_path / "http.sock"
     service = await start("run", str(write_plant(tmp_path, service=f'socket = "{path}"\n')))

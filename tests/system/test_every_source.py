@@ -98,6 +98,7 @@ def plant_file(
     return path
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ids", fast_and_long(ONE_OF_EACH, EVERY_ONE), ids=len)
 async def test_the_service_reads_every_kind_of_source_over_every_wire(start, tmp_path, ids):
     daq = await start("daq", str(plant_file(tmp_path, ids)))

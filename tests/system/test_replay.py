@@ -142,6 +142,7 @@ async def test_a_run_gives_the_same_results_at_any_speed(start, straight, speed)
     assert await trends(paced, "U2") == straight["trends"]["U2"]
 
 
+@pytest.mark.long
 def test_a_replay_prints_the_stiffness_of_each_film_with_its_uncertainty(tmp_path):
     command = ("replay", RECORDINGS / "part_load", "--plant", RECORDINGS / "plant.toml")
     done = padwatch_program(*command, "--speed", "0", "--out", tmp_path / "results")
@@ -155,6 +156,7 @@ def test_a_replay_prints_the_stiffness_of_each_film_with_its_uncertainty(tmp_pat
         assert abs(float(found[1]) - FILM_GN_PER_M) < float(found[2])
 
 
+@pytest.mark.long
 async def test_the_last_result_stays_when_a_replay_has_ended(start):
     program = await played(start, "--speed", "0", runs=("U1",))
 
@@ -186,6 +188,7 @@ def test_a_replay_that_only_shall_be_stored_ends_by_itself_and_is_mixed_with_not
     assert "holds replay results and cannot be used for live ones" in refused.stderr
 
 
+@pytest.mark.long
 async def test_a_replay_whose_daq_is_killed_ends_and_says_results_are_incomplete(start, daq_of):
     program = await start(
         *("replay", str(RECORDINGS / "full_load"), "--plant", str(RECORDINGS / "plant.toml")),

@@ -134,6 +134,7 @@ def with_channels(unit: Unit, **changes: object) -> Unit:
     return replace(unit, channels=channels)
 
 
+@pytest.mark.long
 def test_equation_5_reads_the_film_only_when_runout_of_this_probe_is_taken_off(unit, blocks):
     unit = with_runout_limit(unit, 0.0)
     found = upper(unit, blocks)

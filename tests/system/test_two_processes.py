@@ -151,6 +151,7 @@ def test_a_serving_process_of_another_version_is_refused_with_both_named(tmp_pat
     assert "Traceback" not in serving.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "storms",
     [

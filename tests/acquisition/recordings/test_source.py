@@ -33,6 +33,7 @@ def machine(*channels: str, measurand: Measurand = Measurand.GAP_UM, **changes: 
     return replace(made, **changes)
 
 
+@pytest.mark.long
 async def test_blocks_are_those_that_were_calibrated_live_also_when_left_and_taken_up_again(
     record, numbered, stepped_clock
 ):

@@ -143,6 +143,7 @@ async def test_a_login_that_ends_leads_to_the_door_and_back_to_the_same_page(pla
     await expect(page.get_by_role("heading", name="Log in")).to_be_visible()
 
 
+@pytest.mark.long
 async def test_an_admin_adds_changes_and_removes_accounts_and_reads_what_is_refused(
     plant, remote_page, complaints
 ):
@@ -224,6 +225,7 @@ async def local(plant, browser) -> AsyncIterator[APIRequestContext]:
     await context.close()
 
 
+@pytest.mark.long
 async def test_an_own_password_is_changed_and_a_change_without_an_answer_is_reported(
     plant, remote_page, local
 ):

@@ -2,6 +2,7 @@
 
 import asyncio
 
+import pytest
 from on_screen import tab_to
 from playwright.async_api import Page, Response, Route, expect
 
@@ -84,6 +85,7 @@ async def test_an_alarm_is_acknowledged_shelved_and_unshelved_by_keys(plant, pag
     assert complaints == []
 
 
+@pytest.mark.long
 async def test_the_list_and_its_history_are_filtered_together(plant, page, complaints):
     await page.goto(plant.url + LIST)
     row, history = page.locator(LINK), page.get_by_role("table", name="History")

@@ -96,6 +96,7 @@ async def test_no_page_scrolls_sideways_on_a_phone(plant, phone_page):
         await assert_fits(phone_page)
 
 
+@pytest.mark.long
 async def test_names_of_sixty_characters_in_any_alphabet_fit_on_a_phone(plant, phone_page):
     overview = await freeze(phone_page, plant.url)
     for unit in overview["units"]:
@@ -149,6 +150,7 @@ async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembe
     await page.wait_for_function(REDRAWN, arg=drawn)
 
 
+@pytest.mark.long
 async def test_amplitudes_are_shown_zero_to_peak_or_twice_that_as_chosen(plant, page):
     await page.goto(plant.url + BEARING)
     shaft = page.locator("[data-reading=order1_shaft_x_um_pk]")

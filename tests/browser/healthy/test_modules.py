@@ -232,6 +232,7 @@ async def test_the_reference_of_the_api_needs_no_other_site(plant, page, complai
     assert complaints == []
 
 
+@pytest.mark.long
 async def test_browsers_that_open_the_page_at_once_all_show_it(plant, browser):
     contexts = [await browser.new_context() for _ in range(4)]
     pages = [await context.new_page() for context in contexts]

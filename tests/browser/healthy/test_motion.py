@@ -141,6 +141,7 @@ async def test_an_orbit_plays_pauses_and_steps_by_keyboard(plant, page, complain
     assert complaints == []
 
 
+@pytest.mark.long
 async def test_a_turn_is_held_as_reference_and_the_address_holds_what_is_drawn(
     plant, page, complaints
 ):
@@ -162,6 +163,7 @@ async def test_a_turn_is_held_as_reference_and_the_address_holds_what_is_drawn(
     assert [words for words in complaints if "willReadFrequently" not in words] == []  # the test's
 
 
+@pytest.mark.long
 async def test_an_arrow_points_the_way_the_shaft_runs(plant, page):
     await page.goto(plant.url)
     ways = [await page.evaluate(ARROW, [FILES, sense]) for sense in (1, -1)]
@@ -192,6 +194,7 @@ async def test_all_pages_of_a_bearing_have_the_same_ways(plant, page):
     assert seen == [["Bearing", "Film", "Spectra over time", "Orbit player", "Trends"]] * 4
 
 
+@pytest.mark.long
 async def test_nothing_moves_by_itself_for_those_who_asked_for_less_motion(plant, page):
     await page.emulate_media(reduced_motion="reduce")
     await page.goto(plant.url + ORBITS)

@@ -31,6 +31,7 @@ def days(request: Request) -> float:
     return (end - start) / timedelta(days=1)
 
 
+@pytest.mark.long
 async def test_two_bearings_are_compared_and_the_address_says_so(plant, page, complaints):
     await page.goto(plant.url + "#/trends")
     await expect(page.locator("summary").first).to_have_text("Bearings: 1")
@@ -47,6 +48,7 @@ async def test_two_bearings_are_compared_and_the_address_says_so(plant, page, co
     assert complaints == []
 
 
+@pytest.mark.long
 async def test_quantities_are_found_by_words_and_taken_away(plant, page):
     await page.goto(plant.url + COMPARED + "&last=2592000")
     await await_curve(page)
@@ -70,6 +72,7 @@ async def test_quantities_are_found_by_words_and_taken_away(plant, page):
     assert "stiffness_xx_n_per_m_mean [N/m]" in rows[0]
 
 
+@pytest.mark.long
 async def test_the_mouse_and_the_keyboard_zoom_and_back_leads_back(plant, page):
     await page.goto(plant.url + COMPARED + "&last=2592000")
     await await_curve(page)
@@ -215,6 +218,7 @@ async def test_uncertain_values_far_from_the_good_ones_do_not_set_the_axis(plant
     assert axis[1] > 26.4
 
 
+@pytest.mark.long
 async def test_alarms_are_marked_when_they_were_raised_rose_and_returned(plant, page):
     await page.goto(plant.url)
     events = [

@@ -3,6 +3,7 @@
 import copy
 import re
 
+import pytest
 from on_screen import (
     A_NUMBER,
     FILES,
@@ -204,6 +205,7 @@ async def test_the_trail_tells_what_the_service_wrote_and_keys_find_it(plant, pa
     assert complaints == []
 
 
+@pytest.mark.long
 async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(plant, page, complaints):
     await page.goto(plant.url + "#/units/U1")
     table = page.get_by_role("table", name="side by side")
@@ -226,6 +228,7 @@ async def test_bearings_stand_side_by_side_with_the_numbers_of_the_service(plant
     assert complaints == []
 
 
+@pytest.mark.long
 async def test_films_and_trends_fit_a_phone(plant, phone_page):
     for address, widest in WIDEST.items():
         await phone_page.goto(plant.url + address)

@@ -81,6 +81,7 @@ def test_the_order_of_the_days_does_not_change_what_is_normal(healthy):
     assert np.nanquantile(np.abs(shift), 0.95) < 1e-3  # alike days are weighed as one, and are not
 
 
+@pytest.mark.long
 def test_the_surface_is_as_near_the_truth_as_it_says(film_life):
     errors = []
     for seed in range(6):

@@ -48,7 +48,7 @@ def assert_same(steps: list[Decision], whole: DecisionHistory) -> None:
     np.testing.assert_allclose(changes, whole.change, rtol=1e-12)
 
 
-@pytest.mark.parametrize("size", [0.05, 0.25])
+@pytest.mark.parametrize("size", fast_and_long(0.05, 0.25))
 def test_a_back_test_says_what_the_plant_would_have_said(watch, size):
     limits = replace(LIMITS, off_delay_h=4.0)
     seen = watch(1, days=160, change=passing(size, 20 * 24.0, 30 * 24.0))
@@ -82,6 +82,7 @@ def test_a_softened_film_is_found_in_time(watch, size, within_h, n_seeds):
         assert found.change[first] < -0.02
 
 
+@pytest.mark.long
 def test_a_large_loss_is_danger_with_its_size_and_a_rise_of_stiffness_is_found_too(watch):
     for size, sign in ((0.3, -1.0), (-0.3, 1.0)):
         found = watch(1, change=loss(size, LATER_H + 24.0)).whole()
@@ -92,6 +93,7 @@ def test_a_large_loss_is_danger_with_its_size_and_a_rise_of_stiffness_is_found_t
     assert newest.finding.change == pytest.approx(np.log(0.9), abs=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("size", "lasting_std", "most"), [(0.03, 0.02, 0), (0.1, 0.03, AlarmLevel.ALERT)]
 )

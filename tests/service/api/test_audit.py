@@ -3,6 +3,8 @@
 import asyncio
 from typing import Any
 
+import pytest
+
 from service.api.auth.refusals import N_AT_ONCE, SECONDS_EACH
 from service.store.access.audit_entries import AuditAction
 
@@ -73,6 +75,7 @@ async def test_pages_lead_from_the_newest_to_the_oldest_of_what_was_chosen(servi
     assert numbers == [5, 4, 3, 2, 1]
 
 
+@pytest.mark.long
 async def test_pages_go_through_both_chains_by_time(service):
     """Also where the clock was set back, and entries are written between two pages."""
     times = {"padwatch": [1, 5, 3, 7], "access": [2, 4, 6, 8, 9]}

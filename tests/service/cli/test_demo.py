@@ -53,6 +53,7 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> Begun:
     return found
 
 
+@pytest.mark.long
 def test_the_demo_begins_with_a_past_that_it_is_given_once(begun, tmp_path):
     first, again = (padwatch("demo", "--port", 0, "--data-folder", tmp_path) for _ in range(2))
 
@@ -112,6 +113,7 @@ def store(tmp_path_factory, plant, pasts) -> Iterator[SqliteStore]:
     opened.close()
 
 
+@pytest.mark.long
 def test_the_past_is_there_marked_and_judged(store, pasts):
     for bearing, past in pasts["U1"].items():
         found = store.films.history(FilmQuery("U1", bearing, Estimator.DYNAMIC))
@@ -125,6 +127,7 @@ def test_the_past_is_there_marked_and_judged(store, pasts):
     assert store.films.past_end_ns("U2", "UJB") is None
 
 
+@pytest.mark.long
 def test_trends_show_the_past(store, pasts):
     past = pasts["U1"]["UJB"]
     asked = TrendQuery("U1", "UJB", (K, "power_mw"), 0, NOW_NS, 10**6, 10**12)
@@ -134,6 +137,7 @@ def test_trends_show_the_past(store, pasts):
     np.testing.assert_array_equal(shown[there], np.exp(past.ln_k[0]))
 
 
+@pytest.mark.long
 def test_a_past_is_given_once_with_a_baseline_that_says_where_it_comes_from(store, plant, pasts):
     fill(store.films, plant, pasts, NOW_NS + 10**15)
     assert [unit.id for unit in without_past(store.films, plant)] == ["U2"]

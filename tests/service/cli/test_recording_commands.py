@@ -54,6 +54,7 @@ def recording(plant: PlantFile, tmp_path: Path) -> Path:
     return tmp_path / "run"
 
 
+@pytest.mark.long
 def test_a_recorded_unit_can_be_read_back(plant_path, tmp_path):
     out = tmp_path / "run"
     command = ("record", plant_path, "--unit", "U2", "--seconds", 0.5, "--out", out)

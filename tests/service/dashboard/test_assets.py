@@ -1,19 +1,14 @@
 """How the dashboard's files travel: complete, compressed, kept by browsers, under a hash."""
 
-import asyncio
 import gzip
 import json
 import posixpath
 import re
-import socket
-from collections import Counter
 
-import httpx2
 import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
-from service.api.http.server import http_server
 from service.dashboard import assets as told
 from service.dashboard.assets import (
     Asset,
@@ -25,7 +20,6 @@ from service.dashboard.assets import (
     served,
 )
 from service.dashboard.bundle import IMPORT
-from service.settings.processes import HttpLimitSettings
 
 FILES = f"/static/{edition()}/"
 PLOTLY, _ = libraries()["plotly.min.js"]
@@ -77,41 +71,6 @@ def test_the_page_loads_one_script_of_all_modules_and_one_style_sheet(client):
     assert modules == {path for path in found if path.endswith(".js")} - {"docs.js", "all.js"}
     sheets = [found[path].body for path in found if path.endswith(".css") and path != "all.css"]
     assert len(found["all.css"].body) == sum(map(len, sheets))
-
-
-SIX = httpx2.Limits(max_connections=6)
-"""As many connections as a browser opens."""
-
-
-async def test_twenty_browsers_that_open_the_dashboard_at_once_all_get_every_file():
-    app = FastAPI()
-    app.add_middleware(StaticFiles)
-    listener = socket.create_server(("127.0.0.1", 0))
-    server = http_server(app, HttpLimitSettings(), [])
-    serving = asyncio.create_task(server.run_on(listener))
-    found: Counter[int] = Counter()
-
-    async def browser(url: str) -> None:
-        async with httpx2.AsyncClient(
-            base_url=url, trust_env=False, limits=SIX, timeout=60.0
-        ) as client:
-            page = await client.get("/")
-            named = re.findall(r'(?:href|src)="(/[^"]+)"', page.text)
-            answers = await asyncio.gather(*(client.get(path) for path in [*named, PLOTLY]))
-            assert [len(answer.content) for answer in answers[:-1]] == [
-                len(served()[path].body) for path in named
-            ]
-            found.update(answer.status_code for answer in answers)
-
-    url = f"http://127.0.0.1:{listener.getsockname()[1]}"
-    try:
-        await asyncio.gather(*(browser(url) for _ in range(20)))
-    finally:
-        server.should_exit = True
-        await serving
-
-    assert found.keys() == {200}
-    assert found[200] == 20 * 5
 
 
 def test_a_page_of_another_edition_gets_no_file_of_this_one(client):

@@ -119,6 +119,7 @@ async def test_a_baseline_is_learned_after_its_days_and_put_in_force(plant, film
     assert set(newest.baseline_version.tolist()) <= {versions[0], versions[0] - 1}
 
 
+@pytest.mark.long
 async def test_learning_ends_with_its_period(plant, film_life):
     keeper, history = await plant.start(learning_days=30, learn_every_days=5), film_life(2, days=37)
     await plant.live(keeper, history, (0, 37))
@@ -127,6 +128,7 @@ async def test_learning_ends_with_its_period(plant, film_life):
     assert last.learned_until_ns > history.time_ns[0] + 29 * DAY_NS
 
 
+@pytest.mark.long
 async def test_a_film_that_creeps_away_is_not_learned_little_by_little(plant, film_life):
     """Too slow to differ much from one fortnight's baseline to the next."""
     creep = film_life(
@@ -145,6 +147,7 @@ async def test_a_film_that_creeps_away_is_not_learned_little_by_little(plant, fi
     assert (found.change[:2, -1] < -0.1).all()
 
 
+@pytest.mark.long
 async def test_a_restart_goes_on_with_the_same_baseline_and_decisions(plant, film_life):
     history = film_life(2, days=26)
     keeper = await plant.start(learn_every_days=100)

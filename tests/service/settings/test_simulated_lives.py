@@ -51,6 +51,7 @@ def plant_with(life: str, folder: Path) -> PlantFile:
     return load_plant_file(path)
 
 
+@pytest.mark.long
 def test_the_films_of_a_living_unit_are_read_as_its_past_says(tmp_path, stepped_clock):
     """Five minutes of samples, of films of which one has been damaged two hours ago."""
     now_ns = stepped_clock.now_ns()

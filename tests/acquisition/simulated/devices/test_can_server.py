@@ -81,6 +81,7 @@ async def test_a_port_in_use_is_an_error_that_names_it(device):
             await SlcanTcpServer(device, port=int(where.rpartition(":")[2])).__aenter__()
 
 
+@pytest.mark.long
 async def test_a_device_that_nobody_reads_stays_bounded(device):
     device.produce(10_000)
     n_waiting = 0

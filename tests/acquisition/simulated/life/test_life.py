@@ -20,6 +20,7 @@ Life = Callable[..., UnitLife]
 SEEDS = (0, *fast_and_long(1, 2))
 
 
+@pytest.mark.long
 def test_the_same_seed_lives_the_same_life_and_another_one_another(two_years):
     life = two_years(1)
     again = live(1, int(life.operation.time_ns[0]) // 86_400_000_000_000 * 86_400_000_000_000, 2.0)
@@ -116,6 +117,7 @@ def test_load_is_held_in_some_hours_of_the_day_only(day_ns):
     assert np.ptp(operation.load) < 0.05
 
 
+@pytest.mark.long
 def test_clearance_moves_damping_over_stiffness_and_oil_and_gains_do_not(two_years, day_ns):
     usual, onset_ns = two_years(0), day_ns(400)
     later = usual.operation.time_ns >= onset_ns

@@ -136,6 +136,7 @@ def test_readings_reach_until_now_and_a_year_back():
         assert 364.0 < (history.time_ns[-1] - history.time_ns[0]) / (86_400 * NS_PER_S) <= 365.25
 
 
+@pytest.mark.long
 def test_a_unit_watched_again_tomorrow_has_the_same_past():
     today, tomorrow = (history_until(LifePlan(2), ns) for ns in (NOW_NS, NOW_NS + 144 * STEP_NS))
     for name, history in today.readings.items():

@@ -176,6 +176,7 @@ def wandering() -> Rotation:
     return Rotation(np.random.default_rng(1), TURN_HZ, RATE_HZ, 0.003, 120.0)
 
 
+@pytest.mark.long
 def test_the_shaft_turns_as_fast_as_its_speed_says_which_wanders_by_what_it_is_told():
     index = np.arange(0.0, 300.0 * RATE_HZ)
     rotation = wandering()

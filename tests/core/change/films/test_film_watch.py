@@ -27,6 +27,7 @@ def loss(size: float, day: float) -> Callable[[np.ndarray], np.ndarray]:
     return lambda hours: np.where(hours > day * 24.0, np.log(1.0 - size), 0.0)
 
 
+@pytest.mark.long
 def test_results_one_by_one_are_judged_as_their_whole_history_is(films, rules):
     history = films.later(change=loss(0.2, 106.0))
     news = films.watched(history)
@@ -83,6 +84,7 @@ def test_a_baseline_of_stiffness_is_not_compared_with_ratios_to_an_unknown_brack
     assert not verdicts & set(JUDGED)
 
 
+@pytest.mark.long
 def test_ratios_are_judged_by_a_baseline_of_ratios_as_stiffness_is(films, rules):
     [before, after] = films.life(3), films.later(change=loss(0.2, 106.0))
     in_ratios = [replace(h, ln_k=h.ln_k - math.log(1.18e9)) for h in (before, after)]
@@ -107,6 +109,7 @@ def test_ratios_are_judged_by_a_baseline_of_ratios_as_stiffness_is(films, rules)
     assert found[-1].findings[0].level is not None
 
 
+@pytest.mark.long
 def test_decisions_caught_up_with_are_those_that_would_have_been_made(films, rules):
     history = films.later()
     made = films.watched(history)
@@ -243,6 +246,7 @@ def test_damping_that_is_not_judged_holds_its_alarm_but_hinders_no_verdict():
     assert condition_in_x(softer, held).level is AlarmLevel.DANGER
 
 
+@pytest.mark.long
 def test_time_that_passes_faster_asks_for_fewer_hours(films, rules):
     history = films.later(change=loss(0.2, 106.0))
     start_ns = int(history.time_ns[0])

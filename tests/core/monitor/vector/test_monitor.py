@@ -201,6 +201,7 @@ def test_a_step_of_vibration_is_an_alarm_in_half_a_minute_and_delay(unit, rack, 
     assert delay_s <= raised["order1_shaft_x"] <= 30.0 + delay_s
 
 
+@pytest.mark.long
 def test_the_stated_random_part_is_true(rack):
     results = [
         watch(rack(), polls(60.0, 60.0, 20.0, 20.0, noise=0.05, seed=seed))[-1].readings
@@ -243,6 +244,7 @@ def test_a_rack_that_repeats_itself_or_is_asked_too_often_is_not_believed_more(r
     assert newest.readings["order1_k_eff_xx_n_per_m"].quality.reason is Reason.FEW_SEGMENTS
 
 
+@pytest.mark.long
 def test_a_rack_that_averages_longer_than_a_poll_is_not_believed_more(rack):
     """Each poll shows the mean of the last ten periods: neighbours share nine of them."""
     results = []

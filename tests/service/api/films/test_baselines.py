@@ -13,6 +13,7 @@ FILM = "/api/v1/units/U1/bearings/UJB/film"
 ANNA = {"actor": "A. Name", "reason": "checked against the overhaul report"}
 
 
+@pytest.mark.long
 async def test_versions_say_where_they_come_from_and_which_is_in_force(learned, lived):
     found = await learned.json(BASELINES)
 

@@ -250,6 +250,7 @@ def export(*arguments: object) -> Result:
     return padwatch("readings", "export", *arguments)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", fast_and_long(".csv", ".parquet"))
 def test_stored_readings_come_back_out_of_the_file(filled, tmp_path, suffix, monkeypatch):
     monkeypatch.setattr(stored, "AT_ONCE_NS", 7 * STORED_STEP_NS)

@@ -51,6 +51,7 @@ def found(histories: Histories, learning: Learning) -> BackTestResult:
     return run_back_test(histories, BackTestRules(learning, bracket_n_per_m=BRACKETS))
 
 
+@pytest.mark.long
 def test_csv_and_parquet_are_the_same_histories(two_units, histories):
     from_csv = read_histories(two_units.csv)
     assert set(from_csv) == set(histories) == set(BRACKETS)
@@ -74,6 +75,7 @@ def learned_rows(two_units: Any, life: UnitLife) -> int:
     return int(np.searchsorted(time_ns, time_ns[0] + two_units.learning_days * DAY_NS))
 
 
+@pytest.mark.long
 def test_alarms_are_those_that_core_decides(two_units, found):
     """Straight from the simulated life, without any file."""
     expected = []

@@ -249,6 +249,7 @@ def _latched_twice(events: Sequence[AlarmEvent]) -> bool:
 LATCHES = (AlarmChange.LATCHED, AlarmChange.RESET)
 
 
+@pytest.mark.long
 @pytest.mark.timeout(max(300, N_LIVES))
 @pytest.mark.usefixtures("_quiet")
 @pytest.mark.parametrize("n_lives", fast_and_long(min(N_LIVES, 30), N_LIVES))

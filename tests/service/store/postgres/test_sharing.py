@@ -59,6 +59,7 @@ def all_write(place: PostgresPlace, folder: Path, build: Build) -> list[int]:
     return [job.exitcode or 0 for job in jobs]
 
 
+@pytest.mark.long
 def test_processes_write_at_the_same_time_and_the_trail_is_one_chain(postgres_place, tmp_path):
     assert all_write(postgres_place, tmp_path, assessment) == [0] * N_PROCESSES
 
