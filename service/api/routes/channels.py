@@ -21,64 +21,32 @@ from service.live.current_state import LiveUnits
 from service.live.samples import SampleWindow, newest_blocks, sample_window
 from service.live.status import HELD_S
 from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS
-from service.settings.channels import ChannelSettings, SlowChannelSettings, SlowUnit
+from service.settings.channels import ChannelSettings, SlowChannelSettings
 from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.units import UnitSettings
-
-TransducerName = Literal[
-    "proximity_probe", "displacement", "velocity", "accelerometer", "key_phase"
-]
 
 ChannelUnit = Annotated[
     Literal["um", "mm/s", "m/s2", "V"], Field(examples=["um"], description="Engineering unit.")
 ]
 
 
-class WaveformChannelModel(ApiModel):
-    """Settings and current state of a waveform channel."""
+class ChannelModel(ApiModel):
+    """Base class of the models of channels."""
 
-    id: Annotated[str, Field(examples=["ujb_shaft_x"])]
     used_by: Annotated[list[str], Field(examples=[["UJB shaft_x"]])]
     quality: QualityModel
 
-    transducer: TransducerName
-    """Kind of transducer."""
+
+class WaveformChannelModel(ChannelModel):
+    """Settings of a waveform channel, and its samples in the newest block."""
+
+    settings: ChannelSettings
 
     unit: ChannelUnit
     """Engineering unit of the samples."""
 
-    sensitivity: float | None
-    """Sensitivity of the transducer; null for a key-phase, and if counts are scaled directly."""
-
-    sensitivity_unit: str | None
-    """Unit of the sensitivity; null without a sensitivity."""
-
-    full_scale_v: float | None
-    """Input voltage of the converter at full scale, V; null if counts are scaled directly."""
-
-    ok_min_v: float | None
-    """Lowest mean voltage of a healthy transducer, V; null without this limit."""
-
-    ok_max_v: float | None
-    """Highest mean voltage of a healthy transducer, V; null without this limit."""
-
-    unit_per_count: float | None
-    """Engineering units per count; null if counts are not scaled directly."""
-
-    ok_min: float | None
-    """Lowest mean of a healthy transducer, in engineering units; null without this limit."""
-
-    ok_max: float | None
-    """Highest mean of a healthy transducer, in engineering units; null without this limit."""
-
-    gain_uncertainty: float
-    """Half-width of the relative error of the sensitivity; 0.01 is 1 %."""
-
     direction: Literal[1, -1]
     """+1 if the reading increases with motion along the positive bearing axis, else -1."""
-
-    probe: str | None
-    """Serial number or label of the probe; null if unknown."""
 
     minimum: float | None
     """Lowest sample of the newest block; null for a bad channel, or a device without samples."""
@@ -90,27 +58,13 @@ class WaveformChannelModel(ApiModel):
     """Mean of the newest block: for a proximity probe, the gap. Null if `minimum` is null."""
 
 
-class SlowChannelModel(ApiModel):
+class SlowChannelModel(ChannelModel):
     """Settings and newest reading of a slow channel, such as an oil temperature."""
 
-    id: Annotated[str, Field(examples=["ujb_oil_temperature"])]
-    used_by: Annotated[list[str], Field(examples=[["UJB oil_temperature"]])]
-    quality: QualityModel
-
-    unit: SlowUnit
-    """Unit of the readings."""
+    settings: SlowChannelSettings
 
     reading: str | None
     """Name of the quantity in results and trends; null if the channel is not recorded as one."""
-
-    angle_deg: float | None
-    """Angle of a pad around the bearing, degrees from x towards y; null if unknown."""
-
-    minimum: float
-    """Lowest valid reading, in the unit of the readings."""
-
-    maximum: float
-    """Highest valid reading, in the unit of the readings."""
 
     value: float | None
     """Newest reading; null if and only if its quality level is bad."""
@@ -219,7 +173,7 @@ def _waveform(
     rows = rows_of(settings, channel.id)
     quality = bad(why) if block is None else worst(block.channel_quality[row] for row in rows)
     return WaveformChannelModel.of(
-        channel,
+        settings=channel,
         unit=UNITS[channel.measurand],
         direction=channel.sign,
         used_by=used_by,
@@ -247,7 +201,7 @@ def _slow(
     reading = (None if block is None else block.slow.get(channel.id)) or missing(why)
     recorded = channel.recorded
     name = None if recorded is None else recorded.reading
-    return SlowChannelModel.of(channel, reading, used_by=used_by, reading=name)
+    return SlowChannelModel.of(reading, settings=channel, used_by=used_by, reading=name)
 
 
 def _uses(settings: UnitSettings) -> dict[str, list[str]]:

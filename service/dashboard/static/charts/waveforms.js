@@ -26,7 +26,7 @@ export function waveforms(unit, bearing, absence) {
 
 async function channelsOf(unit, bearing, signal) {
   const { waveform } = await ask(["units", unit, "channels"], [], signal);
-  return waveform.filter(({ used_by: uses }) => uses.some((use) => use === "key_phase" || use.startsWith(`${bearing} `))).map(({ id }) => id);
+  return waveform.filter(({ used_by: uses }) => uses.some((use) => use === "key_phase" || use.startsWith(`${bearing} `))).map(({ settings }) => settings.id);
 }
 
 const axisName = (n) => (n ? `y${n + 1}` : "y");
