@@ -106,7 +106,7 @@ class QualityModel(ApiModel):
     """Data quality of a value."""
 
     level: Annotated[LevelName, ByName]
-    """Quality level: the worst level of all readings from which the value is derived."""
+    """Quality level of the value: the worst of all readings from which it is derived."""
 
     reason: Annotated[str, Field(examples=["insufficient_excitation"])]
     """Reason for the quality level; "ok" if the level is good."""
@@ -125,17 +125,11 @@ class UncertaintyModel(ApiModel):
     """Systematic standard uncertainty, due to transducers and bracket; null if unknown."""
 
 
-class ReadingModel(ApiModel):
+class ReadingModel(QualityModel):
     """Reading of one quantity: value, data quality and uncertainty."""
 
     value: Annotated[float | None, Field(examples=[0.6914e9])]
     """Value of the reading, in the unit of the catalogue; null if and only if the level is bad."""
-
-    level: LevelName
-    """Quality level of the reading."""
-
-    reason: Annotated[str, Field(examples=["ok"])]
-    """Reason for the quality level; "ok" if the level is good."""
 
     uncertainty: UncertaintyModel | None
     """Uncertainty of a stiffness or damping; null for other quantities and if unknown."""

@@ -247,9 +247,7 @@ def plant_snapshot(analysis: Analysis, sources: Mapping[str, TimedSource]) -> Pl
             "stored data": analysis.soundness.trouble or "ok",
         },
         audit_error=analysis.process.store.audit.head_error,
-        captures=CaptureStatus(
-            captures.trouble, captures.error, captures.n_written, captures.being_made
-        ),
+        captures=CaptureStatus(captures.trouble, captures.error, captures.being_made),
         evidence=analysis.evidence.status,
         continuous=tuple(analysis.tape.units),
         continuous_trouble=analysis.tape.trouble,

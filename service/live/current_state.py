@@ -217,12 +217,6 @@ class LiveUnits:
         errors = (self._latest[u].link.store_error for u in self._latest if self.is_alive(u))
         return self.read_error or next((error for error in errors if error), None)
 
-    @property
-    def n_unstored(self) -> int:
-        """Number of findings that the reporting processes have not stored since their start."""
-        latest = self._latest.values()
-        return sum({each.beat[0]: each.link.n_unstored for each in latest if each.beat}.values())
-
     def status(self, unit: str) -> UnitStatus:
         """Return the link status of a unit; "not connected" while no reports on the unit arrive."""
         latest = self._latest[unit]

@@ -94,8 +94,6 @@ class UnitLink:
         Age of the newest samples in seconds; None before the first.
     result_ages_s
         Age of the newest result in seconds, by bearing id.
-    n_unstored
-        Number of findings that the process could not store.
     store_error
         Present error of the database in the process that analyses the unit, or None.
     said_s
@@ -108,7 +106,6 @@ class UnitLink:
     status: UnitStatus
     data_age_s: float | None
     result_ages_s: Mapping[str, float]
-    n_unstored: int = 0
     store_error: str | None = None
     said_s: float | None = None
     stored: StoredResults = field(default_factory=StoredResults)
@@ -184,21 +181,13 @@ class CaptureStatus:
         Reason why samples cannot be recorded now, or None.
     error
         Reason why the newest recording failed, or None.
-    n_written
-        Number of finished recordings since the start.
     being_made
         Alarm id and occurrence number of each recording in progress.
     """
 
     trouble: str | None = None
     error: str | None = None
-    n_written: int = 0
     being_made: frozenset[tuple[str, int]] = frozenset()
-
-    @property
-    def n_running(self) -> int:
-        """Number of recordings in progress."""
-        return len(self.being_made)
 
 
 @dataclass(frozen=True)
@@ -207,20 +196,12 @@ class EvidenceStatus:
 
     Parameters
     ----------
-    error
-        Present write error, or None.
-    n_waiting, n_written, n_lost
-        Numbers of bundles that wait to be written, and that were written and lost since the start.
     pending
         Alarm id and occurrence number of each bundle that is still to be written.
     capturing
         Alarm id and occurrence number of each recording that is not linked to its bundle yet.
     """
 
-    error: str | None
-    n_waiting: int
-    n_written: int
-    n_lost: int
     pending: frozenset[tuple[str, int]] = frozenset()
     capturing: frozenset[tuple[str, int]] = frozenset()
 

@@ -111,7 +111,7 @@ class SnapshotBuilder:
     def _link(self, unit: str) -> UnitLink:
         """Return a unit's link state and data ages, if measured here, and the process's faults."""
         live = self._live
-        faults = (live.n_unstored, live.store_error, self._clock.monotonic_s())
+        faults = (live.store_error, self._clock.monotonic_s())
         if unit not in self._units:
             return UnitLink(UnitStatus(), None, {}, *faults)
         bearings = [bearing.id for bearing in self._units[unit].bearing]
@@ -161,9 +161,8 @@ class SocketReports:
     def _unit(self, unit: str, now_s: float) -> UnitReport | None:
         newest = self._builder.report(unit)
         status = newest.link.status
-        faults = (newest.link.store_error, newest.link.n_unstored)
         arrived = (status.last_sample_ns, newest.link.stored)
-        link = (status.state, status.reason, *arrived, *faults)
+        link = (status.state, status.reason, *arrived, newest.link.store_error)
         revision, sent_link, sent_s = self._sent.get(unit, (0, None, 0.0))
         is_new = newest.revision != revision
         if not is_new and link == sent_link and now_s - sent_s < LINK_EVERY_S:

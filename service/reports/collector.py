@@ -133,11 +133,8 @@ class EvidenceCollector:
 
     @property
     def status(self) -> EvidenceStatus:
-        """Error of the last attempt, numbers of bundles, and unfinished bundles and captures."""
-        return EvidenceStatus(
-            *(self.error, self.n_pending, self.n_written, self.n_lost),
-            *(self.pending, self.capturing),
-        )
+        """Unfinished bundles and captures."""
+        return EvidenceStatus(self.pending, self.capturing)
 
     @property
     def n_pending(self) -> int:

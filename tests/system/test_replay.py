@@ -67,7 +67,7 @@ async def told(program: Any) -> dict[str, Any]:
         "trends": {unit: await trends(program, unit) for unit in RUNS},
         "gaps": {unit: await program.get(f"/api/v1/units/{unit}/gaps", **YEAR) for unit in RUNS},
         "alarms": await alarm_events(program),
-        "origin": overview["plant"]["origin"],
+        "origin": overview["origin"],
     }
 
 

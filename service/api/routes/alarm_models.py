@@ -37,10 +37,6 @@ else:
 
 ConditionName = Literal["active", "within_limits", "unknown"]
 
-OriginName = Literal["live", "replay"]
-
-Directions = Annotated[Literal["", "x", "y", "xy"], Field(examples=["xy"])]
-
 AlarmIdText = Annotated[str, Field(examples=["U1:ujb_shaft_x:channel_not_ok"])]
 
 
@@ -67,11 +63,8 @@ class RaisedAtModel(ApiModel):
     cell: CellModel | None
 
 
-class AlarmModel(ApiModel):
-    """Alarm with its current state."""
-
-    id: AlarmIdText
-    """Stable identifier of the alarm: unit, subject and kind, separated by colons."""
+class AlarmFactsModel(ApiModel):
+    """Base class of alarms and their events: subject, kind, value and limit."""
 
     unit: str
     """Identifier of the unit; "plant" for alarms about the service itself."""
@@ -82,6 +75,29 @@ class AlarmModel(ApiModel):
 
     kind: AlarmKindName
     """Kind of alarm."""
+
+    value: Annotated[float | None, Field(examples=[163.2])]
+    """Value compared with the limit; the last known value while the condition is unknown; null
+    without a value."""
+
+    limit: Annotated[float | None, Field(examples=[150.0])]
+    """Limit; null for an alarm without a limit."""
+
+    value_unit: Annotated[str | None, Field(examples=["µm 0-pk"])]
+    """Unit of value and limit; null for an alarm without a unit."""
+
+    directions: Annotated[Literal["", "x", "y", "xy"], Field(examples=["xy"])]
+    """Directions in which the limit is exceeded; empty for an alarm without directions."""
+
+    raised_at: RaisedAtModel | None
+    """Operating condition when the alarm was last raised; null if unknown or never raised."""
+
+
+class AlarmModel(AlarmFactsModel):
+    """Alarm with its current state."""
+
+    id: AlarmIdText
+    """Stable identifier of the alarm: unit, subject and kind, separated by colons."""
 
     state: AlarmStateName
     """State of the alarm in the alarm life cycle of ISA-18.2."""
@@ -108,28 +124,12 @@ class AlarmModel(ApiModel):
     raised: Time | None
     """Start of the newest occurrence; null if the alarm was never raised."""
 
-    raised_at: RaisedAtModel | None
-    """Operating condition when the alarm was last raised; null if unknown or never raised."""
-
     condition: ConditionName
     """Condition of the alarm by the newest data; "unknown" without good data. An active alarm whose
     condition becomes unknown stays active."""
 
     condition_reason: str
     """Code of the reason for `condition`; "ok" without a fault."""
-
-    value: Annotated[float | None, Field(examples=[163.2])]
-    """Value compared with the limit; the last known value while the condition is unknown; null
-    without a value."""
-
-    limit: Annotated[float | None, Field(examples=[150.0])]
-    """Limit; null for an alarm without a limit."""
-
-    value_unit: Annotated[str | None, Field(examples=["µm 0-pk"])]
-    """Unit of value and limit; null for an alarm without a unit."""
-
-    directions: Directions
-    """Directions in which the limit is exceeded; empty for an alarm without directions."""
 
     waits_for: Literal["normal", "alert", "danger"] | None
     """State that the alarm takes if the present condition is certain and lasts for its delay; null
@@ -155,7 +155,7 @@ class AlarmModel(ApiModel):
 class AlarmListModel(ApiModel):
     """List of alarms that are not normal, and of normal alarms whose condition is unknown."""
 
-    origin: OriginName
+    origin: Origin
     count: AlarmCount
 
     alarms: list[AlarmModel]
@@ -165,21 +165,13 @@ class AlarmListModel(ApiModel):
     """Alarms that are in the normal state and whose condition is unknown."""
 
 
-class AlarmEventModel(ApiModel):
+class AlarmEventModel(AlarmFactsModel):
     """Event in the history of an alarm, such as a change of state or a comment."""
 
     id: int
     """Number of the event in the history of all alarms; later events have higher numbers."""
 
     alarm: AlarmIdText
-    unit: str
-
-    subject: str
-    """Subject of the alarm, such as the identifier of a channel or bearing."""
-
-    kind: AlarmKindName
-    """Kind of alarm."""
-
     number: int
     """Number of the event in the history of the alarm, from 1 without gaps."""
 
@@ -199,32 +191,17 @@ class AlarmEventModel(ApiModel):
 
     occurrence: int
 
-    value: float | None
-    """Value compared with the limit; null without a value."""
-
-    limit: float | None
-    """Limit; null for an alarm without a limit."""
-
-    value_unit: str | None
-    """Unit of value and limit; null for an alarm without a unit."""
-
-    directions: Directions
-    """Directions in which the limit was exceeded; empty for an alarm without directions."""
-
     actor: str
     """Person or key that caused the event; empty for an automatic change."""
 
     reason: str
     """Reason or comment given by the actor, or reason for an automatic change; may be empty."""
 
-    raised_at: RaisedAtModel | None
-    """Operating condition when the alarm was raised; null if unknown."""
-
 
 class AlarmEventsModel(ApiModel):
     """One page of the list of alarm events."""
 
-    origin: OriginName
+    origin: Origin
     next_before: int | None
 
     events: list[AlarmEventModel]

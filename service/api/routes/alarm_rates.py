@@ -46,9 +46,6 @@ class AlarmFiguresModel(ApiModel):
     per_day: Annotated[float, Field(examples=[3.4])]
     """Mean number of announcements per day."""
 
-    per_10_min: Annotated[float, Field(examples=[0.02])]
-    """Mean number of announcements per ten minutes."""
-
     most_in_10_min: int
     """Largest number of announcements in ten minutes."""
 
@@ -57,9 +54,6 @@ class AlarmFiguresModel(ApiModel):
 
     n_by_level: dict[AlarmLevelName, int]
     """Number of announcements by level of the alarm."""
-
-    share_by_level: dict[AlarmLevelName, float]
-    """Fraction of all announcements by level of the alarm, 0 to 1; 0 without announcements."""
 
     most_frequent: list[FrequentModel]
     """Alarms with the most announcements, at most ten, in descending order."""
@@ -141,9 +135,7 @@ def counted(
 
 def _figures_model(figures: AlarmFigures) -> AlarmFiguresModel:
     n_by_level = {LEVEL_NAMES[level]: figures.n_by_level[level] for level in AlarmLevel}
-    n_alarms = max(figures.n_alarms, 1)
-    share_by_level = {name: n / n_alarms for name, n in n_by_level.items()}
-    return AlarmFiguresModel.of(figures, n_by_level=n_by_level, share_by_level=share_by_level)
+    return AlarmFiguresModel.of(figures, n_by_level=n_by_level)
 
 
 DEFAULT_DAYS, MAX_DAYS = 7, 400

@@ -126,15 +126,6 @@ class BaselineCellsModel(ApiModel):
     neighbouring cells ("borrowed"), or no basis ("none")."""
 
 
-class TimeScatterModel(ApiModel):
-    """Scatter of the mean stiffness of a healthy film for one averaging time."""
-
-    time_scale_h: float
-
-    share: float
-    """Standard deviation of means over this time, divided by that of single readings."""
-
-
 class BaselineDirectionModel(ApiModel):
     """Learned stiffness of an oil film in one direction, x or y."""
 
@@ -142,15 +133,6 @@ class BaselineDirectionModel(ApiModel):
 
     cells: BaselineCellsModel
     """Cells with readings, and cells between them."""
-
-    u_random_percent: float
-    """Typical random standard uncertainty of single readings, %, a part of their scatter."""
-
-    rejected_share: float
-    """Fraction of the readings of the learning period rejected as outliers, 0 to 1."""
-
-    time_scatter: list[TimeScatterModel]
-    """Scatter of mean values, one entry per averaging time, shortest time first."""
 
 
 class BaselineModel(BearingAnswer):

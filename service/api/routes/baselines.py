@@ -108,7 +108,6 @@ def _direction(learned: QuantityBaseline) -> BaselineDirectionModel:
         learned,
         cells=_cells(list(learned.table.cells), learned.grid),
         scatter_percent=100.0 * learned.scatter,
-        u_random_percent=100.0 * learned.u_random,
     )
 
 

@@ -11,6 +11,7 @@ from service.api.context import Context
 from service.api.values import ApiModel, Time
 from service.live.receivers import ReceiverView, SenderStatus
 from service.settings.notifications import ChannelKind
+from service.settings.storage import Origin
 from service.store.outbox import Backlog, MessageState, StoredMessage
 
 SenderStateName = Literal[
@@ -80,13 +81,9 @@ class ReceiverModel(ApiModel):
 
 
 class DeliveryModel(ApiModel):
-    """State of all receivers of alarm messages."""
+    """State of all receivers of alarm messages; a replay sends no messages."""
 
-    origin: Literal["live", "replay"]
-    n_waiting: int
-
-    n_failing: int
-    """Number of receivers whose newest delivery attempt failed."""
+    origin: Origin
 
     receivers: list[ReceiverModel]
     """Receivers in the order of the plant file, then receivers that are no longer in it."""
@@ -102,19 +99,12 @@ def delivery_router(context: Context) -> APIRouter:
     @router.get("/delivery", summary="Receivers of alarm messages", response_model=DeliveryModel)
     async def delivery() -> Response:
         """List the receivers of alarm messages with their waiting and failed messages."""
-        receivers = [_receiver(view) for view in await context.receivers()]
-        return await rendered(lambda: _delivery(context, receivers))
+        views = await context.receivers()
+        return await rendered(
+            lambda: DeliveryModel.of(context, receivers=[_receiver(view) for view in views])
+        )
 
     return router
-
-
-def _delivery(context: Context, receivers: list[ReceiverModel]) -> DeliveryModel:
-    return DeliveryModel.of(
-        context,
-        n_waiting=sum(receiver.n_waiting for receiver in receivers),
-        n_failing=sum(receiver.is_failing for receiver in receivers),
-        receivers=receivers,
-    )
 
 
 def _receiver(view: ReceiverView) -> ReceiverModel:

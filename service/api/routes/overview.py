@@ -1,7 +1,7 @@
 """Route for the overview of the plant: what a tile shows of each unit, and what changed."""
 
 from collections.abc import Hashable
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
@@ -25,6 +25,7 @@ from service.api.values import (
 from service.live.alarm_list import AlarmCount
 from service.live.current_state import CHECK_S
 from service.settings.bearings import BearingSettings
+from service.settings.storage import Origin
 
 SHOWN = (
     "speed_rpm",
@@ -39,53 +40,6 @@ SHOWN = (
 """Quantities that the overview contains; stiffness is a ratio where the bracket is unknown."""
 
 Revision = Annotated[str, Field(examples=["9f86d081-412"])]
-
-
-class EvidenceStatusModel(ApiModel):
-    """State of the writing of alarm evidence."""
-
-    error: str | None
-    """Reason why the newest attempt to write evidence failed; null if it succeeded."""
-
-    n_waiting: int
-    """Number of alarm occurrences whose evidence is not written yet."""
-
-    n_written: int
-    """Number of alarm occurrences whose evidence was written since the service started."""
-
-    n_lost: int
-    """Number of alarm occurrences without evidence because too many waited, since the start."""
-
-
-class PlantModel(ApiModel):
-    """Name of the plant and origin of the data."""
-
-    name: str
-    origin: Literal["live", "replay"]
-
-
-class StoreModel(ApiModel):
-    """State of the database."""
-
-    error: str | None
-    """Reason why results cannot be stored or read; null without a fault."""
-
-    n_unstored: int
-    """Number of results that are not in the database, because it did not answer for too long or
-    rejected them."""
-
-
-class CapturesModel(ApiModel):
-    """State of the recordings around alarms."""
-
-    error: str | None
-    """Reason why the newest recording failed; null if it succeeded."""
-
-    n_running: int
-    """Number of recordings in progress."""
-
-    n_written: int
-    """Number of recordings finished since the service started."""
 
 
 class TileModel(ResultModel):
@@ -119,10 +73,8 @@ class UnitTileModel(BasicUnitModel):
 class OverviewModel(ApiModel):
     """Overview of the plant: units, alarms, and state of the service."""
 
-    plant: PlantModel
-    store: StoreModel
+    origin: Origin
     alarms: AlarmCount
-    captures: CapturesModel
 
     revision: Revision
     """Parameter ``since`` with which the next request obtains only the units that changed."""
@@ -130,11 +82,17 @@ class OverviewModel(ApiModel):
     since: Revision | None
     """Revision after which the listed units changed; null if all units are listed."""
 
+    plant: str
+    """Name of the plant for display."""
+
     refresh_s: float
     """Time between successive results, s."""
 
-    evidence: EvidenceStatusModel | None
-    """State of the evidence of alarms; null if no evidence is kept."""
+    store_error: str | None
+    """Reason why results cannot be stored or read; null without a fault."""
+
+    captures_error: str | None
+    """Reason why the newest recording around an alarm failed; null if it succeeded."""
 
     units: list[UnitTileModel]
     """Units of the plant that changed since the requested revision, or all units."""
@@ -162,7 +120,7 @@ class Overview:
                 if unit not in self._units or self._units[unit][0] != now:
                     self._n += 1
                     self._units[unit] = now, self._n
-        head = (live.store_error, live.n_unstored, alarms.revision, plant.captures, plant.evidence)
+        head = live.store_error, alarms.revision, plant.captures.error
         self._n += head != self._head
         self._head = head
         return self._n
@@ -182,11 +140,10 @@ class Overview:
             context,
             revision=f"{started}-{self._n}",
             since=since if before else None,
-            plant=PlantModel.of(context, name=context.plant_name),
-            store=StoreModel.of(context.live, error=context.live.store_error),
+            plant=context.plant_name,
+            store_error=context.live.store_error,
             alarms=context.alarms.count(),
-            captures=context.plant().captures,
-            evidence=context.plant().evidence,
+            captures_error=context.plant().captures.error,
             units=[self._tile(unit, at) for unit, (_, at) in self._units.items() if at > before],
         )
 

@@ -208,14 +208,9 @@ class ConfigurationModel(ApiModel):
     commit: str | None
     """Source commit of the program; null if unknown."""
 
-    json_schema: Annotated[str, Field(examples=["/api/v1/configuration/schema"])]
-    """URL path of the JSON schema, which gives meaning, limits and default of every setting."""
-
     settings: dict[str, Any]
     """All settings, structured like the plant file."""
 
-
-SCHEMA = "/api/v1/configuration/schema"
 
 SCHEMA_TYPE = "application/schema+json"
 
@@ -278,7 +273,7 @@ def plant_router(context: Context) -> APIRouter:
         found = context.configuration
         document = json.loads(found.text)
         shown = {key: document[key] for key in ("padwatch", "commit", "settings")}
-        return ConfigurationModel(version=found.version, json_schema=SCHEMA, **shown)
+        return ConfigurationModel(version=found.version, **shown)
 
     @router.get(
         "/configuration/schema",

@@ -91,37 +91,6 @@ class RecordingsModel(ApiModel):
     """Reason why continuous recording fails now; null if recording does not fail."""
 
 
-class RecordedChannelModel(ApiModel):
-    """Waveform channel in a recording."""
-
-    id: str
-
-    unit: ChannelUnit
-    """Engineering unit of the samples."""
-
-    n_not_ok: int
-    """Number of samples in blocks that the device flagged as not OK."""
-
-
-class RecordedSlowModel(ApiModel):
-    """Slow channel in a recording, such as an oil temperature."""
-
-    id: str
-
-    unit: str
-    """Unit of the readings."""
-
-
-class RecordedFileModel(ApiModel):
-    """File of a recording: size and checksum."""
-
-    size: int
-    """Size of the file, bytes."""
-
-    sha256: str
-    """SHA-256 checksum of the file."""
-
-
 class RecordingInfoModel(ApiModel):
     """Description of a recording, made from a full check of its files."""
 
@@ -130,9 +99,6 @@ class RecordingInfoModel(ApiModel):
 
     made_by: str
     """Program that made the recording, and its purpose."""
-
-    sample_type: Literal["int16", "float32"]
-    """Type of the stored samples: int16 counts of the converter, or float32 engineering units."""
 
     end: Time
     """End of the recording: time of the last sample plus one sampling interval."""
@@ -146,14 +112,15 @@ class RecordingInfoModel(ApiModel):
     epochs: list[int]
     """Epochs of the sample index; several if the device restarted its count meanwhile."""
 
-    channels: list[RecordedChannelModel]
-    """Waveform channels, in the order of the columns of the stored samples."""
+    channels: dict[str, ChannelUnit]
+    """Engineering unit of each waveform channel, by identifier of the channel."""
 
-    slow_channels: list[RecordedSlowModel]
-    """Slow channels, in the order of the columns of the stored readings."""
+    slow_channels: dict[str, str]
+    """Unit of the readings of each slow channel, by identifier of the channel."""
 
-    files: dict[str, RecordedFileModel]
-    """Files of the recording by name, except the manifest and the list of alarms."""
+    n_not_ok: dict[str, int]
+    """Number of samples in blocks that the device flagged as not OK, by identifier of the channel;
+    without channels that were always OK."""
 
 
 def recording_model(kept: RecordingEntry) -> RecordingModel:
@@ -187,12 +154,8 @@ def recording_info(shelf: RecordingLibrary, kept: RecordingEntry) -> RecordingIn
         manifest,
         recording=recording_model(kept),
         end=summary.stop_ns,
-        channels=[
-            RecordedChannelModel(
-                id=each.id, unit=UNITS[each.measurand], n_not_ok=summary.n_not_ok.get(each.id, 0)
-            )
-            for each in manifest.channels
-        ],
+        channels={each.id: UNITS[each.measurand] for each in manifest.channels},
+        slow_channels={each.id: each.unit for each in manifest.slow_channels},
     )
 
 

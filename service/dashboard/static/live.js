@@ -60,13 +60,13 @@ export function viewAt(live, now, timeMs) {
     silenceS,
     failure: live.failure,
     failedS: live.failedSince ? secondsBetween(live.failedSince, now) : null,
-    plant: live.overview?.plant.name ?? null,
-    origin: live.overview?.plant.origin ?? null,
-    storeError: live.overview?.store.error ?? null,
-    captureError: live.overview?.captures.error ?? null,
+    plant: live.overview?.plant ?? null,
+    origin: live.overview?.origin ?? null,
+    storeError: live.overview?.store_error ?? null,
+    captureError: live.overview?.captures_error ?? null,
     alarms: current ? live.overview.alarms : null,
     refreshS: live.overview?.refresh_s ?? null,
-    serviceTimeMs: live.overview?.plant.origin === "replay" ? replayTimeMs(live.overview) : live.overview && timeMs,
+    serviceTimeMs: live.overview?.origin === "replay" ? replayTimeMs(live.overview) : live.overview && timeMs,
     units: (live.overview?.units ?? []).map((unit) => agedUnit(unit, live.details, timeMs, current)),
   };
 }

@@ -175,7 +175,8 @@ async def test_every_transducer_of_the_bearing_has_its_waveform(plant, page):
     await page.goto(plant.url + ORBITS)
     answer = await page.request.get(f"{plant.url}api/v1/units/U1/channels")
     found = (await answer.json())["waveform"]
-    wanted = [one["id"] for one in found if any(use.startswith("UJB ") for use in one["used_by"])]
+    ours = [one for one in found if any(use.startswith("UJB ") for use in one["used_by"])]
+    wanted = [one["settings"]["id"] for one in ours]
     chart = page.locator("[data-chart=waveforms] .chart")
     await expect(chart.locator(".annotation-text")).to_have_text(wanted)
     await expect(chart.locator("path.js-line")).to_have_count(len(wanted))

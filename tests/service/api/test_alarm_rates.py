@@ -65,7 +65,7 @@ async def test_a_quiet_plant_has_rates_of_zero_of_spans_that_can_be_counted(read
     found = await read_only.json(RATES)
     assert set(found["units"]) == {"U1", "U2"}
     assert (found["all"]["n_alarms"], found["all"]["per_day"]) == (0, 0.0)
-    assert found["all"]["share_by_level"] == {"alert": 0.0, "danger": 0.0}
+    assert found["all"]["n_by_level"] == {"alert": 0, "danger": 0}
     assert (found["is_complete"], found["stale"]) == (True, [])
     for parameters, status, words in (
         ({"unit": "U9"}, 404, "unknown unit 'U9'"),

@@ -57,7 +57,9 @@ async def test_every_channel_is_listed_with_its_settings_in_wire_order(read_only
     body = await read_only.json(CHANNELS)
 
     unit = plant.unit[0]
-    assert [each["settings"]["id"] for each in body["waveform"]] == [channel.id for channel in unit.channel]
+    assert [each["settings"]["id"] for each in body["waveform"]] == [
+        channel.id for channel in unit.channel
+    ]
     ids = [each["settings"]["id"] for each in body["slow"]]
     assert ids == [channel.id for channel in unit.slow_channel]
     first, settings = body["waveform"][0], unit.channel[0]

@@ -84,15 +84,15 @@ async function checkedRecording(id) {
 }
 
 function contentsWords(found) {
-  const { channels, slow_channels: slow, n_gaps: gaps, n_gap_samples: missing, rejected, epochs, made_by: by, recording } = found;
+  const count = (byChannel) => Object.keys(byChannel).length;
+  const { channels, slow_channels: slow, n_gaps: gaps, n_gap_samples: missing, rejected, epochs, n_not_ok: notOk, made_by: by, recording } = found;
   const refused = Object.values(rejected).reduce((sum, count) => sum + count, 0);
-  const notOk = channels.filter((channel) => channel.n_not_ok > 0).map(({ id }) => id);
   const parts = [
-    `Every checksum is right. ${channels.length} channels at ${formatFixed(recording.rate_hz, 0)} samples per second, ${slow.length} slow ones`,
+    `Every checksum is right. ${count(channels)} channels at ${formatFixed(recording.rate_hz, 0)} samples per second, ${count(slow)} slow ones`,
     gaps === 0 ? "no holes" : `${gaps} holes, ${formatCount(missing)} samples missing`,
   ];
   if (refused) parts.push(`${formatCount(refused)} samples rejected`);
   if (epochs.length > 1) parts.push(`the device restarted ${epochs.length - 1}×`);
-  if (notOk.length) parts.push(`not OK for a while: ${notOk.join(", ")}`);
+  if (count(notOk)) parts.push(`not OK for a while: ${Object.keys(notOk).join(", ")}`);
   return `${parts.join("; ")}. Made by ${by}.`;
 }

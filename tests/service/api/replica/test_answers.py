@@ -25,7 +25,7 @@ SAME = [
     "/api/v1/delivery",
 ]
 LINK = "U1:link:link_lost"
-ELSEWHERE = {"captures", "evidence", "refresh_s", "revision"}
+ELSEWHERE = {"captures_error", "refresh_s", "revision"}
 """Of the overview: what lies with the process that analyses, and what the test rounds."""
 
 
@@ -38,7 +38,7 @@ async def test_a_replica_answers_as_the_process_that_analyses(pair):
 
 
 def _shared(answer: Any) -> Any:
-    if isinstance(answer, dict) and "captures" in answer:
+    if isinstance(answer, dict) and "captures_error" in answer:
         return {key: value for key, value in answer.items() if key not in ELSEWHERE}
     if isinstance(answer, dict) and "status" in answer:
         return answer["status"]
