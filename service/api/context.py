@@ -13,8 +13,8 @@ from service.api.auth.authenticator import Authenticator
 from service.api.downloads import Downloads
 from service.api.problems import ProblemError
 from service.live.alarm_list import LiveAlarms
+from service.live.commands import Operators
 from service.live.current_state import LiveFilms, LiveUnits
-from service.live.operators import Operators
 from service.live.receivers import ReceiverView
 from service.live.references import ReferencesInForce
 from service.live.snapshot import PlantSnapshot

@@ -1,21 +1,21 @@
-"""Tables as answers: CSV and Parquet files."""
+"""Tables as answers, CSV and Parquet files, and the audit trail as a CSV file."""
 
 import csv
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import astuple, dataclass, fields
 from io import BytesIO, StringIO
 from itertools import islice
 from types import NoneType
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, TextIO, get_args
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 from fastapi import Depends, Query, Request
 from fastapi.responses import StreamingResponse
 
-from service.api.audit_csv import harmless
 from service.api.downloads import attachment
 from service.runtime.times import rfc3339
+from service.store.access.audit_entries import AuditEntry
 
 FormatName = Literal["json", "csv", "parquet"]
 ColumnKind = Literal["time", "number", "count", "text", "flag"]
@@ -164,3 +164,36 @@ def _cells(column: Column) -> Iterator[object]:
     if column.kind == "text":
         return (None if value is None else harmless(value) for value in column.values)
     return iter(column.values)
+
+
+HEADER = ("time", "chain", *(field.name for field in fields(AuditEntry)))
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "|", "%", "'", "＝", "＋", "－", "＠")
+"""First characters of spreadsheet formulas, and the single quote to make escaping reversible."""
+
+
+def write_csv(file: TextIO, entries: Iterable[tuple[str, AuditEntry]]) -> int:
+    """Write pairs of chain name and audit entry to an open CSV file; return their number.
+
+    Text that a spreadsheet could interpret as a formula is prefixed with a single quote.
+    """
+    rows = csv.writer(file, quoting=csv.QUOTE_ALL, lineterminator="\r\n")
+    rows.writerow(HEADER)
+    n_entries = 0
+    for chain, entry in entries:
+        rows.writerow([rfc3339(entry.time_ns), chain, *map(_cell, astuple(entry))])
+        n_entries += 1
+    return n_entries
+
+
+def harmless(text: str) -> str:
+    """Return a text escaped against formula injection, with invalid characters replaced."""
+    text = text.encode("utf-8", "replace").decode("utf-8").replace("\0", "\ufffd")
+    is_formula = text.lstrip(" \u00a0\ufeff").startswith(FORMULA) or text.startswith(FORMULA)
+    return f"'{text}" if is_formula else text
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, str):
+        return harmless(value)
+    return "" if value is None else value

@@ -5,6 +5,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from prometheus_client.process_collector import ProcessCollector
+
 from acquisition.clock import Clock
 from core.alarms.alarm import AlarmNews
 from core.monitor.monitor import UnitMonitor
@@ -20,6 +22,7 @@ from service.app.kept_files import (
 from service.app.notifications import receivers_of
 from service.app.service_health import Pressure, health_of
 from service.cluster.measuring_side import CommandWorker, Reporter, process_name
+from service.live.metrics import add_alarms, add_films, add_units
 from service.live.references import ReferencesInForce
 from service.live.snapshot import CaptureStatus, PlantSnapshot, SourceCounts
 from service.measuring.acquirer import Bus
@@ -29,22 +32,27 @@ from service.measuring.commands import CommandExecutor
 from service.measuring.films import FilmMonitor, film_monitor
 from service.measuring.integrity import IntegrityMonitor
 from service.measuring.live_view import LiveView
+from service.measuring.metrics import add_disks, add_integrity, add_samples, add_store
 from service.measuring.recorder import FILE, ParkedRows, Recorder
 from service.measuring.service_alarms import StreamStatus
 from service.measuring.snapshots import SnapshotBuilder
 from service.measuring.sources import vector_rows
 from service.notifications.message import LiveContext
+from service.notifications.metrics import add_deliveries
 from service.notifications.sender import Deliveries
 from service.recordings.around_alarms import Captures
 from service.recordings.continuous_recorder import ContinuousRecorder
 from service.recordings.keeper import RecordingIndexer
+from service.recordings.metrics import add_recordings
 from service.reports.collector import EvidenceCollector
 from service.runtime.disk import SpaceWatch
 from service.runtime.heartbeats import Heartbeats, Loop, Pulse
+from service.runtime.metrics import Families
 from service.runtime.polls import TimedSource
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.loops import RetentionLoop, RollupLoop, ScrubLoop
+from service.store.port import StoreError
 from service.store.retention import ages_of
 from service.store.store import Store
 
@@ -279,3 +287,52 @@ def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> 
     reporter = Reporter(name, held, analysis.snapshots, store.unit_states, clock)
     carrying_out = CommandWorker(name, held, analysis.executor, store, clock)
     return {"report": reporter.run, "commands": carrying_out.run}
+
+
+async def measuring_metrics(
+    analysis: Analysis, bus: Bus, sources: Mapping[str, TimedSource]
+) -> bytes:
+    """Return all metrics of the measuring process in the Prometheus text format.
+
+    Parameters
+    ----------
+    sources
+        Timed sample sources by unit id.
+    """
+    try:
+        receivers = await analysis.deliveries.look()
+    except StoreError:
+        receivers = None
+    process, families = analysis.process, Families()
+    live, now_ns = process.live, process.clock.now_ns()
+    units = {unit.id: [bearing.id for bearing in unit.bearing] for unit in process.plant.unit}
+    families.add_program(process.store.kind)
+    add_samples(families, live, units, sources, now_ns)
+    add_units(families, live, units)
+    add_films(families, live, analysis.films.newest, units)
+    add_alarms(families, analysis.alarms.alarms, analysis.alarms.count(), list(units))
+    add_store(families, bus, analysis.recorder, live)
+    add_integrity(families, analysis.soundness)
+    add_disks(families, analysis.space)
+    add_recordings(families, analysis.tape, analysis.captures, analysis.recordings)
+    add_evidence(families, analysis.evidence)
+    add_deliveries(families, receivers, now_ns)
+    families.include(ProcessCollector(registry=None))
+    return families.text
+
+
+EVIDENCE = {
+    "evidence_written_total": "This counts the bundles of evidence of alarms.",
+    "evidence_failed_total": "This counts the failed attempts to write such a bundle.",
+    "evidence_lost_total": "This counts the occurrences whose evidence was given up.",
+    "evidence_pending": "This is the number of bundles that are still to be written.",
+}
+
+
+def add_evidence(families: Families, evidence: EvidenceCollector) -> None:
+    """Add the numbers of stored and failed evidence bundles."""
+    families.declare(EVIDENCE)
+    families.add("evidence_written_total", evidence.n_written)
+    families.add("evidence_failed_total", evidence.n_failed)
+    families.add("evidence_lost_total", evidence.n_lost)
+    families.add("evidence_pending", evidence.n_pending)

@@ -12,10 +12,10 @@ from service.app.listener import require_protected
 from service.app.measuring_process import (
     ProcessContext,
     analysis_on,
+    measuring_metrics,
     plant_snapshot,
     reporting_loops,
 )
-from service.app.metrics import measuring_metrics
 from service.app.notifications import router_of
 from service.app.process import Supervision
 from service.app.service_audit import ServiceTrail

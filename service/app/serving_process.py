@@ -28,8 +28,8 @@ from service.app.supervisor import Start, read_start
 from service.app.web import access_desk, application, server_of
 from service.dashboard.assets import compress_all
 from service.live.client import LiveClient, SocketOperators
+from service.live.commands import Operators
 from service.live.exchange import MeasuringGoneError, ServingEnd, VersionError
-from service.live.operators import Operators
 from service.live.receivers import receiver_views
 from service.live.references import ReferencesInForce
 from service.live.snapshot import Report

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from service.api.audit_csv import write_csv
+from service.api.tables import write_csv
 from service.app.storage import open_trails
 from service.cli.options import JsonOutput, PlantPath, argument, command_group, fail, print_result
 from service.settings.plant import load_plant_file

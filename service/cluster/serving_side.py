@@ -10,8 +10,7 @@ from acquisition.clock import Clock
 from core.units import ns_from_s
 from service.live.alarm_list import LiveAlarms
 from service.live.client import LiveClient
-from service.live.commands import OperatorCommand, encoded
-from service.live.operators import Operators
+from service.live.commands import OperatorCommand, Operators, encoded
 from service.live.receivers import (
     ReceiverStatus,
     ReceiverView,

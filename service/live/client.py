@@ -8,10 +8,9 @@ import structlog
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from service.live.alarm_list import LiveAlarms
-from service.live.commands import CommandFailedError, OperatorCommand, encoded
+from service.live.commands import CommandFailedError, OperatorCommand, Operators, encoded
 from service.live.current_state import Ask, LiveFilms, LiveUnits
 from service.live.exchange import MeasuringGoneError, ServingEnd
-from service.live.operators import Operators
 from service.live.snapshot import PlantSnapshot, Report
 from service.settings.core_values import chatter_rule_of, stale_after_s
 from service.settings.plant import PlantFile

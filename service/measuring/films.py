@@ -18,8 +18,7 @@ from core.limits import Judgement
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
 from service.live.commands import BaselineAction, FilmPlace, baseline_step
-from service.measuring.baseline_learning import Learner
-from service.measuring.baseline_versions import in_force, resume_films
+from service.measuring.baseline_learning import Learner, in_force, resume_films
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.core_values import film_rules_of
 from service.settings.films import FilmAlarmSettings

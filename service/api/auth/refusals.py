@@ -5,7 +5,7 @@ import asyncio
 import structlog
 
 from acquisition.clock import Clock
-from service.api.token_bucket import TokenBucket
+from service.api.auth.backoff import TokenBucket
 from service.store.access.audit_entries import AuditAction, acting
 from service.store.audit import AuditStore
 from service.store.port import StoreError

@@ -23,6 +23,7 @@ from core.condition.cells import CellGrid
 from core.limits import AlarmLevel
 from core.units import ns_from_s
 from service.api.answers import in_thread, rendered
+from service.api.auth.backoff import TokenBucket
 from service.api.auth.declared import Reach, needs, subject_router
 from service.api.auth.gate import actor_or, identity_of
 from service.api.context import Context
@@ -50,7 +51,6 @@ from service.api.routes.alarm_models import (
     is_raised_within,
 )
 from service.api.tables import Column, Format, kind_of, table_content, table_response
-from service.api.token_bucket import TokenBucket
 from service.api.values import ActorModel, ApiModel, NoteText, ReasonText, states_named
 from service.settings.alarm_kinds import AlarmKindName, AlarmLevelName
 from service.store.access.identities import Permission

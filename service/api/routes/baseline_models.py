@@ -1,11 +1,16 @@
-"""API models of baselines, and of requests that change baselines."""
+"""API models of baselines and of their learning, and of requests that change baselines."""
 
 from typing import Annotated, Literal
 
+import numpy as np
+import numpy.typing as npt
 from pydantic import Field
 
+from core.baseline.history import DIRECTIONS, ReadingOutcome
+from core.change.decision import JUDGED
+from core.condition.operating_state import STEADY
+from core.units import DAY_NS
 from service.api.parameters import Moment
-from service.api.routes.learning import LearningModel
 from service.api.values import (
     ActorModel,
     ApiModel,
@@ -14,7 +19,131 @@ from service.api.values import (
     ReasonText,
     Time,
 )
+from service.live.commands import FilmPlace
 from service.live.models import BaselineOriginModel
+from service.settings.films import FilmAlarmSettings
+from service.store.baselines import BaselineEntry, Versions
+from service.store.film_readings import FilmHistory, FilmQuery
+from service.store.films import FilmStore
+
+RECENT_DAYS = 7.0
+
+
+class ReadingCountsModel(ApiModel):
+    """Counts of recent film readings, which show why a film is not learned or judged."""
+
+    days: Annotated[float, Field(examples=[7.0])]
+    """Length of the period whose readings are counted, days."""
+
+    n_at_speed: Annotated[int, Field(examples=[180])]
+    """Number of readings at rated speed."""
+
+    n_settled: Annotated[int, Field(examples=[0])]
+    """Number of these readings in a settled operating state after the warm-up of the film."""
+
+    n_complete: int
+    """Number of settled readings with stiffness, eccentricity and oil temperature, in x or y,
+    whichever has fewer."""
+
+    n_judged: int
+    """Number of complete readings with a verdict on the film, in x or y, whichever has fewer."""
+
+
+class LearningModel(ApiModel):
+    """Progress of learning the baseline of a bearing."""
+
+    recent: ReadingCountsModel
+
+    since: Time | None
+    """Start of the learning period: first reading or last machine event; null without readings."""
+
+    until: Time | None
+    """End of the learning period, after which learning stops; null without readings."""
+
+    is_over: bool
+    """Whether the learning period has ended."""
+
+    n_readings: int | None
+    """Number of usable readings so far; null once this period has a baseline."""
+
+    n_days: Annotated[int | None, Field(examples=[12])]
+    """Number of days with usable readings; null once this period has a baseline."""
+
+    n_days_wanted: Annotated[int, Field(examples=[20])]
+    """Number of days with usable readings that the first baseline requires."""
+
+
+def learning_model(
+    store: FilmStore,
+    place: FilmPlace,
+    versions: Versions,
+    entries: list[BaselineEntry],
+    settings: FilmAlarmSettings,
+    now_ns: int,
+) -> LearningModel:
+    """Return the progress of learning a baseline; ``entries`` are all baselines of the bearing."""
+    since_ns = versions.renewed_ns
+    if since_ns is None:
+        since_ns = store.first_ns(place.unit, place.bearing, place.estimator)
+    until_ns: int | None = None
+    n_readings: int | None = 0
+    n_days: int | None = 0
+    if since_ns is not None:
+        until_ns = since_ns + round(settings.learning_days * DAY_NS)
+        is_learned = any(
+            entry.estimator is place.estimator and entry.learned_from_ns >= since_ns
+            for entry in entries
+        )
+        n_readings, n_days = (
+            (None, None) if is_learned else _counts(store, place, since_ns, until_ns, settings)
+        )
+    return LearningModel.of(
+        since=since_ns,
+        until=until_ns,
+        is_over=until_ns is not None and now_ns >= until_ns,
+        n_readings=n_readings,
+        n_days=n_days,
+        n_days_wanted=settings.baseline.min_learning_days,
+        recent=_recent(store, place, settings, now_ns),
+    )
+
+
+def _counts(
+    store: FilmStore, place: FilmPlace, since_ns: int, until_ns: int, settings: FilmAlarmSettings
+) -> tuple[int, int]:
+    """Return `LearningModel.n_readings` and `n_days` of a learning period."""
+    found = store.history(
+        FilmQuery(place.unit, place.bearing, place.estimator, since_ns, until_ns + 1)
+    )
+    if not len(found):
+        return 0, 0
+    usable = found.is_settled & ~np.any(found.level > 0, axis=0)
+    rows = [usable & complete for complete in _complete(found, settings)]
+    time_ns = found.history.time_ns
+    return min((int(row.sum()), np.unique(time_ns[row] // DAY_NS).size) for row in rows)
+
+
+def _recent(
+    store: FilmStore, place: FilmPlace, settings: FilmAlarmSettings, now_ns: int
+) -> ReadingCountsModel:
+    since_ns = now_ns - round(RECENT_DAYS * DAY_NS)
+    found = store.history(FilmQuery(place.unit, place.bearing, place.estimator, since_ns))
+    n_complete = [(found.is_settled & row).sum() for row in _complete(found, settings)]
+    is_judged = np.isin(found.verdict, [int(verdict) for verdict in JUDGED])
+    return ReadingCountsModel(
+        days=RECENT_DAYS,
+        n_at_speed=int(np.isin(found.state, [int(state) for state in STEADY]).sum()),
+        n_settled=int(found.is_settled.sum()),
+        n_complete=int(min(n_complete)),
+        n_judged=int(is_judged[: len(DIRECTIONS)].sum(axis=1).min()),
+    )
+
+
+def _complete(found: FilmHistory, settings: FilmAlarmSettings) -> list[npt.NDArray[np.bool_]]:
+    """Return masks of the readings with stiffness and operating condition, (n,) per direction."""
+    is_known = settings.baseline.settings().is_known(found.history.conditions)
+    return [is_known & (outcome == ReadingOutcome.MEASURED) for outcome in found.history.outcome]
+
 
 BaselineStatusName = Literal["in_force", "rejected", "superseded", "learned"]
 

@@ -27,9 +27,9 @@ from service.api.routes.baseline_models import (
     BaselineStepModel,
     BaselineVersionModel,
     RenewModel,
+    learning_model,
 )
 from service.api.routes.films import watched_place
-from service.api.routes.learning import learning_model
 from service.api.values import bounds, listed
 from service.live.commands import (
     Accept,
