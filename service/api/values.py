@@ -68,14 +68,6 @@ class ActorModel(RequestModel):
 
 LevelName = Literal["good", "uncertain", "bad"]
 
-EstimatorName = Literal[
-    "dynamic", "transfer_order1", "transfer_vortex", "ratio_order1", "ratio_vortex"
-]
-
-SpeedSourceName = Literal["key_phase", "slow_channel", "line", "rated"]
-
-RunoutName = Literal["applied", "no_vector", "other_probe", "not_slow_roll", "no_phase_reference"]
-
 
 class BearingAnswer(ApiModel):
     """Base class of answers about one bearing."""

@@ -404,8 +404,7 @@ class LiveFilms:
         fetched
             Baselines in force, as returned by `fetch`; None to keep those in memory.
         """
-        for bearing, film in state.films.items():
-            self._newest[unit, bearing] = FilmNews(film.reading, film.findings, film.decisions)
+        self._newest |= {(unit, bearing): news for bearing, news in state.films.items()}
         if fetched is None:
             fetched = self._held(unit, state)
         others = {key: held for key, held in self._baselines.items() if key[0] != unit}

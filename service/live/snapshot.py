@@ -8,9 +8,7 @@ from importlib.metadata import version
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from core.alarms.alarm import Alarm
-from core.change.decision import Decision
-from core.change.film_judge import FilmFinding
-from core.change.film_reading import FilmReading
+from core.change.film_judge import FilmNews
 from core.condition.cells import BearingCondition
 from core.machine.unit import Estimator
 from core.monitor.assessment import AveragingWindow
@@ -54,15 +52,6 @@ class BearingSnapshot:
 
 
 @dataclass(frozen=True)
-class FilmSnapshot:
-    """Newest reading of an oil film, with its finding and decision in each direction (x, y)."""
-
-    reading: FilmReading
-    findings: tuple[FilmFinding, FilmFinding]
-    decisions: tuple[Decision, Decision]
-
-
-@dataclass(frozen=True)
 class UnitSnapshot:
     """State of a unit that changes with each result; `bearings` and `films` are by bearing id.
 
@@ -80,7 +69,7 @@ class UnitSnapshot:
     alarms: tuple[Alarm, ...]
     judged: frozenset[str]
     chattering: frozenset[str]
-    films: Mapping[str, FilmSnapshot]
+    films: Mapping[str, FilmNews]
     baselines: Mapping[str, int]
 
 

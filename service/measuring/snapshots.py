@@ -10,7 +10,6 @@ from core.monitor.assessment import Assessment
 from service.live.alarm_list import SHARED, is_shared, reporting_unit
 from service.live.snapshot import (
     BearingSnapshot,
-    FilmSnapshot,
     PlantSnapshot,
     Report,
     UnitLink,
@@ -88,7 +87,7 @@ class SnapshotBuilder:
             alarms=tuple(own),
             judged=frozenset(a.identity.id for a in own if self._alarms.is_judged(a)),
             chattering=frozenset(a.identity.id for a in own if self._alarms.is_chattering(a)),
-            films={b: FilmSnapshot(**vars(news)) for b, news in seen.items() if news},
+            films={b: news for b, news in seen.items() if news},
             baselines={b: found.origin.version for b, found in in_force.items() if found},
         )
 

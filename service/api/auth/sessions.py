@@ -1,7 +1,7 @@
 """Routes for login, logout, password change, and creation of the first account."""
 
 from math import ceil
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Request, Response
 from pydantic import Field
@@ -19,8 +19,6 @@ from service.api.auth.service import LoggedIn, NotLoggedIn
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel
 from service.store.access.identities import Means, Permission, Role
-
-PermissionName = Literal["read", "act_on_alarms", "change_measuring", "read_audit", "change_access"]
 
 
 class SessionModel(ApiModel):
@@ -42,7 +40,7 @@ class SessionModel(ApiModel):
     role: Annotated[RoleName | None, Field(examples=["operator"])]
     """Role of the caller; null if the caller must log in first."""
 
-    permissions: Annotated[list[PermissionName], Field(examples=[["read", "act_on_alarms"]])]
+    permissions: Annotated[list[Permission], Field(examples=[["read", "act_on_alarms"]])]
     """Permissions of the caller; empty if the caller must log in first."""
 
 
@@ -219,5 +217,5 @@ async def session_model(caller: Caller, authenticator: Authenticator) -> Session
         password_change_needed=identity is not None and identity.must_change_password,
         name=identity.name if identity is not None and identity.is_proven else None,
         role=identity.role.value if identity is not None else None,
-        permissions=[p.value for p in Permission if identity is not None and identity.role.may(p)],
+        permissions=[p for p in Permission if identity is not None and identity.role.may(p)],
     )

@@ -1,7 +1,7 @@
 """API models of alarms and alarm events."""
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -26,14 +26,6 @@ from service.live.current_state import LiveFilms
 from service.settings.alarm_kinds import LEVEL_NAMES, AlarmKindName, AlarmLevelName, value_unit
 from service.settings.storage import Origin
 from service.store.port import StoredEvent, ValueRange
-
-if TYPE_CHECKING:
-    AlarmStateName = str
-    AlarmChangeName = str
-else:
-    AlarmStateName = Literal[tuple(state.value for state in AlarmState)]
-    AlarmChangeName = Literal[tuple(change.value for change in AlarmChange)]
-"""Names of the states and changes of alarms, validated by pydantic."""
 
 ConditionName = Literal["active", "within_limits", "unknown"]
 
@@ -99,7 +91,7 @@ class AlarmModel(AlarmFactsModel):
     id: AlarmIdText
     """Stable identifier of the alarm: unit, subject and kind, separated by colons."""
 
-    state: AlarmStateName
+    state: AlarmState
     """State of the alarm in the alarm life cycle of ISA-18.2."""
 
     level: Annotated[AlarmLevelName, ByName] | None
@@ -175,15 +167,15 @@ class AlarmEventModel(AlarmFactsModel):
     number: int
     """Number of the event in the history of the alarm, from 1 without gaps."""
 
-    change: AlarmChangeName
+    change: AlarmChange
 
     level: Annotated[AlarmLevelName, ByName] | None
     """Level after the event; for a return to normal, the level before the return; null if none."""
 
-    state_before: AlarmStateName
+    state_before: AlarmState
     """State of the alarm before the event."""
 
-    state_after: AlarmStateName
+    state_after: AlarmState
     """State of the alarm after the event."""
 
     time: Time

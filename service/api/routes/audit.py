@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Response
 from pydantic import Field
@@ -13,11 +13,9 @@ from service.api.context import Context
 from service.api.parameters import OptionalTimeRange, only
 from service.api.tables import Column, Format, table_content, table_response
 from service.api.values import ApiModel, Time
-from service.store.access.audit_entries import MAX_NAME, AuditEntry
+from service.store.access.audit_entries import MAX_NAME, AuditEntry, Source
 from service.store.access.identities import Permission
 from service.store.audit import AuditQuery, AuditStore, by_time
-
-SourceName = Literal["api", "command_line", "padwatch"]
 
 
 class AuditEntryModel(ApiModel):
@@ -36,7 +34,7 @@ class AuditEntryModel(ApiModel):
     time: Time
     """Time of the action."""
 
-    source: SourceName
+    source: Source
     """Source of the action: API, command line, or padwatch itself."""
 
     peer: Annotated[str | None, Field(examples=["127.0.0.1"])]

@@ -9,20 +9,20 @@ from pydantic import Field
 from core.baseline.history import DIRECTIONS, ReadingOutcome
 from core.change.decision import JUDGED
 from core.condition.operating_state import STEADY
+from core.machine.unit import Estimator
 from core.units import DAY_NS
 from service.api.parameters import Moment
 from service.api.values import (
     ActorModel,
     ApiModel,
     BearingAnswer,
-    EstimatorName,
     ReasonText,
     Time,
 )
 from service.live.commands import FilmPlace
 from service.live.models import BaselineOriginModel
 from service.settings.films import FilmAlarmSettings
-from service.store.baselines import BaselineEntry, Versions
+from service.store.baselines import BaselineEntry, BaselineStep, Versions
 from service.store.film_readings import FilmHistory, FilmQuery
 from service.store.films import FilmStore
 
@@ -147,17 +147,13 @@ def _complete(found: FilmHistory, settings: FilmAlarmSettings) -> list[npt.NDArr
 
 BaselineStatusName = Literal["in_force", "rejected", "superseded", "learned"]
 
-BaselineStepName = Literal[
-    "learned", "accepted", "rejected", "withdrawn", "frozen", "thawed", "renewed"
-]
-
 SupportName = Literal["own", "borrowed", "none"]
 
 
 class BaselineVersionModel(BaselineOriginModel, ApiModel):
     """Version of the learned baseline of a bearing, without its cells."""
 
-    estimator: EstimatorName
+    estimator: Estimator
 
     status: BaselineStatusName
     """Status: in force; rejected by an engineer; superseded by another version or by a machine
@@ -176,7 +172,7 @@ class BaselineStepModel(ApiModel):
     actor: str
     reason: str
 
-    step: BaselineStepName
+    step: BaselineStep
     """Kind of step."""
 
     version: int | None
@@ -192,7 +188,7 @@ class BaselineStepModel(ApiModel):
 class BaselinesModel(BearingAnswer):
     """All baseline versions of a bearing, and their history."""
 
-    estimator: EstimatorName | None
+    estimator: Estimator | None
 
     in_force: int | None
     """Number of the version in force; null if no version is in force."""

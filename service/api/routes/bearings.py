@@ -7,7 +7,10 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
+from core.machine.unit import Estimator
 from core.monitor.catalogue import quantity_named, quantity_of
+from core.spectra.runout import RunoutVerdict
+from core.spectra.speed import SpeedSource
 from core.stiffness.estimators import ESTIMATORS, reported_name
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, QuantityName, UnitId
@@ -16,11 +19,8 @@ from service.api.values import (
     PLACES,
     ApiModel,
     BearingAnswer,
-    EstimatorName,
     QualityModel,
     ReadingModel,
-    RunoutName,
-    SpeedSourceName,
     Time,
     UncertaintyModel,
     WindowModel,
@@ -92,10 +92,10 @@ class ResultModel(ApiModel):
     quality: QualityModel
     """Quality of the result: the worst of its 1× amplitudes and its preferred stiffness."""
 
-    speed_source: SpeedSourceName | None
+    speed_source: SpeedSource | None
     """Source of the running speed of the newest result; null without a result."""
 
-    estimators: dict[str, EstimatorName | None]
+    estimators: dict[str, Estimator | None]
     """Estimator of the preferred stiffness, by axes "xx" and "yy"; null without a stiffness."""
 
     readings: dict[str, ReadingModel]
@@ -106,7 +106,7 @@ class LatestModel(ResultModel, BearingAnswer):
     """Newest result of a bearing with the readings of all quantities of the catalogue."""
 
     runout: Annotated[
-        dict[str, RunoutName | None],
+        dict[str, RunoutVerdict | None],
         Field(examples=[{"shaft_x": "applied", "shaft_y": "no_vector"}]),
     ]
     """Runout compensation of 1× in the newest segment, by "shaft_x" and "shaft_y": "applied", or

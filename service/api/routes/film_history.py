@@ -12,6 +12,7 @@ from core.baseline.history import DIRECTIONS, ReadingOutcome, absolute_and_ratio
 from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel
+from core.machine.unit import Estimator
 from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
@@ -24,7 +25,6 @@ from service.api.values import (
     ApiModel,
     BearingHistory,
     ByName,
-    EstimatorName,
     OperatingStateName,
     Time,
     listed,
@@ -86,7 +86,7 @@ class FilmSeriesModel(ApiModel):
 class FilmReadingsModel(BearingHistory):
     """Stiffness readings of an oil film with their operating conditions, oldest first."""
 
-    estimator: EstimatorName
+    estimator: Estimator
     n_found: int
     operating_state: list[Annotated[OperatingStateName, ByName]]
     is_settled: list[bool]

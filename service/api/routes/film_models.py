@@ -4,11 +4,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from core.machine.unit import Estimator
 from service.api.values import (
     ApiModel,
     BearingAnswer,
     ByName,
-    EstimatorName,
     FilmConditionModel,
     Time,
 )
@@ -131,7 +131,7 @@ class FilmLimitsModel(ApiModel):
 class FilmModel(BearingAnswer):
     """Current state of the oil film of a bearing."""
 
-    estimator: EstimatorName | None
+    estimator: Estimator | None
     baseline_version: int | None
     x: FilmDirectionModel | None
     y: FilmDirectionModel | None

@@ -4,13 +4,12 @@ from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
 from acquisition.errors import ConfigError
 from core.arrays import FloatArray
 from core.machine.unit import Bearing
-from core.monitor.assessment import Assessment
 from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
 from service.api.auth.declared import subject_router
@@ -24,7 +23,6 @@ from service.api.routes.recordings import (
     entry_of,
     library_of,
 )
-from service.api.routes.spectra import newest_answer
 from service.api.values import ApiModel, BearingAnswer, SampleRange, Time, listed
 from service.live.samples import newest_blocks, sample_window
 from service.live.status import HELD_S
@@ -107,18 +105,6 @@ class MotionModel(SampleRange, BearingAnswer):
     unit without a key-phase."""
 
 
-class OrbitModel(ApiModel):
-    """Orbit of the shaft relative to its bearing in the newest turns, about its mean position."""
-
-    rate_hz: float
-    duration_s: float
-    shaft_x_um: list[float]
-    shaft_y_um: list[float]
-
-    time: Time
-    """Time of the first sample."""
-
-
 DECIMALS = 3
 """Number of decimals of displacements in µm, finer than a tenth of a converter count."""
 
@@ -180,18 +166,6 @@ def _rounded(values_um: FloatArray) -> list[float | None]:
     return listed(np.round(values_um, DECIMALS))
 
 
-def _orbit(assessment: Assessment) -> OrbitModel | None:
-    if (orbit := assessment.orbit) is None:
-        return None
-    return OrbitModel.of(
-        orbit,
-        time=orbit.start_ns,
-        duration_s=orbit.shaft_x_um.size / orbit.rate_hz,
-        shaft_x_um=orbit.shaft_x_um.tolist(),
-        shaft_y_um=orbit.shaft_y_um.tolist(),
-    )
-
-
 MAX_SAMPLES = 60_000
 """Maximum number of samples per direction in one answer: 100 s at 600 Hz, about 2 MB."""
 
@@ -207,18 +181,8 @@ RECORDING_PROBLEMS = problem_responses(
 
 
 def motion_router(context: Context) -> APIRouter:
-    """Return the router for the newest orbit and motion."""
+    """Return the router for the newest motion."""
     router = subject_router("/units/{unit}/bearings", "bearing")
-
-    @router.get(
-        "/{bearing}/orbit",
-        summary="Orbit",
-        response_model=OrbitModel,
-        responses=problem_responses(409),
-    )
-    async def orbit(request: Request, unit: UnitId, bearing: BearingId) -> Response:
-        """Return the orbit of the shaft relative to the bearing in the newest turns."""
-        return await newest_answer(context, request, unit, bearing, _orbit)
 
     @router.get(
         "/{bearing}/motion",

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 
 from core.monitor.catalogue import CATALOGUE, quantity_named
+from core.samples.blocks import StampFault
 from core.samples.gaps import Gap
 from core.units import ns_from_s
 from service.api.auth.declared import Reach, needs, subject_router
@@ -17,6 +18,7 @@ from service.api.parameters import TimeRange
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, Time
 from service.live.current_state import LiveUnits
+from service.live.status import LinkState
 from service.settings.plant import plant_file_schema
 from service.settings.units import UnitSettings
 from service.store.access.identities import Permission
@@ -38,14 +40,14 @@ class DeviceClockModel(ApiModel):
     n_stamp_faults: int
     """Number of blocks whose time stamp was discarded because it contradicts the sample index."""
 
-    stamp_fault: Literal["stamp_regressed", "stamp_repeated", "stamp_jumped"] | None
+    stamp_fault: StampFault | None
     """Fault of the newest time stamp; null without a fault."""
 
 
 class LinkModel(ApiModel):
     """State of the link to the data source of a unit."""
 
-    state: Literal["connecting", "connected", "not_connected", "ended"]
+    state: LinkState
     """State of the link to the source; only the replay of a recording can be "ended"."""
 
     reason: str | None

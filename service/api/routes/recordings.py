@@ -50,7 +50,7 @@ class RecordingModel(ApiModel):
     id: Annotated[str, Field(examples=["U1-20261121T090312.400Z-shaft_x"])]
     """Name of the recording."""
 
-    kind: Literal["capture", "continuous"]
+    kind: WaveformKind
     """"capture" for samples around an alarm, "continuous" for a part of a continuous recording."""
 
     state: Literal["complete", "damaged"]

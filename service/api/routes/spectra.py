@@ -1,6 +1,6 @@
 """Routes for the amplitude spectra of a bearing: newest spectra, and stored spectra over time."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Annotated, Literal
 
@@ -210,9 +210,16 @@ def spectra_router(context: Context) -> APIRouter:
     )
     async def spectrum(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the averaged amplitude spectra of the newest result, all as displacement."""
+        context.bearing(unit, bearing)
         sense = machine_of(context.unit(unit)).rotation_sense
-        make = partial(spectrum_model, rotation_sense=sense)
-        return await newest_answer(context, request, unit, bearing, make)
+
+        async def newest() -> SpectrumModel:
+            found = await context.live.assessment(unit, bearing)
+            if found is None:
+                raise no_result(unit, bearing)
+            return await in_thread(lambda: spectrum_model(found, sense))
+
+        return await context.answers.of(request, lambda: context.live.revision(unit), newest)
 
     @router.get("/{bearing}/spectra", summary="Spectra over time", response_model=SpectraModel)
     async def spectra(
@@ -254,26 +261,6 @@ def spectra_router(context: Context) -> APIRouter:
         return await context.answers.of(request, revision, make)
 
     return router
-
-
-async def newest_answer(
-    context: Context,
-    request: Request,
-    unit: str,
-    bearing: str,
-    make: Callable[[Assessment], ApiModel | None],
-) -> Response:
-    """Return the answer that `make` builds from the newest result, or raise a problem (409)."""
-    context.bearing(unit, bearing)
-
-    async def answer() -> ApiModel:
-        found = await context.live.assessment(unit, bearing)
-        model = None if found is None else await in_thread(lambda: make(found))
-        if model is None:
-            raise no_result(unit, bearing)
-        return model
-
-    return await context.answers.of(request, lambda: context.live.revision(unit), answer)
 
 
 def _read(

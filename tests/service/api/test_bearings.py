@@ -175,13 +175,6 @@ async def test_the_spectrum_shows_lines_of_the_readings_and_the_newest_orbit(rea
     line = np.argmin(np.abs(frequency - body["lines"]["order1"]))
     assert full["forward"][line] > 2.0 * full["backward"][line]
 
-    orbit, body = newest.orbit, await read_only.json(f"{UJB}/orbit")
-    assert orbit is not None
-    assert body["shaft_x_um"] == orbit.shaft_x_um.tolist()
-    assert body["shaft_y_um"] == orbit.shaft_y_um.tolist()
-    assert body["time"] == rfc3339(orbit.start_ns)
-    assert body["duration_s"] == pytest.approx(3 * 60 / 92.3, abs=1 / 600)  # three turns
-
 
 def test_forward_is_with_the_shaft_whichever_way_it_turns(found):
     one, other = (spectrum_model(found[-1], sense).full["shaft"] for sense in (1, -1))

@@ -71,7 +71,7 @@ def test_every_operation_is_explained_and_has_an_example(read_only, operations):
 def test_every_error_is_documented_as_a_problem(operations):
     by_end_of_path = {
         "404": {"configuration", "recordings", "rates"},
-        "409": {"waveform", "readings", "spectrum", "orbit"},
+        "409": {"waveform", "readings", "spectrum"},
         "410": {"{recording}"},
         "503": {
             *("gaps", "trends", "references", "readings", "baselines"),

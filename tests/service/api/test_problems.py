@@ -23,11 +23,11 @@ GOOD = {**WHOLE, "quantity": "speed_rpm"}
 async def test_an_unknown_unit_bearing_or_path_is_not_found(read_only):
     bearing = "U9/bearings/UJB"
     units = ("U9", "U9/bearings", bearing, "u1", "%00", "'; DROP TABLE assessment; --")
-    for path in (*units, *(f"{bearing}/{what}" for what in ("latest", "spectrum", "orbit"))):
+    for path in (*units, *(f"{bearing}/{what}" for what in ("latest", "spectrum"))):
         problem = await read_only.problem(f"/api/v1/units/{path}", 404)
         assert problem["title"] == "Unknown unit"
         assert "unknown unit" in problem["detail"]
-    for what in ("", "/latest", "/spectrum", "/orbit"):
+    for what in ("", "/latest", "/spectrum"):
         problem = await read_only.problem(f"/api/v1/units/U1/bearings/XJB{what}", 404)
         assert problem["detail"] == "unit 'U1' has no bearing 'XJB'"
     await read_only.problem("/api/v1/units/U9/bearings/UJB/trends", 404, **GOOD)

@@ -29,7 +29,6 @@ POLLED = (
     "units/U1/bearings/UJB/latest",
     "units/U1/bearings/UJB/film",
     "units/U1/bearings/UJB/spectrum",
-    "units/U1/bearings/UJB/orbit",
     "units/U1/bearings/UJB/baselines",
     f"units/U1/bearings/UJB/trends?{RANGE}&quantity=speed_rpm",
     f"units/U1/bearings/UJB/spectra?{RANGE}&channel=shaft_x",

@@ -8,9 +8,16 @@ from importlib.metadata import version
 import pytest
 
 from core.alarms.alarm import Alarm, AlarmIdentity
+from core.baseline.history import ReadingOutcome
+from core.change.decision import INITIAL_DECISION, Verdict
+from core.change.film_judge import FilmNews, unjudged
+from core.change.film_reading import FilmReading, FilmValue
+from core.condition.cells import BearingCondition
+from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel
+from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
-from core.quality import Reading
+from core.quality import Reading, Reason
 from service.live import snapshot
 from service.live.snapshot import (
     UnitSnapshot,
@@ -21,11 +28,17 @@ from service.live.snapshot import (
 from service.measuring.snapshots import bearing_snapshot
 
 IDENTITY = AlarmIdentity("U1", "UJB", "order1_shaft_x")
+FOUND = unjudged(Verdict.NO_BASELINE)
+VALUE = FilmValue(20.0, 0.01, 40.0, 5.0, ReadingOutcome.MEASURED, Reason.OK)
+STEADY = BearingCondition(OperatingState.FULL_LOAD, is_settled=True, cell=(7, 18))
+READ = FilmReading(
+    *("U1", "UJB", Estimator.DYNAMIC, 1, STEADY, 90.9, 30.0, 0.4, 0.01, 45.0, 46.0, (VALUE, VALUE))
+)
 
 
 @pytest.fixture
 def published(assessment: Callable[..., Assessment]) -> UnitSnapshot:
-    """A unit with a result, of which one value is not a number, and an active alarm."""
+    """A unit with a result, of which one value is not a number, a film and an active alarm."""
     found = assessment()
     readings = {**found.readings, "power_mw": Reading(float("nan"))}
     alarm = Alarm(IDENTITY, level=AlarmLevel.DANGER, occurrence=3, is_acknowledged=False)
@@ -34,7 +47,7 @@ def published(assessment: Callable[..., Assessment]) -> UnitSnapshot:
         alarms=(alarm,),
         judged=frozenset({IDENTITY.id}),
         chattering=frozenset(),
-        films={},
+        films={"UJB": FilmNews(READ, FOUND, (INITIAL_DECISION,) * len(FOUND))},
         baselines={"UJB": 2},
     )
 

@@ -31,7 +31,7 @@ class Row(NamedTuple):
 
 FILM = "/api/v1/units/{unit}/bearings/{bearing}"
 OF_BEARING = (
-    *("latest", "spectrum", "orbit", "trends", "spectra", "motion", "references"),
+    *("latest", "spectrum", "trends", "spectra", "motion", "references"),
     *("film", "film/readings", "baselines", "order1-references"),
 )
 """What is shown of a bearing below its address."""
