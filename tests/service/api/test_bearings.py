@@ -74,9 +74,8 @@ async def test_a_result_that_is_too_old_or_of_a_lost_link_shows_no_number(runnin
         assert {r["reason"] for r in body["readings"].values()} == {"not_connected"}
     assert body["time"] is None
     assert body["window"] is None
-    for what in ("spectrum", "orbit"):
-        problem = await running.problem(f"/api/v1/units/U2/bearings/UJB/{what}", 409)
-        assert "no result yet" in problem["detail"]
+    problem = await running.problem("/api/v1/units/U2/bearings/UJB/spectrum", 409)
+    assert "no result yet" in problem["detail"]
 
 
 async def test_before_the_first_segment_a_bearing_waits_for_data(service):
@@ -155,7 +154,7 @@ async def test_a_hole_in_the_trend_is_a_point_without_a_value(running, found):
     assert body["series"][K]["count"][-2:] == [0, 1]
 
 
-async def test_the_spectrum_shows_lines_of_the_readings_and_the_newest_orbit(read_only, found):
+async def test_the_spectrum_shows_lines_of_the_readings(read_only, found):
     body = await read_only.json(f"{UJB}/spectrum")
 
     newest = found[-1]
