@@ -21,7 +21,7 @@ from service.settings.storage import Origin
 
 log = structlog.get_logger()
 
-REPORT_EVERY_S = 0.25
+REPORT_EVERY_S = 0.5
 """Period of reports to the serving process, s."""
 
 STEADY_S = 10.0

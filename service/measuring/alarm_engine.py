@@ -90,8 +90,6 @@ class AlarmEngine:
         self._chatter = ChatterWatch(self.chatter_rule)
         self._time = HostTime(clock)
         self._observer: Callable[[Sequence[AlarmNews]], None] | None = None
-        self.revision = 0
-        """Revision number, increased whenever alarms may have changed."""
 
     def set_observer(self, observer: Callable[[Sequence[AlarmNews]], None]) -> None:
         """Set the function that receives the changes of alarms, in non-empty lists."""
@@ -125,12 +123,10 @@ class AlarmEngine:
         """Add a board of alarms taken over from another process; `stored` has their state."""
         self._reported.append(board)
         self._publish(board.restore(stored, self._clock.now_ns()))
-        self.revision += 1
 
     def remove_alarms(self, board: ReportedAlarms) -> None:
         """Remove a board of alarms that another process takes over."""
         self._reported.remove(board)
-        self.revision += 1
 
     def refuse(self, unit: str, reason: str) -> None:
         """Raise a unit's alarm about a refused stream message; no effect without a stream."""
@@ -164,8 +160,6 @@ class AlarmEngine:
             Judgements for the film alarms, by alarm id and direction.
         """
         own = self._units[block.unit]
-        if assessments or films:
-            self.revision += 1
         news = own.take(block, assessments, self._host_ns())
         news += own.films(films, block.stop_ns)
         self._announce(news)
@@ -175,7 +169,6 @@ class AlarmEngine:
 
     def link(self, unit: str, is_connected: bool, reason: str | None = None) -> None:
         """Update the link alarm of a unit; `reason` is why the unit is not connected."""
-        self.revision += 1
         self._publish(self._units[unit].link(is_connected, reason, self._host_ns()))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
@@ -224,6 +217,15 @@ class AlarmEngine:
         """All alarms of this process, active or not."""
         return [alarm for board in self._boards for alarm in board.alarms]
 
+    def alarms_of(self, unit: str) -> Sequence[Alarm]:
+        """Return the alarms of a unit, except `common_alarms`."""
+        return self._units[unit].alarms
+
+    @property
+    def common_alarms(self) -> list[Alarm]:
+        """Alarms that no unit updates: of the service itself, and those that others reported."""
+        return [alarm for board in (self._service, *self._reported) for alarm in board.alarms]
+
     def is_judged(self, alarm: Alarm) -> bool:
         """Return whether an alarm's condition is known; most kinds require a connected unit."""
         if alarm.identity.kind in WITHOUT_LINK:
@@ -251,7 +253,6 @@ class AlarmEngine:
             self._put(Findings(alarms=news))
 
     def _announce(self, news: list[AlarmNews]) -> None:
-        self.revision += bool(news)
         now_ns = self._clock.now_ns()
         for event in (event for each in news for event in each.events):
             _log(event)

@@ -63,8 +63,6 @@ class FilmMonitor:
     ) -> None:
         self._store, self._clock, self.settings = store, clock, settings
         self.learner = Learner(store, settings)
-        self.revision = 0
-        """Revision number, increased with every new reading and every change of a baseline."""
         self._acting = asyncio.Lock()  # each action depends on the previous one
         self._films = {
             unit: _watched(units[unit], found)
@@ -120,7 +118,6 @@ class FilmMonitor:
         if films is None or not assessments:
             return assessments, []
         seen, news = films.watch.take(assessments)
-        self.revision += bool(news)
         films.newest.update({each.reading.bearing: each for each in news})
         return seen, news
 
@@ -214,7 +211,6 @@ class FilmMonitor:
         found, decisions = await asyncio.to_thread(in_force, self._store, place, films.rules)
         if found is None or held is None or found.origin != held.origin:
             films.watch.judge.activate_baseline(place.bearing, found, decisions)
-            self.revision += 1
 
 
 def _watched(unit: Unit, rules: FilmRules) -> WatchedFilms:

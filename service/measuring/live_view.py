@@ -117,9 +117,13 @@ class LiveView:
         entry = self._assessments.get((unit, bearing))
         return entry[1] if entry else None
 
+    def result_age_s(self, unit: str, bearing: str) -> float | None:
+        """Return the age of the newest result of a bearing in seconds; None before the first."""
+        entry = self._assessments.get((unit, bearing))
+        return None if entry is None else self._clock.monotonic_s() - entry[0]
+
     def current(self, unit: str, bearing: str) -> CurrentBearing:
         """Return the newest result of a bearing; all readings are missing if it is out of date."""
-        received_s, result = self._assessments.get((unit, bearing), (None, None))
-        age_s = None if received_s is None else self._clock.monotonic_s() - received_s
+        result, age_s = self.assessment(unit, bearing), self.result_age_s(unit, bearing)
         why_not = why_not_current(self._status[unit].state, age_s, self._stale_after_s)
         return current_bearing(result, age_s, why_not)

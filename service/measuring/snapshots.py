@@ -43,7 +43,7 @@ class _Built:
 
 
 class SnapshotBuilder:
-    """Builder of snapshots of units; it builds a snapshot again only after a change."""
+    """Builder of snapshots of units; it builds a snapshot again only after a change of the unit."""
 
     def __init__(
         self,
@@ -53,21 +53,31 @@ class SnapshotBuilder:
         films: FilmMonitor,
         clock: Clock,
     ) -> None:
-        self._units = {unit.id: unit for unit in units}
+        self._bearings = {unit.id: [each.id for each in unit.bearing] for unit in units}
         self._live, self._alarms, self._films, self._clock = live, alarms, films, clock
         self._built: dict[str, _Built] = {}
-        self._owned: tuple[object, Mapping[str, list[Alarm]]] = (None, {})
+        self._common: tuple[Sequence[Alarm], Mapping[str, list[Alarm]]] = ([], {})
 
     def report(self, unit: str) -> UnitReport:
         """Return the present state of a unit, or the alarms of `PLANT` or `SHARED`."""
         built = self._newest(unit)
         return UnitReport(unit, self._link(unit), built.revision, built.snapshot)
 
+    def state(self, unit: str) -> tuple[int, object]:
+        """Return the revision of a unit's snapshot, and its link, newest sample and store state."""
+        live, link = self._live, None
+        if unit in self._bearings:
+            status = live.status(unit)
+            link = (status.state, status.reason, status.last_sample_ns, live.stored(unit))
+        return self._newest(unit).revision, (link, live.store_error)
+
     def _newest(self, unit: str) -> _Built:
-        round_ = self._clock.monotonic_s() // REBUILT_EVERY_S
-        is_unit, alarms = unit in self._units, self._alarms_of(unit, round_)
+        bearings, alarms = self._bearings.get(unit, []), self._alarms_of(unit)
+        is_unit = unit in self._bearings
         own = (self._live.revision(unit), self._alarms.is_connected(unit)) if is_unit else ()
-        key = (own, alarms, self._films.revision, round_)
+        films = [self._films.newest(unit, bearing) for bearing in bearings]
+        round_ = self._clock.monotonic_s() // REBUILT_EVERY_S
+        key = (own, alarms, films, self._versions(unit), round_)
         built = self._built.get(unit)
         if built is not None and built.key == key:
             return built
@@ -78,32 +88,37 @@ class SnapshotBuilder:
         return built
 
     def _snapshot(self, unit: str, own: Sequence[Alarm]) -> UnitSnapshot:
-        bearings = [each.id for each in self._units[unit].bearing] if unit in self._units else []
+        bearings = self._bearings.get(unit, [])
         found = {bearing: self._live.assessment(unit, bearing) for bearing in bearings}
         seen = {bearing: self._films.newest(unit, bearing) for bearing in bearings}
-        in_force = {bearing: self._films.baseline(unit, bearing) for bearing in bearings}
         return UnitSnapshot(
             bearings={b: bearing_snapshot(result) for b, result in found.items() if result},
             alarms=tuple(own),
             judged=frozenset(a.identity.id for a in own if self._alarms.is_judged(a)),
             chattering=frozenset(a.identity.id for a in own if self._alarms.is_chattering(a)),
             films={b: news for b, news in seen.items() if news},
-            baselines={b: found.origin.version for b, found in in_force.items() if found},
+            baselines=self._versions(unit),
         )
 
-    def _alarms_of(self, unit: str, round_: float) -> Sequence[Alarm]:
-        """Return the alarms that a report on a unit contains; all alarms are sorted at once."""
-        key = (self._alarms.revision, round_)
-        if self._owned[0] != key:
+    def _versions(self, unit: str) -> dict[str, int]:
+        bearings = self._bearings.get(unit, [])
+        in_force = {bearing: self._films.baseline(unit, bearing) for bearing in bearings}
+        return {bearing: found.origin.version for bearing, found in in_force.items() if found}
+
+    def _alarms_of(self, unit: str) -> list[Alarm]:
+        """Return the alarms that a report on a unit contains."""
+        common = self._alarms.common_alarms
+        if self._common[0] != common:
             owned: dict[str, list[Alarm]] = defaultdict(list)
-            for alarm in self._alarms.alarms:
+            for alarm in common:
                 owned[self._owner(alarm)].append(alarm)
-            self._owned = key, owned
-        return self._owned[1].get(unit, ())
+            self._common = common, owned
+        of_unit = self._alarms.alarms_of(unit) if unit in self._bearings else []
+        return [*of_unit, *self._common[1].get(unit, ())]
 
     def _owner(self, alarm: Alarm) -> str:
         unit = reporting_unit(alarm.identity)
-        if unit in self._units:
+        if unit in self._bearings:
             return unit
         return SHARED if is_shared(alarm) else PLANT
 
@@ -111,10 +126,9 @@ class SnapshotBuilder:
         """Return a unit's link state and data ages, if measured here, and the process's faults."""
         live = self._live
         faults = (live.store_error, self._clock.monotonic_s())
-        if unit not in self._units:
+        if unit not in self._bearings:
             return UnitLink(UnitStatus(), None, {}, *faults)
-        bearings = [bearing.id for bearing in self._units[unit].bearing]
-        ages_s = {bearing: live.current(unit, bearing).age_s for bearing in bearings}
+        ages_s = {bearing: live.result_age_s(unit, bearing) for bearing in self._bearings[unit]}
         known = {bearing: age_s for bearing, age_s in ages_s.items() if age_s is not None}
         stored = live.stored(unit)
         return UnitLink(live.status(unit), live.data_age_s(unit), known, *faults, stored=stored)
@@ -158,13 +172,11 @@ class SocketReports:
         return Report("measuring", self._n_reports, tuple(found), plant if is_new else None)
 
     def _unit(self, unit: str, now_s: float) -> UnitReport | None:
-        newest = self._builder.report(unit)
-        status = newest.link.status
-        arrived = (status.last_sample_ns, newest.link.stored)
-        link = (status.state, status.reason, *arrived, newest.link.store_error)
-        revision, sent_link, sent_s = self._sent.get(unit, (0, None, 0.0))
-        is_new = newest.revision != revision
+        revision, link = self._builder.state(unit)
+        sent_revision, sent_link, sent_s = self._sent.get(unit, (0, None, 0.0))
+        is_new = revision != sent_revision
         if not is_new and link == sent_link and now_s - sent_s < LINK_EVERY_S:
             return None
-        self._sent[unit] = (newest.revision, link, now_s)
+        self._sent[unit] = (revision, link, now_s)
+        newest = self._builder.report(unit)
         return newest if is_new else replace(newest, snapshot=None)
