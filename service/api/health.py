@@ -101,18 +101,17 @@ def health_router(context: Context, requests: RequestMetrics) -> APIRouter:
     """
     router = APIRouter(tags=["health"])
 
-    @router.get("/livez", summary="Liveness", dependencies=[OPEN])
-    async def livez() -> HealthModel:
+    @router.get("/livez", dependencies=[OPEN])
+    async def liveness() -> HealthModel:
         """Answer 200 while the event loop runs, independent of data acquisition and disk."""
         return HealthModel(status="ok", checks={"event_loop": "turning"})
 
     @router.get(
         "/readyz",
-        summary="Readiness",
         dependencies=[OPEN],
         responses={503: {"model": HealthModel, "description": "At least one check fails"}},
     )
-    async def readyz(response: Response) -> HealthModel:
+    async def readiness(response: Response) -> HealthModel:
         """Answer 200 if results can be stored and every background loop runs, else 503.
 
         Lost links to data acquisition devices are reported, but the service remains ready.
@@ -134,12 +133,11 @@ def health_router(context: Context, requests: RequestMetrics) -> APIRouter:
 
     @router.get(
         "/metrics",
-        summary="Metrics for Prometheus",
         dependencies=[needs(Permission.READ)],
         response_class=Response,
         responses={200: ANSWER},
     )
-    async def metrics() -> Response:
+    async def prometheus_metrics() -> Response:
         """Return metrics of samples, links, results, films, alarms, store, deliveries, requests."""
         headers = {"content-type": TEXT, "cache-control": "no-store"}
         return Response(await look() + requests.text, headers=headers)

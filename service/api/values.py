@@ -198,20 +198,19 @@ PLACES: dict[PlaceName, int] = {
 
 def reading_model(reading: Reading) -> ReadingModel:
     """Return the API model of a reading."""
+    uncertainty = None
+    if reading.interval_95 is not None:
+        low, high = reading.interval_95
+        random, systematic = reading.u_random, reading.u_systematic
+        uncertainty = UncertaintyModel(
+            random=random, systematic=systematic, low_95=low, high_95=high
+        )
     return ReadingModel(
         value=reading.value,
         level=LEVEL_NAMES[reading.quality.level],
         reason=reading.quality.reason.value,
-        uncertainty=_uncertainty(reading),
+        uncertainty=uncertainty,
     )
-
-
-def _uncertainty(reading: Reading) -> UncertaintyModel | None:
-    if reading.interval_95 is None:
-        return None
-    low, high = reading.interval_95
-    random, systematic = reading.u_random, reading.u_systematic
-    return UncertaintyModel(random=random, systematic=systematic, low_95=low, high_95=high)
 
 
 def window_model(window: AveragingWindow) -> WindowModel:

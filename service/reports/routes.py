@@ -197,8 +197,8 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
         dependencies=[needs(Permission.READ)],
     )
 
-    @router.get("", summary="Evidence of an alarm", responses=LIST_PROBLEMS)
-    async def occurrences(
+    @router.get("", responses=LIST_PROBLEMS)
+    async def evidence_of_alarm(
         alarm: AlarmId,
         limit: Annotated[
             int, Query(ge=1, le=1000, description="Maximum number of occurrences in the answer.")
@@ -212,8 +212,8 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
             occurrences=[_occurrence_model(*each) for each in found],
         )
 
-    @router.get("/{occurrence}", summary="Evidence document", responses=PROBLEMS)
-    async def document(alarm: AlarmId, occurrence: Number) -> Evidence:
+    @router.get("/{occurrence}", responses=PROBLEMS)
+    async def evidence_document(alarm: AlarmId, occurrence: Number) -> Evidence:
         """Return the evidence document: the state of the unit when the alarm was raised."""
         held = _there(desk)
         found = await _complete(context, held, alarm, occurrence)
@@ -222,13 +222,8 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
         except DamagedEvidenceError as error:
             raise _damaged(error) from error
 
-    @router.get(
-        "/{occurrence}/report",
-        summary="Evidence report as a page",
-        response_class=HTMLResponse,
-        responses=PROBLEMS,
-    )
-    async def report(alarm: AlarmId, occurrence: Number) -> Response:
+    @router.get("/{occurrence}/report", response_class=HTMLResponse, responses=PROBLEMS)
+    async def evidence_report(alarm: AlarmId, occurrence: Number) -> Response:
         """Return the report as an HTML page without scripts, to read or to print on one A4 page."""
         held = _there(desk)
         found = await _complete(context, held, alarm, occurrence)
@@ -241,11 +236,12 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
 
     @router.get(
         "/{occurrence}/bundle.zip",
-        summary="Evidence bundle as a ZIP file",
         response_class=StreamingResponse,
         responses=PROBLEMS | file_content("application/zip", "A ZIP file"),
     )
-    async def bundle(request: Request, alarm: AlarmId, occurrence: Number) -> StreamingResponse:
+    async def evidence_bundle(
+        request: Request, alarm: AlarmId, occurrence: Number
+    ) -> StreamingResponse:
         """Return a ZIP file with document, tables, report, and the samples once they are complete.
 
         The file includes the configuration of the plant, unless the API key is limited to units.

@@ -188,13 +188,13 @@ def account_router(authenticator: Authenticator) -> APIRouter:
             raise ProblemError(404, "Unknown account", "the account does not exist")
         return account_model(found)
 
-    @router.get("", summary="Accounts")
+    @router.get("")
     async def accounts() -> list[AccountModel]:
         """List all accounts, sorted by name."""
         return [account_model(account) for account in await authenticator.work.run(stored.all)]
 
-    @router.post("", summary="Add an account", status_code=201, responses=CHANGE_PROBLEMS)
-    async def add(asked: NewAccountModel) -> AccountModel:
+    @router.post("", status_code=201, responses=CHANGE_PROBLEMS)
+    async def add_account(asked: NewAccountModel) -> AccountModel:
         """Add an account; its password must be changed at the first login."""
         new = asked.name, Role(asked.role), asked.password
         with refusals_as_problems():
@@ -202,14 +202,14 @@ def account_router(authenticator: Authenticator) -> APIRouter:
                 await change(lambda: service.add(*new, now_ns(), must_change=True), hashes=True)
             )
 
-    @router.put("/{name}/role", summary="Change a role", responses=CHANGE_PROBLEMS)
+    @router.put("/{name}/role", responses=CHANGE_PROBLEMS)
     async def set_role(name: AccountName, asked: SetRoleModel) -> AccountModel:
         """Change the role of an account, effective from the next request of the person."""
         with refusals_as_problems():
             await change(lambda: stored.set_role(name, Role(asked.role), now_ns()))
         return await one(name)
 
-    @router.put("/{name}/password", summary="Set a password", responses=CHANGE_PROBLEMS)
+    @router.put("/{name}/password", responses=CHANGE_PROBLEMS)
     async def set_password(
         request: Request, name: AccountName, asked: SetPasswordModel
     ) -> AccountModel:
@@ -226,10 +226,8 @@ def account_router(authenticator: Authenticator) -> APIRouter:
             )
         return await one(name)
 
-    @router.delete(
-        "/{name}", summary="Remove an account", status_code=204, responses=CHANGE_PROBLEMS
-    )
-    async def remove(request: Request, name: AccountName) -> None:
+    @router.delete("/{name}", status_code=204, responses=CHANGE_PROBLEMS)
+    async def remove_account(request: Request, name: AccountName) -> None:
         """Remove the account of another person, and end the sessions of the account."""
         _require_other(request, name, "you cannot remove your own account")
         with refusals_as_problems():
@@ -256,14 +254,14 @@ def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
     router = subject_router("/keys", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
     router.dependencies.append(Depends(name_caller))
 
-    @router.get("", summary="Keys")
+    @router.get("")
     async def keys() -> list[KeyModel]:
         """List all API keys, also expired and revoked keys, oldest first, without their secrets."""
         keys, now_ns = await authenticator.work.run(stored.all), clock.now_ns()
         return [KeyModel.of(key, state=key.state(now_ns)) for key in keys]
 
-    @router.post("", summary="Create a key", status_code=201, responses=CHANGE_PROBLEMS)
-    async def create(asked: NewKeyModel) -> CreatedKeyModel:
+    @router.post("", status_code=201, responses=CHANGE_PROBLEMS)
+    async def create_key(asked: NewKeyModel) -> CreatedKeyModel:
         """Create an API key for a machine; only this answer contains the secret of the key."""
         for unit in asked.units:
             if unit not in context.units:
@@ -276,8 +274,8 @@ def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
             )
         return CreatedKeyModel.of(made, state=made.state(now_ns), key=shown)
 
-    @router.delete("/{key}", summary="Revoke a key", status_code=204, responses=CHANGE_PROBLEMS)
-    async def revoke(key: KeyId) -> None:
+    @router.delete("/{key}", status_code=204, responses=CHANGE_PROBLEMS)
+    async def revoke_key(key: KeyId) -> None:
         """Revoke an API key permanently; the request is idempotent."""
         if await authenticator.work.run(lambda: stored.get(key)) is None:
             raise ProblemError(404, "Unknown key", "the key does not exist")

@@ -101,18 +101,12 @@ def session_router(authenticator: Authenticator) -> APIRouter:
     """Return the router for sessions and for the creation of the first account."""
     router = APIRouter(prefix="/api/v1", tags=["access"])
 
-    @router.get("/session", summary="Current identity", dependencies=[OPEN])
-    async def session(request: Request) -> SessionModel:
+    @router.get("/session", dependencies=[OPEN])
+    async def current_identity(request: Request) -> SessionModel:
         """Return identity and permissions of the caller, and whether a login is required."""
         return await session_model(caller_of(request), authenticator)
 
-    @router.post(
-        "/session",
-        summary="Log in",
-        status_code=201,
-        responses=LOGIN_PROBLEMS,
-        dependencies=[OPEN],
-    )
+    @router.post("/session", status_code=201, responses=LOGIN_PROBLEMS, dependencies=[OPEN])
     async def log_in(request: Request, response: Response, asked: LoginModel) -> SessionModel:
         """Log in: start a session and set its cookie; an earlier session of the browser ends."""
         with refusals_as_problems():
@@ -122,7 +116,7 @@ def session_router(authenticator: Authenticator) -> APIRouter:
             await authenticator.log_out(shown.secret, is_replaced=True)
         return await _begun(authenticator, request, response, logged_in)
 
-    @router.delete("/session", summary="Log out", status_code=204, dependencies=[OPEN])
+    @router.delete("/session", status_code=204, dependencies=[OPEN])
     async def log_out(request: Request, response: Response) -> None:
         """Log out: end the session of the browser, if any, and delete the session cookie."""
         shown = caller_of(request).shown
@@ -133,7 +127,6 @@ def session_router(authenticator: Authenticator) -> APIRouter:
 
     @router.post(
         "/session/password",
-        summary="Change your password",
         status_code=201,
         responses=PASSWORD_PROBLEMS,
         dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
@@ -152,14 +145,8 @@ def session_router(authenticator: Authenticator) -> APIRouter:
             found = await authenticator.change(lambda: change(*given, *times), hashes=True)
         return await _begun(authenticator, request, response, _logged_in(found))
 
-    @router.post(
-        "/set-up",
-        summary="Create the first account",
-        status_code=201,
-        responses=SET_UP_PROBLEMS,
-        dependencies=[OPEN],
-    )
-    async def set_up(request: Request, asked: SetUpModel) -> SessionModel:
+    @router.post("/set-up", status_code=201, responses=SET_UP_PROBLEMS, dependencies=[OPEN])
+    async def create_first_account(request: Request, asked: SetUpModel) -> SessionModel:
         """Create the first account, an administrator, with the token that the service printed."""
         given, now_ns = (asked.token, asked.name, asked.password), authenticator.clock.now_ns()
         with refusals_as_problems():

@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from pydantic import Field
 
 from core.alarms.alarm import PLANT, AlarmEvent
-from core.alarms.statistics import AlarmFigures, ChatterRule, figures_of, stale_alarms
+from core.alarms.statistics import ChatterRule, figures_of, stale_alarms
 from core.limits import AlarmLevel
 from core.units import DAY_NS
 from service.api.auth.declared import Reach, subject_router
@@ -118,11 +118,13 @@ def counted(
     start_ns, end_ns = wanted.start_ns, wanted.end_ns
     if not is_complete:
         start_ns = min(events[0].time_ns + 1, end_ns - 1)
-    found = {event.identity.unit for event in events}
-    names = [*units, *([PLANT] if PLANT in found and PLANT not in units else [])]
+    about_plant = [PLANT] if any(event.identity.unit == PLANT for event in events) else []
+    names = dict.fromkeys([*units, *about_plant])
 
     def figures(some: Iterable[AlarmEvent]) -> AlarmFiguresModel:
-        return _figures_model(figures_of(some, start_ns, end_ns, rule))
+        found = figures_of(some, start_ns, end_ns, rule)
+        n_by_level = {LEVEL_NAMES[level]: found.n_by_level[level] for level in AlarmLevel}
+        return AlarmFiguresModel.of(found, n_by_level=n_by_level)
 
     return {
         "start": start_ns,
@@ -131,11 +133,6 @@ def counted(
         "all": figures(events),
         "units": {n: figures(e for e in events if e.identity.unit == n) for n in names},
     }
-
-
-def _figures_model(figures: AlarmFigures) -> AlarmFiguresModel:
-    n_by_level = {LEVEL_NAMES[level]: figures.n_by_level[level] for level in AlarmLevel}
-    return AlarmFiguresModel.of(figures, n_by_level=n_by_level)
 
 
 DEFAULT_DAYS, MAX_DAYS = 7, 400
@@ -149,8 +146,8 @@ def alarm_rate_router(context: Context) -> APIRouter:
     router = subject_router("/alarms", "alarms", reach=Reach.ASKED)
     engine, films = context.alarms, context.films
 
-    @router.get("/rates", summary="Alarm rates", responses=problem_responses(404))
-    async def rates(
+    @router.get("/rates", responses=problem_responses(404))
+    async def alarm_rates(
         unit: OnlyUnit = None,
         start: Annotated[Moment | None, time_query(*START)] = None,
         end: Annotated[Moment | None, time_query(*END)] = None,

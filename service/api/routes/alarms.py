@@ -163,7 +163,7 @@ def alarm_router(context: Context) -> APIRouter:
     router = subject_router("/alarms", "alarms")
     engine, films = context.alarms, context.films
 
-    @router.get("", summary="All alarms that are not normal", response_model=AlarmListModel)
+    @router.get("", response_model=AlarmListModel)
     async def alarms(
         request: Request,
         eccentricity: Eccentricity,
@@ -218,12 +218,11 @@ def alarm_router(context: Context) -> APIRouter:
 
     @router.get(
         "/events",
-        summary="History of all alarms",
         response_model=AlarmEventsModel,
         responses=table_content("History of all alarms"),
         dependencies=[needs(Permission.READ, Reach.ASKED)],
     )
-    async def events(
+    async def alarm_history(
         query: Annotated[AlarmQuery, Depends(event_query)], wanted: Format
     ) -> Response:
         """List events of all alarms, newest first, in pages.
@@ -250,8 +249,8 @@ def alarm_router(context: Context) -> APIRouter:
         cursor = str(page[-1].id) if is_more else None
         return table_response(wanted, columns, "alarm-events", cursor)
 
-    @router.get("/{alarm}", summary="One alarm", responses=problem_responses(own=UNKNOWN))
-    async def one(alarm: AlarmId) -> AlarmModel:
+    @router.get("/{alarm}", responses=problem_responses(own=UNKNOWN))
+    async def one_alarm(alarm: AlarmId) -> AlarmModel:
         """Return one alarm, also if it is normal, with its value and limit."""
         try:
             return alarm_model(engine, films, engine.alarm(alarm))
@@ -266,14 +265,14 @@ def operation_router(context: Context) -> APIRouter:
     router = subject_router("/alarms/{alarm}", "alarms", Permission.ACT_ON_ALARMS)
     allowances = Allowances()
 
-    @router.post("/acknowledge", summary="Acknowledge", responses=ACTION_PROBLEMS)
+    @router.post("/acknowledge", responses=ACTION_PROBLEMS)
     async def acknowledge(alarm: AlarmId, asked: AcknowledgeModel) -> AlarmModel:
         """Acknowledge an occurrence of an alarm; repeating the request changes nothing."""
         return await _done(
             context, alarm, Acknowledge(**{**dict(asked), "actor": actor_or(asked.actor)})
         )
 
-    @router.post("/shelve", summary="Shelve", responses=ACTION_PROBLEMS)
+    @router.post("/shelve", responses=ACTION_PROBLEMS)
     async def shelve(alarm: AlarmId, asked: ShelveModel) -> AlarmModel:
         """Hide an alarm for a limited time; an alarm still active afterwards is announced again."""
         if asked.duration_s > context.max_shelf_s:
@@ -282,37 +281,27 @@ def operation_router(context: Context) -> APIRouter:
         until_ns = context.clock.now_ns() + ns_from_s(asked.duration_s)
         return await _done(context, alarm, Shelve(actor_or(asked.actor), asked.reason, until_ns))
 
-    @router.post("/unshelve", summary="Unshelve", responses=ACTION_PROBLEMS)
+    @router.post("/unshelve", responses=ACTION_PROBLEMS)
     async def unshelve(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """End the shelving of an alarm early."""
         return await _done(context, alarm, Unshelve(actor_or(asked.actor)))
 
-    @router.post(
-        "/out-of-service",
-        summary="Take out of service",
-        responses=ACTION_PROBLEMS,
-        dependencies=OUTAGE,
-    )
-    async def take_out(alarm: AlarmId, asked: OutageModel) -> AlarmModel:
+    @router.post("/out-of-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
+    async def take_out_of_service(alarm: AlarmId, asked: OutageModel) -> AlarmModel:
         """Hide an alarm until it is returned to service, for example for maintenance."""
         return await _done(context, alarm, TakeOutOfService(actor_or(asked.actor), asked.reason))
 
-    @router.post(
-        "/return-to-service",
-        summary="Return to service",
-        responses=ACTION_PROBLEMS,
-        dependencies=OUTAGE,
-    )
+    @router.post("/return-to-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
     async def return_to_service(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """Return an alarm to service; an active alarm is announced again."""
         return await _done(context, alarm, ReturnToService(actor_or(asked.actor)))
 
-    @router.post("/reset", summary="Reset a latched alarm", responses=ACTION_PROBLEMS)
-    async def reset(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
+    @router.post("/reset", responses=ACTION_PROBLEMS)
+    async def reset_latched_alarm(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """Release the latch of an acknowledged alarm whose condition has cleared."""
         return await _done(context, alarm, Reset(actor_or(asked.actor)))
 
-    @router.post("/comment", summary="Comment", responses=ACTION_PROBLEMS | COMMENT_LIMIT)
+    @router.post("/comment", responses=ACTION_PROBLEMS | COMMENT_LIMIT)
     async def comment(request: Request, alarm: AlarmId, asked: CommentModel) -> AlarmModel:
         """Add a comment to the events of an alarm; the state of the alarm does not change."""
         allowances.take(request, context.clock.monotonic_s())

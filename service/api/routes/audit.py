@@ -138,13 +138,8 @@ def audit_router(context: Context) -> APIRouter:
     router = subject_router("/audit", "audit", Permission.READ_AUDIT)
     chains = {each.chain: each for each in (context.store.audit, context.access.store.audit)}
 
-    @router.get(
-        "",
-        summary="Audit trail",
-        response_model=AuditModel,
-        responses=table_content("Audit trail"),
-    )
-    async def audit(
+    @router.get("", response_model=AuditModel, responses=table_content("Audit trail"))
+    async def audit_trail(
         query: Annotated[AuditQuery, Depends(audit_query)],
         wanted: Format,
         before: Cursor = None,
@@ -153,7 +148,9 @@ def audit_router(context: Context) -> APIRouter:
 
         As CSV or Parquet: one row per entry; states before and after the action are JSON texts.
         """
-        page, cursor = await in_thread(lambda: read_page(chains, query, numbers_of(before)))
+        pairs = (each.partition(":") for each in before.split(",")) if before else ()
+        numbers = {name: int(number) for name, _, number in pairs}
+        page, cursor = await in_thread(lambda: read_page(chains, query, numbers))
         if wanted == "json":
             own = (each.head_error for each in chains.values())
             errors = [each for each in (context.plant().audit_error, *own) if each]
@@ -190,12 +187,6 @@ async def audit_query(
         start_ns=max(start_ns, AuditQuery.start_ns),
         end_ns=min(end_ns, AuditQuery.end_ns),
     )
-
-
-def numbers_of(cursor: str | None) -> dict[str, int]:
-    """Return the entry numbers in a cursor by chain; empty for None, which is the first page."""
-    pairs = (each.partition(":") for each in cursor.split(",")) if cursor else ()
-    return {name: int(number) for name, _, number in pairs}
 
 
 def _model(chain: str, entry: AuditEntry) -> AuditEntryModel:

@@ -65,10 +65,12 @@ def version_model(
         Steps in the history of all baselines of the bearing.
     """
     own = [step for step in steps if step.version == entry.version]
+    reasons = (step.reason for step in own if step.step is BaselineStep.LEARNED)
     return BaselineVersionModel.of(
         entry,
         status=_status(entry, versions, own),
-        remark=_remark(entry, own),
+        # the reason why it was learned, unless that is the machine event
+        remark=next((words for words in reasons if words != entry.event), ""),
         is_frozen=versions.is_frozen and entry.version == versions.in_force,
     )
 
@@ -81,26 +83,6 @@ def _status(entry: BaselineEntry, versions: Versions, own: list[StoredStep]) -> 
     was_accepted = any(step.step is BaselineStep.ACCEPTED for step in own)
     is_before = versions.renewed_ns is not None and entry.learned_from_ns < versions.renewed_ns
     return "superseded" if was_accepted or is_before else "learned"
-
-
-def _remark(entry: BaselineEntry, own: list[StoredStep]) -> str:
-    """Return the reason why a version was learned; empty if it is the machine event or unknown."""
-    reasons = [step.reason for step in own if step.step is BaselineStep.LEARNED]
-    return next((words for words in reasons if words != entry.event), "")
-
-
-def baseline_model(baseline: BearingBaseline, about: BaselineVersionModel) -> BaselineModel:
-    """Return the API model of a baseline with its cells."""
-    x, y = (baseline.of(f"k_{direction}") for direction in ("x", "y"))
-    grid = next((found.grid for found in (x, y) if found), None)
-    return BaselineModel.of(
-        baseline.origin,
-        about=about,
-        eccentricity_width=grid.eccentricity_width if grid else None,
-        oil_temperature_width_c=grid.temperature_width_c if grid else None,
-        x=_direction(x) if x else None,
-        y=_direction(y) if y else None,
-    )
 
 
 def _direction(learned: QuantityBaseline) -> BaselineDirectionModel:
@@ -167,25 +149,20 @@ def baseline_router(context: Context) -> APIRouter:
     """Return the router that reads baselines."""
     router = subject_router(PATH, "baselines")
 
-    @router.get("", summary="Baselines of a bearing", response_model=BaselinesModel)
+    @router.get("", response_model=BaselinesModel)
     async def baselines(unit: UnitId, bearing: BearingId) -> Response:
         """Return all baseline versions of a bearing, their history, and progress of learning."""
         context.bearing(unit, bearing)
         return await rendered(lambda: _baselines(context, unit, bearing))
 
-    @router.get("/{version}", summary="One baseline", response_model=BaselineModel)
+    @router.get("/{version}", response_model=BaselineModel)
     async def one_baseline(unit: UnitId, bearing: BearingId, version: Version) -> Response:
         """Return the cells of a baseline with their bounds, stiffness and scatter."""
         context.bearing(unit, bearing)
         return await rendered(lambda: _baseline(context, unit, bearing, version))
 
-    @router.get(
-        "/{version}/export",
-        summary="A baseline as a document",
-        responses=EXPORTED,
-        response_class=Response,
-    )
-    async def export(unit: UnitId, bearing: BearingId, version: Version) -> Response:
+    @router.get("/{version}/export", responses=EXPORTED, response_class=Response)
+    async def export_baseline(unit: UnitId, bearing: BearingId, version: Version) -> Response:
         """Export the complete baseline as a JSON document, which padwatch can read without loss."""
         context.bearing(unit, bearing)
         found = await in_thread(lambda: to_json(_stored(context, unit, bearing, version)))
@@ -200,36 +177,38 @@ def baseline_action_router(context: Context) -> APIRouter:
     """Return the router for actions on baselines; each action returns the changed baselines."""
     router = subject_router(PATH, "baselines", Permission.CHANGE_MEASURING)
 
-    @router.post("/{version}/accept", summary="Accept a baseline", responses=ACTION_PROBLEMS)
-    async def accept(
+    @router.post("/{version}/accept", responses=ACTION_PROBLEMS)
+    async def accept_baseline(
         unit: UnitId, bearing: BearingId, version: Version, asked: BaselineActionModel
     ) -> BaselinesModel:
         """Accept a baseline version, which is in force from the next reading."""
         await asyncio.to_thread(_require_version, context, unit, bearing, version)
         return await _done(context, unit, bearing, Accept(version), asked)
 
-    @router.post("/{version}/reject", summary="Reject a baseline", responses=ACTION_PROBLEMS)
-    async def reject(
+    @router.post("/{version}/reject", responses=ACTION_PROBLEMS)
+    async def reject_baseline(
         unit: UnitId, bearing: BearingId, version: Version, asked: BaselineActionModel
     ) -> BaselinesModel:
         """Reject a version; if it was in force, none is in force until another is accepted."""
         await asyncio.to_thread(_require_version, context, unit, bearing, version)
         return await _done(context, unit, bearing, Reject(version), asked)
 
-    @router.post("/freeze", summary="Freeze a baseline", responses=ACTION_PROBLEMS)
-    async def freeze(
+    @router.post("/freeze", responses=ACTION_PROBLEMS)
+    async def freeze_baseline(
         unit: UnitId, bearing: BearingId, asked: BaselineActionModel
     ) -> BaselinesModel:
         """Suspend the learning of baselines; the version in force does not change."""
         return await _done(context, unit, bearing, Freeze(), asked)
 
-    @router.post("/thaw", summary="Thaw a baseline", responses=ACTION_PROBLEMS)
-    async def thaw(unit: UnitId, bearing: BearingId, asked: BaselineActionModel) -> BaselinesModel:
+    @router.post("/thaw", responses=ACTION_PROBLEMS)
+    async def thaw_baseline(
+        unit: UnitId, bearing: BearingId, asked: BaselineActionModel
+    ) -> BaselinesModel:
         """Resume learning after a freeze, until the end of the learning period."""
         return await _done(context, unit, bearing, Thaw(), asked)
 
-    @router.post("/renew", summary="Renew a baseline", responses=ACTION_PROBLEMS)
-    async def renew(unit: UnitId, bearing: BearingId, asked: RenewModel) -> BaselinesModel:
+    @router.post("/renew", responses=ACTION_PROBLEMS)
+    async def renew_baseline(unit: UnitId, bearing: BearingId, asked: RenewModel) -> BaselinesModel:
         """Start a new baseline after a machine event, such as an overhaul.
 
         No baseline is in force until enough readings after the event are learned.
@@ -276,7 +255,16 @@ def _baseline(context: Context, unit: str, bearing: str, version: int) -> Baseli
     found, store = _stored(context, unit, bearing, version), context.store.films
     steps = list(store.steps(unit, bearing))
     [entry] = [one for one in store.baselines(unit, bearing) if one.version == version]
-    return baseline_model(found, version_model(entry, versions_after(steps), steps))
+    x, y = (found.of(f"k_{direction}") for direction in ("x", "y"))
+    grid = next((learned.grid for learned in (x, y) if learned), None)
+    return BaselineModel.of(
+        found.origin,
+        about=version_model(entry, versions_after(steps), steps),
+        eccentricity_width=grid and grid.eccentricity_width,
+        oil_temperature_width_c=grid and grid.temperature_width_c,
+        x=x and _direction(x),
+        y=y and _direction(y),
+    )
 
 
 def _stored(context: Context, unit: str, bearing: str, version: int) -> BearingBaseline:

@@ -188,18 +188,18 @@ def bearing_router(context: Context) -> APIRouter:
     """Return the router for bearings."""
     router = subject_router("/units/{unit}/bearings", "bearing")
 
-    @router.get("", summary="All bearings of a unit")
+    @router.get("")
     async def bearings(unit: UnitId) -> list[BearingModel]:
         """List the guide bearings of a unit with their configuration and gap reference in force."""
         return [_bearing(context, unit, bearing.id) for bearing in context.unit(unit).bearing]
 
-    @router.get("/{bearing}", summary="One bearing as configured")
+    @router.get("/{bearing}")
     async def one_bearing(unit: UnitId, bearing: BearingId) -> BearingModel:
         """Return bracket stiffness, clearance, channels and gap reference of a bearing."""
         return _bearing(context, unit, bearing)
 
-    @router.get("/{bearing}/latest", summary="One bearing now", response_model=LatestModel)
-    async def latest(request: Request, unit: UnitId, bearing: BearingId) -> Response:
+    @router.get("/{bearing}/latest", response_model=LatestModel)
+    async def newest_result(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the newest result of a bearing; readings are null if the result is not current."""
         context.bearing(unit, bearing)
         live = context.live
@@ -209,11 +209,10 @@ def bearing_router(context: Context) -> APIRouter:
 
     @router.get(
         "/{bearing}/budgets/{quantity}",
-        summary="Uncertainty budget",
         response_model=BudgetModel,
         responses=problem_responses(409),
     )
-    async def budget(
+    async def uncertainty_budget(
         request: Request, unit: UnitId, bearing: BearingId, quantity: QuantityName
     ) -> Response:
         """Return the uncertainty budget of a quantity in the newest result."""

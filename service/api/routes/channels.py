@@ -254,7 +254,7 @@ def channel_router(context: Context) -> APIRouter:
     """Return the router for channels."""
     router = subject_router("/units/{unit}", "plant")
 
-    @router.get("/channels", summary="Channels")
+    @router.get("/channels")
     async def channels(unit: UnitId) -> ChannelsModel:
         """List settings and state of every waveform channel and slow channel of a unit.
 
@@ -263,12 +263,9 @@ def channel_router(context: Context) -> APIRouter:
         return await channels_model(context.live, context.unit(unit))
 
     @router.get(
-        "/waveform",
-        summary="Waveform",
-        responses=problem_responses(own=NO_SAMPLES),
-        response_model=WaveformModel,
+        "/waveform", responses=problem_responses(own=NO_SAMPLES), response_model=WaveformModel
     )
-    async def waveform(
+    async def newest_samples(
         unit: UnitId,
         channel: Annotated[
             list[str] | None,

@@ -252,11 +252,10 @@ def film_history_router(context: Context) -> APIRouter:
 
     @router.get(
         "/readings",
-        summary="Readings of a film",
         response_model=FilmReadingsModel,
         responses={**READING_PROBLEMS, **table_content("Readings, by column")},
     )
-    async def readings(
+    async def film_readings(
         request: Request,
         unit: UnitId,
         bearing: BearingId,

@@ -8,7 +8,7 @@ from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
-from core.baseline.baseline import BearingBaseline, QuantityBaseline
+from core.baseline.baseline import BearingBaseline
 from core.baseline.history import DIRECTIONS, QUANTITIES, are_ratios
 from core.change.decision import Decision, Verdict
 from core.change.film_judge import FilmFinding, FilmNews
@@ -28,7 +28,7 @@ from service.api.routes.film_models import (
     FilmModel,
     FilmWordModel,
 )
-from service.api.values import FilmConditionModel, condition_model
+from service.api.values import condition_model
 from service.live.commands import FilmPlace
 from service.live.status import CurrentBearing
 
@@ -50,8 +50,6 @@ class WatchedFilm:
     ----------
     rules
         Rules by which the films of the unit are judged.
-    current
-        Newest result of the bearing.
     news
         Newest reading with its findings; None without a reading since the service started.
     baseline
@@ -61,7 +59,6 @@ class WatchedFilm:
     """
 
     rules: FilmRules
-    current: CurrentBearing
     news: FilmNews | None
     baseline: BearingBaseline | None
     why_not_current: str | None
@@ -78,6 +75,9 @@ def why_unwatched(context: Context, unit: str, bearing: str) -> str | None:
 def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
     """Return the API model of the current state of the film of a bearing."""
     seen, place = _seen(context, unit, bearing), context.films.place(unit, bearing)
+    current = context.live.current(unit, bearing)
+    now = current.assessment if current.is_current else None
+    grid, period_ns = (seen.rules.grid, seen.rules.reading_ns) if seen else (None, 0)
     x, y = _directions(seen) if seen else (None, None)
     return FilmModel.of(
         unit=unit,
@@ -87,8 +87,11 @@ def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
         estimator=place and place.estimator,
         time=seen.news.reading.time_ns if seen and seen.news else None,
         is_current=seen is not None and seen.why_not_current is None,
-        next_reading=seen and _next_reading_ns(seen),
-        condition=seen and _condition(seen),
+        next_reading=(now.time_ns // period_ns + 1) * period_ns if seen and now else None,
+        condition=grid
+        and now
+        and now.condition
+        and condition_model(now.time_ns, now.condition, grid),
         baseline_version=seen and _version(seen.baseline),
         limits=seen and _limits(seen.rules.change),
         damping_limits=seen and _limits(seen.rules.change_ck),
@@ -128,7 +131,7 @@ def _seen(context: Context, unit: str, bearing: str) -> WatchedFilm | None:
     baseline = context.films.baseline(unit, bearing)
     news, current = context.films.newest(unit, bearing), context.live.current(unit, bearing)
     why = _why_not_current(news, current, rules, _version(baseline))
-    return WatchedFilm(rules, current, news, baseline, why)
+    return WatchedFilm(rules, news, baseline, why)
 
 
 def _version(baseline: BearingBaseline | None) -> int | None:
@@ -145,21 +148,6 @@ def _why_not_current(
     if current.assessment.time_ns - news.reading.time_ns > CURRENT_PERIODS * rules.reading_ns:
         return "stale"
     return None if news.findings[0].baseline_version == version else "baseline_changed"
-
-
-def _next_reading_ns(seen: WatchedFilm) -> int | None:
-    """Return the time at which the next reading is due; None without current data."""
-    newest, period_ns = seen.current.assessment, seen.rules.reading_ns
-    if newest is None or not seen.current.is_current:
-        return None
-    return (newest.time_ns // period_ns + 1) * period_ns
-
-
-def _condition(seen: WatchedFilm) -> FilmConditionModel | None:
-    newest = seen.current.assessment
-    if newest is None or newest.condition is None or not seen.current.is_current:
-        return None
-    return condition_model(newest.time_ns, newest.condition, seen.rules.grid)
 
 
 def _directions(seen: WatchedFilm) -> tuple[FilmDirectionModel, FilmDirectionModel]:
@@ -222,17 +210,14 @@ def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding) -> st
     match finding.verdict:
         case Verdict.NO_BASELINE:
             learned = seen.baseline.of(finding.quantity) if seen.baseline else None
-            return "none_in_force" if learned is None else _unseen(learned, reading)
+            if learned is None:
+                return "none_in_force"
+            is_seen = learned.table.find(learned.grid.cells(reading.conditions))[0] >= 0
+            return "attitude_not_learned" if is_seen else "condition_not_learned"
         case Verdict.TRANSIENT:
             return "not_settled"
         case _:
             return reading.values[QUANTITIES[finding.quantity].row].reason.value
-
-
-def _unseen(learned: QuantityBaseline, reading: FilmReading) -> str:
-    """Return why the baseline does not cover a reading: cell or attitude angle not learned."""
-    is_seen = learned.table.find(learned.grid.cells(reading.conditions))[0] >= 0
-    return "attitude_not_learned" if is_seen else "condition_not_learned"
 
 
 def _change(finding: FilmFinding, decision: Decision, rules: FilmRules) -> FilmChangeModel | None:
@@ -271,8 +256,8 @@ def film_router(context: Context) -> APIRouter:
     """Return the router for the current state of a film."""
     router = subject_router("/units/{unit}/bearings/{bearing}/film", "film")
 
-    @router.get("", summary="A film now", response_model=FilmModel)
-    async def film(request: Request, unit: UnitId, bearing: BearingId) -> Response:
+    @router.get("", response_model=FilmModel)
+    async def film_now(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return verdict, change of stiffness and cause in x and y, and the operating condition.
 
         A film that cannot be judged is never reported as normal; its verdict states the reason.

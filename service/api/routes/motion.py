@@ -185,10 +185,7 @@ def motion_router(context: Context) -> APIRouter:
     router = subject_router("/units/{unit}/bearings", "bearing")
 
     @router.get(
-        "/{bearing}/motion",
-        summary="Motion of the shaft",
-        responses=problem_responses(own=NO_SAMPLES),
-        response_model=MotionModel,
+        "/{bearing}/motion", responses=problem_responses(own=NO_SAMPLES), response_model=MotionModel
     )
     async def motion(
         unit: UnitId,
@@ -210,12 +207,7 @@ def recorded_motion_router(context: Context) -> APIRouter:
     """Return the router for the shaft motion in recordings."""
     router = subject_router("/recordings", "recordings")
 
-    @router.get(
-        "/{recording}/motion",
-        summary="Motion of the shaft in a recording",
-        responses=RECORDING_PROBLEMS,
-        response_model=MotionModel,
-    )
+    @router.get("/{recording}/motion", responses=RECORDING_PROBLEMS, response_model=MotionModel)
     async def motion(
         recording: RecordingId,
         bearing: Annotated[

@@ -46,7 +46,7 @@ def note_router(context: Context) -> APIRouter:
     router = subject_router("/units/{unit}/notes", "plant")
     allowances = Allowances()
 
-    @router.get("", summary="Notes")
+    @router.get("")
     async def notes(unit: UnitId, times: OptionalTimeRange) -> list[NoteModel]:
         """List the notes about a unit and its bearings that refer to a time range.
 
@@ -57,12 +57,7 @@ def note_router(context: Context) -> APIRouter:
         found = await in_thread(lambda: notes_between(audit, unit, *times))
         return [NoteModel.of(note) for note in found]
 
-    @router.post(
-        "",
-        summary="Add a note",
-        responses=COMMENT_LIMIT,
-        dependencies=[needs(Permission.ACT_ON_ALARMS)],
-    )
+    @router.post("", responses=COMMENT_LIMIT, dependencies=[needs(Permission.ACT_ON_ALARMS)])
     async def add_note(request: Request, unit: UnitId, asked: AddNoteModel) -> NoteModel:
         """Add a note; the audit trail records it, and it is never changed or deleted."""
         context.unit(unit)

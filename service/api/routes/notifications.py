@@ -12,7 +12,7 @@ from service.api.values import ApiModel, Time
 from service.live.receivers import ReceiverView, SenderStatus
 from service.settings.notifications import ChannelKind
 from service.settings.storage import Origin
-from service.store.outbox import Backlog, MessageState, StoredMessage
+from service.store.outbox import Backlog
 
 SenderStateName = Literal[
     "idle", "sending", "retrying", "quiet", "store_fails", "not_in_the_plant_file"
@@ -96,8 +96,8 @@ def delivery_router(context: Context) -> APIRouter:
     """Return the router for the delivery of alarm messages."""
     router = subject_router("", "alarms", reach=Reach.NO_UNIT)
 
-    @router.get("/delivery", summary="Receivers of alarm messages", response_model=DeliveryModel)
-    async def delivery() -> Response:
+    @router.get("/delivery", response_model=DeliveryModel)
+    async def message_receivers() -> Response:
         """List the receivers of alarm messages with their waiting and failed messages."""
         views = await context.receivers()
         return await rendered(
@@ -109,6 +109,7 @@ def delivery_router(context: Context) -> APIRouter:
 
 def _receiver(view: ReceiverView) -> ReceiverModel:
     receiver, backlog = view.receiver, view.backlog or NO_BACKLOG
+    dead = backlog.last_dead
     status = receiver.status if receiver else SenderStatus()
     return ReceiverModel.of(
         status,
@@ -119,13 +120,7 @@ def _receiver(view: ReceiverView) -> ReceiverModel:
         state=status.state if receiver else "not_in_the_plant_file",
         is_failing=status.n_failures > 0,
         waiting_since=backlog.oldest_ns,
-        last_dead=_dead(backlog.last_dead),
+        last_dead=dead
+        and DeadLetterModel.of(dead, outcome=dead.state, reason=dead.answer, time=dead.done_ns),
         last_delivered=backlog.delivered_ns,
     )
-
-
-def _dead(letter: StoredMessage | None) -> DeadLetterModel | None:
-    if letter is None or letter.done_ns is None:
-        return None
-    outcome = "refused" if letter.state is MessageState.REFUSED else "expired"
-    return DeadLetterModel.of(letter, outcome=outcome, reason=letter.answer, time=letter.done_ns)

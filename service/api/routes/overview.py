@@ -206,7 +206,7 @@ def overview_router(context: Context) -> APIRouter:
     router = subject_router("", "plant")
     shown = Overview(context)
 
-    @router.get("/overview", summary="Overview", response_model=OverviewModel)
+    @router.get("/overview", response_model=OverviewModel)
     async def overview(
         request: Request,
         since: Annotated[

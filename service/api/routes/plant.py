@@ -223,21 +223,17 @@ def plant_router(context: Context) -> APIRouter:
     """Return the router for units, sources, gaps, quantities and the configuration."""
     router = subject_router("", "plant")
 
-    @router.get("/units", summary="All units")
+    @router.get("/units")
     async def units() -> list[UnitModel]:
         """List all units with the state of their sources."""
         return [_unit(context, unit) for unit in context.units]
 
-    @router.get("/units/{unit}", summary="One unit")
+    @router.get("/units/{unit}")
     async def one_unit(unit: UnitId) -> UnitModel:
         """Return a unit with the state of its source."""
         return _unit(context, context.unit(unit).id)
 
-    @router.get(
-        "/quantities",
-        summary="The catalogue of quantities",
-        dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
-    )
+    @router.get("/quantities", dependencies=[needs(Permission.READ, Reach.NO_UNIT)])
     async def quantities() -> list[QuantityModel]:
         """List name, unit and description of all quantities of a bearing.
 
@@ -248,12 +244,12 @@ def plant_router(context: Context) -> APIRouter:
         others = filter(None, map(quantity_named, names))
         return [QuantityModel.of(quantity) for quantity in (*CATALOGUE, *others)]
 
-    @router.get("/sources", summary="Health of each source")
+    @router.get("/sources")
     async def sources() -> list[SourceHealthModel]:
         """List sources with link state, failed connections, counts of samples, and device clock."""
         return [_health(context, unit) for unit in context.units.values()]
 
-    @router.get("/units/{unit}/gaps", summary="Gaps")
+    @router.get("/units/{unit}/gaps")
     async def gaps(unit: UnitId, times: TimeRange) -> list[GapModel]:
         """List gaps that end in the time range, oldest first, including stops of the service."""
         found = await asyncio.to_thread(context.store.gaps, context.unit(unit).id, *times)
@@ -262,7 +258,6 @@ def plant_router(context: Context) -> APIRouter:
 
     @router.get(
         "/configuration",
-        summary="Configuration",
         responses=problem_responses(own={404: "The service keeps no configuration"}),
     )
     async def configuration() -> ConfigurationModel:
@@ -280,11 +275,10 @@ def plant_router(context: Context) -> APIRouter:
     @router.get(
         "/configuration/schema",
         dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
-        summary="JSON schema of plant files",
         response_class=Response,
         responses=file_content(SCHEMA_TYPE, "A JSON schema", SCHEMA_OF_SCHEMA),
     )
-    async def schema() -> Response:
+    async def schema_of_plant_files() -> Response:
         """Return meaning, limits and default of every key of a plant file as a JSON schema."""
         return Response(json.dumps(plant_file_schema()), media_type=SCHEMA_TYPE)
 

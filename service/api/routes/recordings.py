@@ -183,7 +183,7 @@ def recording_router(context: Context) -> APIRouter:
     """Return the router for recordings."""
     router = subject_router("/recordings", "recordings")
 
-    @router.get("", summary="Recordings", responses=LIST_PROBLEMS)
+    @router.get("", responses=LIST_PROBLEMS)
     async def recordings(
         unit: Annotated[str | None, only("unit", "U1")] = None,
         kind: Annotated[WaveformKind | None, only("kind", "capture")] = None,
@@ -205,12 +205,7 @@ def recording_router(context: Context) -> APIRouter:
             continuous_error=plant.continuous_trouble,
         )
 
-    @router.get(
-        "/{recording}",
-        summary="One recording",
-        responses=PROBLEMS,
-        response_model=RecordingInfoModel,
-    )
+    @router.get("/{recording}", responses=PROBLEMS, response_model=RecordingInfoModel)
     async def one_recording(recording: RecordingId) -> Response:
         """Check the files of a recording; return its channels, gaps, rejected samples and files."""
         kept = await entry_of(context, recording)
@@ -221,11 +216,10 @@ def recording_router(context: Context) -> APIRouter:
 
     @router.get(
         "/{recording}/files.zip",
-        summary="The files of a recording",
         response_class=StreamingResponse,
         responses=PROBLEMS | file_content("application/zip", "A ZIP file"),
     )
-    async def files(recording: RecordingId) -> StreamingResponse:
+    async def recording_files(recording: RecordingId) -> StreamingResponse:
         """Return the files of a recording as a ZIP file.
 
         `padwatch recording` and `padwatch replay` read these files. The manifest contains their
@@ -236,11 +230,10 @@ def recording_router(context: Context) -> APIRouter:
 
     @router.get(
         "/{recording}/samples.csv",
-        summary="The samples of a recording",
         response_class=StreamingResponse,
         responses=PROBLEMS | file_content("text/csv", "A CSV file"),
     )
-    async def samples(recording: RecordingId) -> StreamingResponse:
+    async def recording_samples(recording: RecordingId) -> StreamingResponse:
         """Return the samples as CSV, one row per sample, in the engineering units of the headings.
 
         `padwatch recording export` writes the same format: missing samples have no rows, and cells

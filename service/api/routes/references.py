@@ -87,8 +87,8 @@ def reference_router(context: Context) -> APIRouter:
     """Return the router for gap references and 1× reference vectors."""
     router = subject_router("/units/{unit}/bearings/{bearing}", "bearing")
 
-    @router.get("/references", summary="References")
-    async def references(unit: UnitId, bearing: BearingId) -> list[SetReferenceModel]:
+    @router.get("/references")
+    async def gap_references(unit: UnitId, bearing: BearingId) -> list[SetReferenceModel]:
         """List the stored gap references of a bearing, newest first, at most 1000.
 
         The newest reference comes into force a few seconds after it was set. Without stored
@@ -98,7 +98,7 @@ def reference_router(context: Context) -> APIRouter:
         history = await asyncio.to_thread(context.store.gap_references.history, unit, bearing)
         return [set_reference_model(reference) for reference in history]
 
-    @router.get("/order1-references", summary="References of 1×", name="references")
+    @router.get("/order1-references", name="references")
     async def order1_references(unit: UnitId, bearing: BearingId) -> list[Order1ReferenceModel]:
         """List the stored 1× references of a bearing, newest first, at most 1000.
 
@@ -111,11 +111,10 @@ def reference_router(context: Context) -> APIRouter:
 
     @router.post(
         "/order1-references",
-        summary="Take a reference of 1×",
         responses=TAKE_PROBLEMS,
         dependencies=[needs(Permission.CHANGE_MEASURING)],
     )
-    async def take(
+    async def take_order1_reference(
         unit: UnitId, bearing: BearingId, asked: TakeReferenceModel
     ) -> Order1ReferenceModel:
         """Store the 1× vectors of the newest result as reference for its operating state."""

@@ -9,7 +9,6 @@ import structlog
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
-from core.arrays import FloatArray
 from core.monitor.assessment import Assessment
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.stiffness.order_line import marked_hz
@@ -133,16 +132,6 @@ DECIMALS = 6
 """Number of decimals of amplitudes in µm, more than the precision of stored spectra."""
 
 
-def _frequencies(shown: Sequence[StoredSpectrum], max_frequency_hz: float | None) -> FloatArray:
-    if not shown:
-        return np.empty(0)
-    bin_hz, n_lines = shown[-1].resolution
-    frequency_hz: FloatArray = bin_hz * np.arange(1, n_lines + 1, dtype=np.float64)
-    return (
-        frequency_hz if max_frequency_hz is None else frequency_hz[frequency_hz <= max_frequency_hz]
-    )
-
-
 def _require_few(n_spectra: int, n_numbers: int) -> None:
     if n_spectra * n_numbers > MAX_NUMBERS:
         detail = (
@@ -203,12 +192,9 @@ def spectra_router(context: Context) -> APIRouter:
     router = subject_router("/units/{unit}/bearings", "bearing")
 
     @router.get(
-        "/{bearing}/spectrum",
-        summary="Spectra",
-        response_model=SpectrumModel,
-        responses=problem_responses(409),
+        "/{bearing}/spectrum", response_model=SpectrumModel, responses=problem_responses(409)
     )
-    async def spectrum(request: Request, unit: UnitId, bearing: BearingId) -> Response:
+    async def newest_spectra(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the averaged amplitude spectra of the newest result, all as displacement."""
         context.bearing(unit, bearing)
         sense = machine_of(context.unit(unit)).rotation_sense
@@ -221,8 +207,8 @@ def spectra_router(context: Context) -> APIRouter:
 
         return await context.answers.of(request, lambda: context.live.revision(unit), newest)
 
-    @router.get("/{bearing}/spectra", summary="Spectra over time", response_model=SpectraModel)
-    async def spectra(
+    @router.get("/{bearing}/spectra", response_model=SpectraModel)
+    async def spectra_over_time(
         request: Request,
         unit: UnitId,
         bearing: BearingId,
@@ -272,7 +258,10 @@ def _read(
             "spectra are damaged", unit=query.unit, bearing=query.bearing, n=len(found.damaged_ns)
         )
     shown = [each for each in found.spectra if each.resolution == found.spectra[-1].resolution]
-    frequency_hz = _frequencies(shown, max_frequency_hz)
+    bin_hz, n_lines = shown[-1].resolution if shown else (0.0, 0)
+    frequency_hz = bin_hz * np.arange(1, n_lines + 1, dtype=np.float64)
+    if max_frequency_hz is not None:
+        frequency_hz = frequency_hz[frequency_hz <= max_frequency_hz]
     _require_few(len(shown), len(places) * frequency_hz.size)
     return SpectraModel.of(
         query,

@@ -243,10 +243,7 @@ def trend_router(context: Context) -> APIRouter:
     router = subject_router("/units/{unit}/bearings", "bearing")
 
     @router.get(
-        "/{bearing}/trends",
-        summary="Trends",
-        response_model=TrendModel,
-        responses=table_content("Trends, by column"),
+        "/{bearing}/trends", response_model=TrendModel, responses=table_content("Trends, by column")
     )
     async def trends(
         request: Request,
@@ -282,7 +279,10 @@ def trend_router(context: Context) -> APIRouter:
         As CSV or Parquet: one row per time; with `group_by`, one row per group and time.
         """
         context.bearing(unit, bearing)
-        start_ns = _page_start_ns(cursor, group_by, times[0])
+        if cursor is not None and group_by is not None:
+            detail = "cursor and group_by cannot be combined; omit one"
+            raise ProblemError(422, "Wrong parameter", detail, "cursor")
+        start_ns = max(times[0], int(cursor)) if cursor and cursor != "first" else times[0]
         query = TrendQuery(
             unit=unit,
             bearing=bearing,
@@ -322,20 +322,6 @@ def _read(
     whole = context.store.trend(query)
     groups = None if group_by is None else trend_groups(context.store, query, group_by, grid)
     return whole, groups, past_end_ns
-
-
-def _page_start_ns(cursor: str | None, group_by: GroupName | None, start_ns: int) -> int:
-    """Return the start of the page at a cursor, or of the range without a cursor, ns since 1970.
-
-    Raises
-    ------
-    ProblemError
-        If both cursor and group are given.
-    """
-    if cursor is not None and group_by is not None:
-        detail = "cursor and group_by cannot be combined; omit one"
-        raise ProblemError(422, "Wrong parameter", detail, "cursor")
-    return start_ns if cursor in (None, "first") else max(start_ns, int(cursor or 0))
 
 
 def _known(quantities: list[str]) -> tuple[str, ...]:
