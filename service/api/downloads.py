@@ -32,10 +32,7 @@ class Downloads:
     def require_room(self) -> None:
         """Check that fewer than `MAX_DOWNLOADS` downloads are in progress; reserve no place.
 
-        Raises
-        ------
-        ProblemError
-            With status 503 if `MAX_DOWNLOADS` downloads are in progress.
+        Raises `ProblemError` with status 503 if `MAX_DOWNLOADS` downloads are in progress.
         """
         if self._n >= MAX_DOWNLOADS:
             detail = f"the maximum of {MAX_DOWNLOADS} downloads is reached; try again later"
@@ -44,15 +41,12 @@ class Downloads:
     async def download(self, pieces: Generator[bytes, None, None]) -> AsyncIterator[bytes]:
         """Return an iterator over the pieces of a download; the first piece is produced at once.
 
+        Raises `ProblemError` with status 503 if `MAX_DOWNLOADS` downloads are in progress.
+
         Parameters
         ----------
         pieces
             Generator of the pieces; may block. Its errors for the first piece are raised here.
-
-        Raises
-        ------
-        ProblemError
-            With status 503 if `MAX_DOWNLOADS` downloads are in progress.
         """
         self.require_room()
         first = await self.worked(lambda: next(pieces, b""))  # the first piece opens all files

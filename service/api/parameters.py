@@ -18,10 +18,7 @@ FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
 def written_as_date(text: object) -> object:
     """Return the written time unchanged; a number is rejected, since its unit is unknown.
 
-    Raises
-    ------
-    ValueError
-        If the value is a number, or a text that is one.
+    Raises `ValueError` if the value is a number, or a text that is one.
     """
     if not isinstance(text, str) or "-" not in text[1:]:
         raise ValueError("a time must be RFC 3339, such as 2026-11-21T08:00:00Z")
@@ -31,15 +28,12 @@ def written_as_date(text: object) -> object:
 def ns_from_datetime(moment: datetime, parameter: str) -> int:
     """Return a time in nanoseconds since 1970 UTC, clipped to the years 1 to 9999.
 
+    Raises `ProblemError` if the time has no offset from UTC.
+
     Parameters
     ----------
     parameter
         Name of the request parameter with the time, for the error.
-
-    Raises
-    ------
-    ProblemError
-        If the time has no offset from UTC.
     """
     if moment.tzinfo is None:
         detail = f"{parameter} requires an offset from UTC, such as a trailing Z"
@@ -51,10 +45,7 @@ def ns_from_datetime(moment: datetime, parameter: str) -> int:
 def require_order(start_ns: int, end_ns: int) -> None:
     """Require that the start of a time range is before its end.
 
-    Raises
-    ------
-    ProblemError
-        If the start is not before the end.
+    Raises `ProblemError` if the start is not before the end.
     """
     if start_ns >= end_ns:
         detail = f"start {rfc3339(start_ns)} must be before end {rfc3339(end_ns)}"
@@ -103,10 +94,8 @@ async def time_range(
 
     Without an end, the range ends at the next whole minute, so that answers can be cached.
 
-    Raises
-    ------
-    ProblemError
-        Unless exactly one of `start` and `last` is given, or if the start is not before the end.
+    Raises `ProblemError` unless exactly one of `start` and `last` is given, or if the start is not
+    before the end.
     """
     if (start is None) == (last is None):
         detail = "one of start and last, such as last=24h, is required"

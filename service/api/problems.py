@@ -147,10 +147,8 @@ def problem_responses(
 async def refuse_unknown_parameters(request: Request) -> None:
     """Reject a request body or query parameter that the route does not have.
 
-    Raises
-    ------
-    ProblemError
-        For a body, or for the first unknown parameter; the message lists the known parameters.
+    Raises `ProblemError` for a body, or for the first unknown parameter; the message lists the
+    known parameters.
     """
     route = request.scope["route"]
     length = request.headers.get("content-length", "0")

@@ -41,15 +41,13 @@ def require_protected(plant: PlantFile, store: AccessStore) -> None:
 def listener_of(plant: PlantFile, port: int) -> Iterator[socket.socket]:
     """Open the listening socket of the server, before other parts of the process start.
 
+    Raises `PortInUseError` or `CertificateError` if the address is in use, or the certificate
+    cannot be used.
+
     Parameters
     ----------
     port
         TCP port, instead of the port in the plant file; ignored with a Unix socket.
-
-    Raises
-    ------
-    PortInUseError, CertificateError
-        If the address is in use, or the certificate cannot be used.
     """
     tls_of(plant)
     if plant.service.socket is not None:

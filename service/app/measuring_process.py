@@ -153,6 +153,8 @@ async def analysis_on(
 ) -> Analysis:
     """Build the parts of the analysis, and restore their stored state.
 
+    Raises `StoreError` if stored state cannot be read; a start without the state would lose it.
+
     Parameters
     ----------
     bus
@@ -165,11 +167,6 @@ async def analysis_on(
         Saved state by unit, only of units without missing samples since it was saved.
     stream
         Status of the stream; None if the blocks come directly from the sources.
-
-    Raises
-    ------
-    StoreError
-        If stored state cannot be read; a start without the state would lose it.
     """
     plant, origin, store, clock = process.plant, process.origin, process.store, process.clock
     live = process.live

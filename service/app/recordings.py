@@ -26,10 +26,7 @@ from service.settings.units import UnitSettings
 def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> RecordingWriter:
     """Return a writer of a recording of a unit; the first block determines the sample type.
 
-    Raises
-    ------
-    ConfigError
-        If the folder exists or cannot be created.
+    Raises `ConfigError` if the folder exists or cannot be created.
     """
     return RecordingWriter(folder, recorded_unit(unit), made_by)
 
@@ -37,10 +34,8 @@ def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> Recordin
 def recordings_by_unit(folders: Iterable[Path], plant: PlantFile) -> dict[str, Path]:
     """Return the recording folder of each unit by unit id.
 
-    Raises
-    ------
-    ConfigError
-        If a recording has no readable manifest or an unknown unit, or two have the same unit.
+    Raises `ConfigError` if a recording has no readable manifest or an unknown unit, or two have the
+    same unit.
     """
     known = [unit.id for unit in plant.unit]
     found: dict[str, Path] = {}
@@ -57,10 +52,8 @@ def recordings_by_unit(folders: Iterable[Path], plant: PlantFile) -> dict[str, P
 def selection_of(recording: Recording, unit: UnitSettings) -> Selection:
     """Return the selection of the channels of a recording that a unit of the plant file has.
 
-    Raises
-    ------
-    ConfigError
-        If a channel is missing, or its rate or measuring unit differs from the plant file.
+    Raises `ConfigError` if a channel is missing, or its rate or measuring unit differs from the
+    plant file.
     """
     slow_units = {channel.id: channel.unit for channel in unit.slow_channel}
     machine = replace(machine_of(unit), rate_hz=unit.sampling_hz)
@@ -72,15 +65,12 @@ def replay_source(
 ) -> SampleSource:
     """Return a source that replays a recording, with the calibration of the plant file.
 
+    Raises `ConfigError` if the recording is damaged or does not match the unit.
+
     Parameters
     ----------
     speed
         Seconds of the recording per second of replay; None for as fast as it is read.
-
-    Raises
-    ------
-    ConfigError
-        If the recording is damaged or does not match the unit.
     """
     recording = open_recording(folder)
     selection = replace(selection_of(recording, unit), calibration=calibration_of(unit))
@@ -130,10 +120,8 @@ class PlayedOut:
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
         """Open the link and yield its blocks, until the recording or the DAQ ends.
 
-        Raises
-        ------
-        LinkError, ConfigError
-            If the wrapped source raises it before the end of the recording.
+        Raises `LinkError` or `ConfigError` if the wrapped source raises it before the end of the
+        recording.
         """
         async with AsyncExitStack() as stack:
             try:

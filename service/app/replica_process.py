@@ -41,10 +41,7 @@ class Replica:
     async def start(self) -> None:
         """Read the present state of the plant; call it before the first request.
 
-        Raises
-        ------
-        StoreError
-            If the state cannot be read.
+        Raises `StoreError` if the state cannot be read.
         """
         await self.feed.start()
         await self.references.look()

@@ -67,15 +67,13 @@ def open_store(
 ) -> Store:
     """Open the plant's database: a SQLite file, created if missing, or PostgreSQL.
 
+    Raises `StoreError` if the database cannot be used, or contains results of another origin (live,
+    replay).
+
     Parameters
     ----------
     address
         Function that returns the recipients of the notification of an alarm event.
-
-    Raises
-    ------
-    StoreError
-        If the database cannot be used, or contains results of another origin (live, replay).
     """
     if plant.store.postgresql is None:
         return SqliteStore(database_path(plant), origin, address, plant.spectra)
@@ -90,10 +88,7 @@ def open_store_to_serve(plant: PlantFile, origin: Origin = Origin.LIVE) -> Store
 
     A SQLite file is opened read-only; with PostgreSQL operators' commands can be written.
 
-    Raises
-    ------
-    StoreError
-        If the database cannot be used.
+    Raises `StoreError` if the database cannot be used.
     """
     if plant.store.postgresql is None:
         return SqliteReader(database_path(plant))
@@ -103,10 +98,7 @@ def open_store_to_serve(plant: PlantFile, origin: Origin = Origin.LIVE) -> Store
 def open_access(plant: PlantFile, origin: Origin = Origin.LIVE) -> AccessStore:
     """Open the plant's accounts: a SQLite file of their own, created if missing, or PostgreSQL.
 
-    Raises
-    ------
-    StoreError
-        If the database cannot be used.
+    Raises `StoreError` if the database cannot be used.
     """
     if plant.store.postgresql is None:
         return open_access_file(access_path(plant))

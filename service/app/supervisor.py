@@ -146,10 +146,7 @@ def write_start(writer: asyncio.StreamWriter, start: Start) -> None:
 async def read_start(reader: asyncio.StreamReader) -> Start:
     """Read and return the start options that `write_start` wrote.
 
-    Raises
-    ------
-    VersionError
-        If the measuring process is of another version.
+    Raises `VersionError` if the measuring process is of another version.
     """
     theirs, n_bytes = (await reader.readline()).decode().split()
     own = version("padwatch")

@@ -78,6 +78,9 @@ def baseline_step(
 ) -> StoredStep:
     """Return the step of the baseline history that an action on a baseline adds.
 
+    Raises `BaselineRefusedError` if the action is not possible in the present state of the
+    baselines.
+
     Parameters
     ----------
     versions
@@ -86,11 +89,6 @@ def baseline_step(
         All baselines of the bearing.
     actor, reason
         Author of the action and the reason given, stored with the step.
-
-    Raises
-    ------
-    BaselineRefusedError
-        If the action is not possible in the present state of the baselines.
     """
     version: int | None = versions.in_force
     from_ns: int | None = None
@@ -220,10 +218,8 @@ def encoded(command: OperatorCommand) -> tuple[str, str]:
 def decoded(kind: str, document: str) -> OperatorCommand:
     """Decode a command from the kind and the document that `encoded` returned.
 
-    Raises
-    ------
-    UnreadableCommandError
-        If the document is from another version of the program, or damaged.
+    Raises `UnreadableCommandError` if the document is from another version of the program, or
+    damaged.
     """
     theirs, _, content = document.partition("\n")
     if theirs != OWN_VERSION:
@@ -274,10 +270,7 @@ class Operators(ABC):
     async def send(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
         """Send a command; return the answer, which states whether the result is stored.
 
-        Raises
-        ------
-        CommandFailedError
-            If no process answers.
+        Raises `CommandFailedError` if no process answers.
         """
 
     async def operate(self, id_: str, action: Action) -> Alarm:

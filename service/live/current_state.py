@@ -236,10 +236,7 @@ class LiveUnits:
     async def blocks(self, unit: str) -> Sequence[SampleBlock]:
         """Return the newest blocks of a unit, oldest first; they may be out of date.
 
-        Raises
-        ------
-        NotAvailableError
-            If the process that analyses the unit cannot be asked.
+        Raises `NotAvailableError` if the process that analyses the unit cannot be asked.
         """
         blocks: Sequence[SampleBlock]
         blocks = await self._answer(self._latest[unit].beat, "blocks", unit)
@@ -248,10 +245,7 @@ class LiveUnits:
     async def assessment(self, unit: str, bearing: str) -> Assessment | None:
         """Return the newest result of a bearing with spectrum and orbit; None before the first.
 
-        Raises
-        ------
-        NotAvailableError
-            If the process that analyses the unit cannot be asked.
+        Raises `NotAvailableError` if the process that analyses the unit cannot be asked.
         """
         known = self._latest[unit].results.get(bearing)
         if known is None:
@@ -383,10 +377,7 @@ class LiveFilms:
 
         Blocks while the store is read. Baselines that the store does not have are left out.
 
-        Raises
-        ------
-        StoreError
-            If a baseline cannot be read.
+        Raises `StoreError` if a baseline cannot be read.
         """
         found = {
             bearing: self._store.baseline(unit, bearing, version)

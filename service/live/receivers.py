@@ -70,10 +70,7 @@ class ReceiverView:
 def receiver_views(receivers: Iterable[ReceiverStatus], outbox: Outbox) -> list[ReceiverView]:
     """Return the state of all receivers of the plant file, then of removed ones with messages.
 
-    Raises
-    ------
-    StoreError
-        If the outbox cannot be read.
+    Raises `StoreError` if the outbox cannot be read.
     """
     backlogs = {backlog.receiver: backlog for backlog in outbox.backlogs()}
     views = [ReceiverView(each.name, each, backlogs.pop(each.name, None)) for each in receivers]

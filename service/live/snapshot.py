@@ -247,10 +247,8 @@ def snapshot_document(snapshot: UnitSnapshot) -> bytes:
 def snapshot_of_document(document: bytes) -> UnitSnapshot:
     """Return the snapshot in a document that `snapshot_document` returned.
 
-    Raises
-    ------
-    UnreadableSnapshotError
-        If the document is damaged, or from another version of the program.
+    Raises `UnreadableSnapshotError` if the document is damaged, or from another version of the
+    program.
     """
     theirs, _, compressed = document.partition(b"\n")
     if theirs != OWN_VERSION.rstrip():

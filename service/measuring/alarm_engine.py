@@ -324,6 +324,8 @@ async def alarm_engine(
 ) -> AlarmEngine:
     """Build the alarm engine and restore the stored alarms.
 
+    Raises `StoreError` if stored alarms cannot be read; a start without them would lose them.
+
     Parameters
     ----------
     put, listener
@@ -337,11 +339,6 @@ async def alarm_engine(
     memories
         States of the alarms, by unit; given only for units without missing samples since these
         states were saved.
-
-    Raises
-    ------
-    StoreError
-        If stored alarms cannot be read; a start without them would lose them.
     """
     units = {
         unit.id: UnitAlarms(

@@ -73,10 +73,8 @@ class FilmMonitor:
     async def start(self) -> None:
         """Restore the state of all films from stored readings, before the first result.
 
-        Raises
-        ------
-        StoreError
-            If the readings cannot be read; a start without them would lose findings.
+        Raises `StoreError` if the readings cannot be read; a start without them would lose
+        findings.
         """
         responses = await asyncio.to_thread(self._store.responses)
         for unit, films in self._films.items():
@@ -223,10 +221,7 @@ async def film_monitor(
 ) -> FilmMonitor:
     """Build the monitor of all films and restore it from stored readings.
 
-    Raises
-    ------
-    StoreError
-        If the readings cannot be read.
+    Raises `StoreError` if the readings cannot be read.
     """
     rules = {unit.id: film_rules_of(unit, plant.films) for unit in plant.unit}
     monitor = FilmMonitor(machines, rules, plant.films, store, clock)

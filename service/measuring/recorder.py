@@ -43,10 +43,7 @@ class ParkedRows:
     def add(self, time_ns: int, refused: Iterable[tuple[object, str]]) -> None:
         """Append pairs of refused row and reason for ``time_ns``, ns since 1970 UTC; sync the file.
 
-        Raises
-        ------
-        OSError
-            If the file cannot be written.
+        Raises `OSError` if the file cannot be written.
         """
         lines = [
             json.dumps(
@@ -199,10 +196,7 @@ class Recorder:
     async def stored(self) -> None:
         """Wait without limit until the newest change of an alarm is on the disk.
 
-        Raises
-        ------
-        NotStoredError
-            If the change was dropped, or refused by the database.
+        Raises `NotStoredError` if the change was dropped, or refused by the database.
         """
         if not self._alarms:
             return
@@ -222,10 +216,7 @@ class Recorder:
     async def require_store(self) -> None:
         """Check the store by writing an empty transaction.
 
-        Raises
-        ------
-        StoreError
-            If nothing can be written now.
+        Raises `StoreError` if nothing can be written now.
         """
         loop = asyncio.get_running_loop()
         await loop.run_in_executor(self._thread, self._store.append, [], [])

@@ -29,10 +29,8 @@ def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
 
     ``near`` are gaps of the probes on the positive axes, ``opposite`` those of opposite probes.
 
-    Raises
-    ------
-    ReferenceRefusedError
-        If a gap is missing, or given for a probe that the bearing does not have.
+    Raises `ReferenceRefusedError` if a gap is missing, or given for a probe that the bearing does
+    not have.
     """
     x, y = near
     if x is None or y is None:
@@ -51,10 +49,8 @@ def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
 def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) -> Gaps:
     """Return the mean gaps (x, y) in µm of the newest stored result of a bearing.
 
-    Raises
-    ------
-    ReferenceRefusedError
-        If there is no result, it is not of the last ten minutes, or a gap has no value.
+    Raises `ReferenceRefusedError` if there is no result, it is not of the last ten minutes, or a
+    gap has no value.
     """
     if newest is None:
         raise ReferenceRefusedError("no result is stored yet; wait for one or give the gaps")
@@ -114,10 +110,8 @@ NOT_STEADY = (Reason.NON_STATIONARY, Reason.SPEED_IMPLAUSIBLE, Reason.FEW_SEGMEN
 def measured_vectors(assessment: Assessment | None) -> VectorReference:
     """Return the 1× vectors of a result as the reference for the operating state of the result.
 
-    Raises
-    ------
-    ReferenceRefusedError
-        If there is no result, an amplitude has no value, or the machine did not run steadily.
+    Raises `ReferenceRefusedError` if there is no result, an amplitude has no value, or the machine
+    did not run steadily.
     """
     if assessment is None:
         raise ReferenceRefusedError("the bearing has no current result; check its samples")

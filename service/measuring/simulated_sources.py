@@ -137,10 +137,7 @@ def simulated_feed(unit: UnitSettings, clock: Clock) -> SimulatedUnit:
 def scenario_of(simulation: SimulationSettings) -> Scenario:
     """Return the scenario of a simulated unit with constant films.
 
-    Raises
-    ------
-    LookupError
-        If the unit has a machine life instead of constant films.
+    Raises `LookupError` if the unit has a machine life instead of constant films.
     """
     if simulation.speed_rpm is None or simulation.power_mw is None:
         raise LookupError("a unit with life_seed has no constant scenario; remove life_seed")

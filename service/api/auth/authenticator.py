@@ -138,10 +138,7 @@ class Authenticator:
 
         An invalid session counts as no credentials; a caller with an invalid key has no identity.
 
-        Raises
-        ------
-        StoreError
-            If the store cannot be read.
+        Raises `StoreError` if the store cannot be read.
         """
         local_role = self.local_role if is_from_here(scope) else None
         shown = credentials_of(scope)
@@ -160,10 +157,7 @@ class Authenticator:
 
         `peer` is the client's address. A wrong password or too early a try returns `NotLoggedIn`.
 
-        Raises
-        ------
-        TooManyLoginsError
-            If there are too many concurrent logins.
+        Raises `TooManyLoginsError` if there are too many concurrent logins.
         """
         times = self.now
         return await self.work.run_hashing(
@@ -185,17 +179,15 @@ class Authenticator:
     async def change(self, do: Callable[[], T], *, hashes: bool = False) -> T:
         """Change accounts, sessions or keys in a thread, and clear the cache; return the result.
 
+        Raises `TooManyLoginsError` if the function hashes a password and there are too many
+        concurrent logins.
+
         Parameters
         ----------
         do
             Function that makes the change; it blocks. Its errors are raised.
         hashes
             Whether the function hashes a password.
-
-        Raises
-        ------
-        TooManyLoginsError
-            If the function hashes a password and there are too many concurrent logins.
         """
         try:
             return await (self.work.run_hashing(do) if hashes else self.work.run(do))

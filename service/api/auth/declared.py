@@ -102,10 +102,7 @@ def declared(app: FastAPI) -> Mapping[str, Declared]:
 
     The declaration of a route overrides the declaration of its router.
 
-    Raises
-    ------
-    UndeclaredRouteError
-        If a route has no declaration, or an operation occurs twice.
+    Raises `UndeclaredRouteError` if a route has no declaration, or an operation occurs twice.
     """
     found: dict[str, Declared] = {}
     for context in iter_route_contexts(app.routes):

@@ -144,11 +144,8 @@ def caller_of(request: Request) -> Caller:
 async def require_declared(request: Request) -> None:
     """Check that the caller has the permission that the route declares; dependency of all routes.
 
-    Raises
-    ------
-    ProblemError
-        With status 401 if the caller is not authenticated; 403 if the role or units of the caller
-        are not sufficient, or if the caller must first change the password.
+    Raises `ProblemError` with status 401 if the caller is not authenticated; 403 if the role or
+    units of the caller are not sufficient, or if the caller must first change the password.
     """
     operation = f"{request.method} {request.scope['route'].path}"
     needed = request.app.declared[operation].needs

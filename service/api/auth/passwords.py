@@ -41,11 +41,8 @@ def new_password(written: str, name: str) -> str:
 
     The rules require length, but no classes of characters and no expiry (NIST SP 800-63B, 3.1.1).
 
-    Raises
-    ------
-    PasswordRefusedError
-        If the password is too short or too long, has too few different characters, or contains the
-        name of the account.
+    Raises `PasswordRefusedError` if the password is too short or too long, has too few different
+    characters, or contains the name of the account.
     """
     password = _normal(written)
     if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
@@ -145,15 +142,12 @@ class AccessThreads:
     async def run_hashing(self, work: Callable[[], T], is_known: bool = True) -> T:
         """Run a function that hashes a password in a thread; return its result.
 
+        Raises `TooManyLoginsError` if the queue is full.
+
         Parameters
         ----------
         is_known
             Whether the account has logged in from this address; it then has more queue places.
-
-        Raises
-        ------
-        TooManyLoginsError
-            If the queue is full.
         """
         places = self._places
         if not places.acquire(blocking=False):

@@ -122,17 +122,14 @@ class AccessService:
 
         Nothing changes if the current password is wrong or the attempt comes too early.
 
+        Raises `PasswordRefusedError` if the new password is rejected.
+
         Parameters
         ----------
         password, new
             Current and new password.
         peer, now_ns, ticks_ns
             Address of the client, host time (ns since 1970 UTC), and monotonic time (ns).
-
-        Raises
-        ------
-        PasswordRefusedError
-            If the new password is rejected.
         """
         account = self._checked(name, password, peer, ticks_ns)
         if isinstance(account, NotLoggedIn):
@@ -228,10 +225,8 @@ class AccessService:
     def set_up(self, token: str, name: str, password: str, now_ns: int) -> bool:
         """Create the first account, an administrator; return whether the token was valid.
 
-        Raises
-        ------
-        NameRefusedError, PasswordRefusedError
-            If the name or password is rejected; the token then remains valid.
+        Raises `NameRefusedError` or `PasswordRefusedError` if the name or password is rejected; the
+        token then remains valid.
         """
         name = account_name(name)
         password = new_password(password, name)

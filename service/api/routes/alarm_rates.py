@@ -98,6 +98,8 @@ def counted(
 
     The function takes seconds for 100,000 events: call it in a thread.
 
+    Raises `StoreError` if the events cannot be read.
+
     Parameters
     ----------
     wanted
@@ -106,11 +108,6 @@ def counted(
         Identifiers of the units to report, also of units without events.
     rule
         Definition of chattering alarms.
-
-    Raises
-    ------
-    StoreError
-        If the events cannot be read.
     """
     newest_first = store.alarm_events(replace(wanted, limit=MAX_RATED + 1))
     events = [stored.event for stored in reversed(newest_first)]

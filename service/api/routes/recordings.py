@@ -140,10 +140,7 @@ def recording_model(kept: RecordingEntry) -> RecordingModel:
 def recording_info(shelf: RecordingLibrary, kept: RecordingEntry) -> RecordingInfoModel:
     """Check the files of a recording; return the API model of its description.
 
-    Raises
-    ------
-    ConfigError
-        If the recording is damaged.
+    Raises `ConfigError` if the recording is damaged.
     """
     manifest = kept.manifest
     if manifest is None or kept.fault is not None:

@@ -71,17 +71,14 @@ def trend_groups(
 ) -> list[TrendGroup]:
     """Return the trend of each group that contains readings, in the order of states or intervals.
 
+    Raises `ProblemError` with status 422 if there are more than `MAX_GROUPS` groups.
+
     Parameters
     ----------
     by
         Quantity that determines the group of a reading.
     grid
         Grid of operating conditions, which gives the widths of the intervals.
-
-    Raises
-    ------
-    ProblemError
-        With status 422 if there are more than `MAX_GROUPS` groups.
     """
     if by == "state":
         found = _by_state(store, query)
