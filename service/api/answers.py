@@ -71,10 +71,8 @@ def tag_of(*parts: bytes) -> str:
 def is_known(tag: str, if_none_match: str | None) -> bool:
     """Whether an If-None-Match header contains an entity tag: the client has cached the answer.
 
-    Parameters
-    ----------
-    if_none_match
-        Value of the header: comma-separated entity tags, or ``*``; None without the header.
+    `if_none_match` is the value of the header: comma-separated entity tags, or ``*``; None without
+    the header.
     """
     if if_none_match is None:
         return False
@@ -102,10 +100,8 @@ def encoded(body: bytes, encoding: str) -> tuple[bytes, dict[str, str]]:
 class _Making:
     """Answer that is being made for one or several clients.
 
-    Parameters
-    ----------
-    asker
-        Common client of the store reads, which are cancelled when the last client has gone.
+    `asker` is the common client of the store reads, which are cancelled when the last client has
+    gone.
     """
 
     task: asyncio.Task[Response]

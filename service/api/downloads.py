@@ -41,12 +41,9 @@ class Downloads:
     async def download(self, pieces: Generator[bytes, None, None]) -> AsyncIterator[bytes]:
         """Return an iterator over the pieces of a download; the first piece is produced at once.
 
-        Raises `ProblemError` with status 503 if `MAX_DOWNLOADS` downloads are in progress.
-
-        Parameters
-        ----------
-        pieces
-            Generator of the pieces; may block. Its errors for the first piece are raised here.
+        `pieces` is the generator of the pieces, which may block. Its errors for the first piece are
+        raised here. Raises `ProblemError` with status 503 if `MAX_DOWNLOADS` downloads are in
+        progress.
         """
         self.require_room()
         first = await self.worked(lambda: next(pieces, b""))  # the first piece opens all files

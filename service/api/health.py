@@ -94,10 +94,7 @@ ANSWER = {
 def health_router(context: Context, requests: RequestMetrics) -> APIRouter:
     """Return the router for liveness and readiness, and for metrics if the context has them.
 
-    Parameters
-    ----------
-    requests
-        Metrics of this process, which are appended to those of the measuring process.
+    `requests` are the metrics of this process, appended to those of the measuring process.
     """
     router = APIRouter(tags=["health"])
 

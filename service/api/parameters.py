@@ -28,12 +28,8 @@ def written_as_date(text: object) -> object:
 def ns_from_datetime(moment: datetime, parameter: str) -> int:
     """Return a time in nanoseconds since 1970 UTC, clipped to the years 1 to 9999.
 
-    Raises `ProblemError` if the time has no offset from UTC.
-
-    Parameters
-    ----------
-    parameter
-        Name of the request parameter with the time, for the error.
+    `parameter` is the name of the request parameter with the time, for the error. Raises
+    `ProblemError` if the time has no offset from UTC.
     """
     if moment.tzinfo is None:
         detail = f"{parameter} requires an offset from UTC, such as a trailing Z"

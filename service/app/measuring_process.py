@@ -273,11 +273,8 @@ def counts_of(source: TimedSource) -> SourceCounts:
 def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> Mapping[str, Loop]:
     """Return the loops that report the state of units and execute operators' commands, by name.
 
-    Parameters
-    ----------
-    held
-        Function that returns the units of this process, also `PLANT` if it reports alarms without
-        a unit, `SHARED` if it runs the plant-wide tasks.
+    `held` returns the units of this process, also `PLANT` if it reports alarms without a unit,
+    `SHARED` if it runs the plant-wide tasks.
     """
     process, name = analysis.process, process_name()
     store, clock = process.store, process.clock
@@ -291,10 +288,7 @@ async def measuring_metrics(
 ) -> bytes:
     """Return all metrics of the measuring process in the Prometheus text format.
 
-    Parameters
-    ----------
-    sources
-        Timed sample sources by unit id.
+    `sources` are the timed sample sources by unit id.
     """
     try:
         receivers = await analysis.deliveries.look()

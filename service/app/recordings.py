@@ -65,12 +65,8 @@ def replay_source(
 ) -> SampleSource:
     """Return a source that replays a recording, with the calibration of the plant file.
 
+    `speed` is in seconds of the recording per second of replay; None replays as fast as it is read.
     Raises `ConfigError` if the recording is damaged or does not match the unit.
-
-    Parameters
-    ----------
-    speed
-        Seconds of the recording per second of replay; None for as fast as it is read.
     """
     recording = open_recording(folder)
     selection = replace(selection_of(recording, unit), calibration=calibration_of(unit))

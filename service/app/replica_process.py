@@ -86,10 +86,7 @@ async def run_serve(
 ) -> None:
     """Serve the API from the database until SIGINT or SIGTERM.
 
-    Parameters
-    ----------
-    listener, announce
-        Listening socket, and the function called with the URL when requests are served.
+    `listener` is the listening socket; `announce` is called with the URL when requests are served.
 
     Raises
     ------

@@ -30,10 +30,7 @@ Release = Mapping[str, str]
 def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[AuditAction]:
     """Return the audit entries of a service start; a changed configuration comes first.
 
-    Parameters
-    ----------
-    last_start
-        Audit entry of the previous start; None for the first start.
+    `last_start` is the audit entry of the previous start; None for the first start.
     """
     last = json.loads(last_start.after) if last_start and last_start.after else None
     before = last.get(CONFIGURATION) if isinstance(last, dict) else None

@@ -72,10 +72,7 @@ CAUGHT_UP = 1.0 / 3.0
 class Pressure:
     """Control that pauses recording while the analysis is behind or the disk is nearly full.
 
-    Parameters
-    ----------
-    is_full
-        Function that returns whether the disk is nearly full.
+    `is_full` returns whether the disk is nearly full.
     """
 
     def __init__(self, bus: Bus, is_full: Callable[[], bool]) -> None:

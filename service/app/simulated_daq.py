@@ -51,12 +51,8 @@ async def run_daq(servers: Mapping[str, DaqServer], print_line: Print, *, contro
     Prints lines of JSON: first the endpoint of each unit, later ``{"ended": unit}`` when the
     recording of a unit ends, and the answer to each command.
 
-    Raises `AcquisitionError` if a server cannot listen, or fails later.
-
-    Parameters
-    ----------
-    controlled
-        Whether commands are read from standard input; the end of the input then stops the DAQ.
+    With `controlled`, commands are read from standard input, and the end of the input stops the
+    DAQ. Raises `AcquisitionError` if a server cannot listen, or fails later.
     """
     stopped = stop_on_signals()
     async with AsyncExitStack() as stack:

@@ -67,13 +67,8 @@ def open_store(
 ) -> Store:
     """Open the plant's database: a SQLite file, created if missing, or PostgreSQL.
 
-    Raises `StoreError` if the database cannot be used, or contains results of another origin (live,
-    replay).
-
-    Parameters
-    ----------
-    address
-        Function that returns the recipients of the notification of an alarm event.
+    `address` returns the recipients of the notification of an alarm event. Raises `StoreError` if
+    the database cannot be used, or contains results of another origin (live, replay).
     """
     if plant.store.postgresql is None:
         return SqliteStore(database_path(plant), origin, address, plant.spectra)

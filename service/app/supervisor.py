@@ -37,10 +37,7 @@ STOPS_WITHIN_S = 5.0
 class Start:
     """Plant and options with which the serving process starts.
 
-    Parameters
-    ----------
-    is_demo
-        Whether local clients have the admin role without a login.
+    With `is_demo`, local clients have the admin role without a login.
     """
 
     plant: PlantFile

@@ -51,10 +51,7 @@ def access_desk(
 ) -> Authenticator:
     """Return the authenticator of requests; log an error if the accounts were replaced.
 
-    Parameters
-    ----------
-    is_demo
-        Whether local clients have the admin role without a login.
+    With `is_demo`, local clients have the admin role without a login.
     """
     if (difference := store.accept(clock.now_ns())) is not None:
         log.error("the database of accounts is not that of the last run", reason=difference)
@@ -69,10 +66,7 @@ def access_desk(
 def application(context: Context, evidence: EvidenceService | None = None) -> GuardedApi:
     """Return the ASGI application of API, evidence downloads and dashboard.
 
-    Parameters
-    ----------
-    evidence
-        Service for downloads of alarm evidence; None if no evidence is stored.
+    `evidence` is the service for downloads of alarm evidence; None if no evidence is stored.
     """
     app = create_app(context, [evidence_router(context, evidence)])
     app.add_middleware(StaticFiles)

@@ -88,12 +88,8 @@ class LiveUnits:
 
     Ages count from the send time of a report, by the monotonic clock of this process: the arrival
     minus the estimated delay. The clocks of the hosts need not agree, and the delay of a report by
-    the database does not reduce the ages of its values.
-
-    Parameters
-    ----------
-    ask
-        Function that asks the measuring process; None if it cannot be asked.
+    the database does not reduce the ages of its values. `ask` asks the measuring process; None if
+    it cannot be asked.
     """
 
     def __init__(
@@ -390,10 +386,7 @@ class LiveFilms:
     ) -> None:
         """Update the films of a unit from its snapshot.
 
-        Parameters
-        ----------
-        fetched
-            Baselines in force, as returned by `fetch`; None to keep those in memory.
+        `fetched` are the baselines in force, as returned by `fetch`; None keeps those in memory.
         """
         self._newest |= {(unit, bearing): news for bearing, news in state.films.items()}
         if fetched is None:

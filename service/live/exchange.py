@@ -169,10 +169,7 @@ class MeasuringEnd:
 class ServingEnd:
     """Serving process's end of the socket, which receives reports and asks questions.
 
-    Parameters
-    ----------
-    take
-        Function that receives each report of the measuring process.
+    `take` receives each report of the measuring process.
     """
 
     def __init__(

@@ -110,10 +110,7 @@ def add_films(
 ) -> None:
     """Add the number of films by verdict, and the ratio of stiffness to its expected value.
 
-    Parameters
-    ----------
-    films
-        Function that returns the newest film findings of a unit's bearing; None without findings.
+    `films` returns the newest film findings of a unit's bearing; None without findings.
     """
     families.declare(FILMS)
     for unit, its in bearings.items():

@@ -15,10 +15,7 @@ from core.units import ns_from_s
 class BlockHistory:
     """Newest blocks of a unit, without repeated blocks.
 
-    Parameters
-    ----------
-    n_samples
-        Minimum number of newest samples per channel to keep.
+    `n_samples` is the minimum number of newest samples per channel to keep.
     """
 
     def __init__(self, n_samples: int) -> None:

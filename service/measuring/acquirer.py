@@ -24,10 +24,7 @@ from service.runtime.polls import TimedSource
 class LinkNews:
     """Link state of a unit, reported after a change and after a failed attempt to connect.
 
-    Parameters
-    ----------
-    reason
-        Reason why no samples arrive; None while connected.
+    `reason` is why no samples arrive; None while connected.
     """
 
     unit: str
@@ -43,13 +40,9 @@ class LinkNews:
 class Bus:
     """Queue of sample blocks between acquisition and analysis in one process.
 
-    Publishers wait while the queue is full: the device buffers samples in its ring, and if the
-    ring overruns, the sample index shows the exact gap. The queue drops nothing.
-
-    Parameters
-    ----------
-    capacity
-        Maximum number of blocks.
+    Publishers wait while the queue is full: the device buffers samples in its ring, and if the ring
+    overruns, the sample index shows the exact gap. The queue drops nothing. `capacity` is the
+    maximum number of blocks.
     """
 
     def __init__(self, capacity: int, clock: Clock) -> None:

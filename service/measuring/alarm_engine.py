@@ -102,11 +102,8 @@ class AlarmEngine:
     ) -> None:
         """Restore stored alarms; call it before the first block.
 
-        Parameters
-        ----------
-        memories
-            States of the alarms, by unit; given only for units without missing samples since these
-            states were saved.
+        `memories` are the states of the alarms by unit, only of units without missing samples since
+        these states were saved.
         """
         now_ns, found = self._clock.now_ns(), list(alarms)
         for board in self._reported:
@@ -154,10 +151,7 @@ class AlarmEngine:
     ) -> list[AlarmNews]:
         """Update the alarms of a unit from a block and its results; return the changes of alarms.
 
-        Parameters
-        ----------
-        films
-            Judgements for the film alarms, by alarm id and direction.
+        `films` are the judgements for the film alarms, by alarm id and direction.
         """
         own = self._units[block.unit]
         news = own.take(block, assessments, self._host_ns())

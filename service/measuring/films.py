@@ -45,12 +45,8 @@ class WatchedFilms:
 class FilmMonitor:
     """Monitor of the oil films of all units.
 
-    Films are evaluated on the event loop; threads read the store and learn baselines.
-
-    Parameters
-    ----------
-    rules
-        Rules for the films of each unit, or the reason why they cannot be monitored, by unit id.
+    Films are evaluated on the event loop; threads read the store and learn baselines. `rules` are
+    the rules for the films of each unit, or the reason why they cannot be monitored, by unit id.
     """
 
     def __init__(

@@ -24,10 +24,7 @@ MAX_REPORTED = 100
 class IntegrityMonitor:
     """Monitor of damaged and missing rows, outdated copies of the database, and a missing file.
 
-    Parameters
-    ----------
-    live
-        Live view; its store error is set while the database file is missing or replaced.
+    The store error of `live` is set while the database file is missing or replaced.
 
     Attributes
     ----------

@@ -24,10 +24,7 @@ from service.store.port import UnitGap
 class LiveView:
     """Newest link state, samples and results of all units, as the analysis found them.
 
-    Parameters
-    ----------
-    stale_after_s
-        Age above which a result is no longer current, s.
+    `stale_after_s` is the age above which a result is no longer current, s.
     """
 
     def __init__(self, units: Iterable[str], clock: Clock, stale_after_s: float) -> None:

@@ -75,11 +75,8 @@ def monitor_for(source: SourceSettings, unit: Unit, settings: AnalysisSettings) 
 class WatchedUnit:
     """Sample source of a unit, and the monitor of its blocks.
 
-    Parameters
-    ----------
-    retry_s
-        Maximum wait before a lost link is reconnected: the poll period of the source, so that
-        samples arrive within two periods after the device is back.
+    `retry_s` is the maximum wait before a lost link is reconnected: the poll period of the source,
+    so that samples arrive within two periods after the device is back.
     """
 
     source: SampleSource

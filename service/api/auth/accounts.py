@@ -142,10 +142,7 @@ def account_model(account: Account) -> AccountModel:
 def refusals_as_problems(password: str = "password") -> Iterator[None]:  # noqa: S107
     """Return a context that converts errors of names, passwords and keys to `ProblemError`.
 
-    Parameters
-    ----------
-    password
-        Name of the request parameter with the new password, for the error.
+    `password` is the name of the request parameter with the new password, for the error.
     """
     try:
         yield

@@ -23,11 +23,8 @@ def is_foreign(scope: Scope, *, requires_origin: bool) -> bool:
     """Whether a request may come from a page of another origin (cross-site request forgery).
 
     Browsers send cookies with requests of pages of any site, and let these pages reach loopback.
-
-    Parameters
-    ----------
-    requires_origin
-        Whether a request without headers ``Origin`` and ``Sec-Fetch-Site`` counts as foreign.
+    With `requires_origin`, a request without headers ``Origin`` and ``Sec-Fetch-Site`` counts as
+    foreign.
     """
     headers = Headers(scope=scope)
     hosts, origins = headers.getlist("host"), headers.getlist("origin")
@@ -71,11 +68,7 @@ class Gate:
     """ASGI middleware that authenticates callers, and protects routes that are not open.
 
     It gives audit entries the client address, and records refused changes in the audit trail.
-
-    Parameters
-    ----------
-    declared
-        Function that returns the operations of the application, with their requirements, by name.
+    `declared` returns the operations of the application, with their requirements, by name.
     """
 
     def __init__(

@@ -60,11 +60,8 @@ def new_password(written: str, name: str) -> str:
 class Hashing:
     """Password hasher with a limit on the number of concurrent computations.
 
-    Parameters
-    ----------
-    hasher
-        Argon2id hasher for new hashes; default: `plant_hasher`. Stored hashes with other parameters
-        are verified too.
+    `hasher` is the argon2id hasher for new hashes, by default `plant_hasher`. Stored hashes with
+    other parameters are verified too.
     """
 
     def __init__(self, hasher: PasswordHasher | None = None) -> None:
@@ -142,12 +139,8 @@ class AccessThreads:
     async def run_hashing(self, work: Callable[[], T], is_known: bool = True) -> T:
         """Run a function that hashes a password in a thread; return its result.
 
+        If the account has logged in from this address (`is_known`), it has more queue places.
         Raises `TooManyLoginsError` if the queue is full.
-
-        Parameters
-        ----------
-        is_known
-            Whether the account has logged in from this address; it then has more queue places.
         """
         places = self._places
         if not places.acquire(blocking=False):

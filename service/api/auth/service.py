@@ -40,10 +40,7 @@ SET_UP_S = 3600.0
 class LoggedIn:
     """Result of a successful login.
 
-    Parameters
-    ----------
-    token
-        Token of the session, for the cookie; only the digest of the token is stored.
+    `token` is the token of the session, for the cookie; only the digest of the token is stored.
     """
 
     token: str = field(repr=False)
@@ -54,10 +51,8 @@ class LoggedIn:
 class NotLoggedIn:
     """Result of a failed login, the same for a wrong name and a wrong password.
 
-    Parameters
-    ----------
-    wait_s
-        Time until the next attempt is allowed, s, if this attempt came too early; otherwise 0.
+    `wait_s` is the time until the next attempt is allowed, s, if this attempt came too early;
+    otherwise 0.
     """
 
     wait_s: float = 0.0
@@ -107,10 +102,8 @@ class AccessService:
     def log_out(self, token: str, now_ns: int | None = None) -> None:
         """End the session of a token; an unknown token is ignored.
 
-        Parameters
-        ----------
-        now_ns
-            Time of the logout for the audit trail, ns since 1970 UTC; None records no logout.
+        `now_ns` is the time of the logout for the audit trail, ns since 1970 UTC; None records no
+        logout.
         """
         if is_token(token):
             self.store.sessions.end(digest(token), now_ns)
@@ -176,10 +169,7 @@ class AccessService:
     ) -> str:
         """Add an account; return the normalised login name.
 
-        Parameters
-        ----------
-        must_change
-            Whether the password must be changed at the first login.
+        With `must_change`, the password must be changed at the first login.
 
         Raises
         ------
@@ -198,10 +188,7 @@ class AccessService:
     ) -> None:
         """Change the password of an account, and end all sessions of the account.
 
-        Parameters
-        ----------
-        must_change
-            Whether the password must be changed at the next login.
+        With `must_change`, the password must be changed at the next login.
 
         Raises
         ------

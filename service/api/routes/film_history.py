@@ -115,10 +115,8 @@ Rows = npt.NDArray[np.int64]
 def rows_shown(n_found: int, max_points: int, is_thinned: bool) -> Rows:
     """Return the indices of at most `max_points` of `n_found` rows, ascending, with the newest row.
 
-    Parameters
-    ----------
-    is_thinned
-        Whether rows are selected evenly from all rows; otherwise the newest rows are selected.
+    With `is_thinned`, rows are selected evenly from all rows; otherwise the newest rows are
+    selected.
     """
     if n_found <= max_points:
         return np.arange(n_found)
@@ -130,10 +128,7 @@ def rows_shown(n_found: int, max_points: int, is_thinned: bool) -> Rows:
 def film_readings_model(query: FilmQuery, found: FilmHistory, rows: Rows) -> FilmReadingsModel:
     """Return the API model of selected readings of a film, oldest first.
 
-    Parameters
-    ----------
-    rows
-        Indices of the selected rows of the history, ascending; may be empty.
+    `rows` are the indices of the selected rows of the history, ascending; they may be empty.
     """
     history, first = found.history, int(rows[0]) if rows.size else 0
     x, y = (_series(found, direction, rows) for direction in range(2))

@@ -128,10 +128,7 @@ class Overview:
     def model(self, since: str | None) -> OverviewModel:
         """Return the API model of the overview at its newest revision.
 
-        Parameters
-        ----------
-        since
-            Revision after which units have changed, as text; None for all units.
+        `since` is the revision after which units have changed, as text; None for all units.
         """
         context, started = self._context, self._context.answers.started
         process, _, number = (since or "").partition("-")
