@@ -132,13 +132,7 @@ def problem_responses(
     """Return OpenAPI entries for the problems that an operation may return, by status.
 
     `describe_access` adds 401, 403, 503, and 404 below a unit; `EVERY_OPERATION` has 422.
-
-    Parameters
-    ----------
-    statuses
-        HTTP statuses with the default descriptions in `WORDS`.
-    own
-        Further statuses with their own descriptions.
+    `statuses` are described by `WORDS`; `own` has further statuses with their descriptions.
     """
     words = {status: WORDS[status] for status in statuses} | dict(own or {})
     return {status: _documented(text) for status, text in words.items()}

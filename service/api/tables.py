@@ -115,12 +115,8 @@ def table_response(
 ) -> StreamingResponse:
     """Return a response with a table as a CSV or Parquet file.
 
-    Parameters
-    ----------
-    name
-        Name of the file without suffix.
-    next_cursor
-        Value of the header `CURSOR_HEADER`; None omits the header.
+    `name` is the name of the file without suffix; `next_cursor` is the value of the header
+    `CURSOR_HEADER`, or None to omit the header.
     """
     pieces = csv_pieces(columns) if wanted == "csv" else iter([parquet_file(columns)])
     cursor = {} if next_cursor is None else {CURSOR_HEADER: next_cursor}

@@ -54,12 +54,8 @@ async def run_acquire(
 ) -> None:
     """Acquire and publish the samples of units until SIGINT or SIGTERM.
 
-    Parameters
-    ----------
-    units
-        Units whose devices are read, by unit id; their monitors are not used.
-    listener, announce
-        Listening socket of the health page, and the function that is called with its URL.
+    The monitors of the units are not used. `listener` is the listening socket of the health page;
+    `announce` is called with its URL.
     """
     beats, live = (
         Heartbeats(clock),

@@ -61,12 +61,8 @@ from service.store.store import Store
 class ProcessContext:
     """Context of one process: plant, store, live view and heartbeats.
 
-    Parameters
-    ----------
-    origin
-        Origin of the data in the store and in all API responses.
-    beats
-        Heartbeats of all loops of the process.
+    `origin` is that of the data in the store and in all API responses; `beats` are the heartbeats
+    of all loops of the process.
     """
 
     plant: PlantFile

@@ -97,14 +97,9 @@ class PlayedOut:
     """Source that reads a simulated DAQ, and ends when the recording that the DAQ plays ends.
 
     After the end, the DAQ still replies like a device whose converter has stopped. The wrapped
-    source then raises LinkError, which ends the blocks of this source.
-
-    Parameters
-    ----------
-    over
-        Event that is set when the DAQ has reported the end of the recording.
-    gone
-        Event that is set when the DAQ process has exited, which also ends the blocks; or None.
+    source then raises LinkError, which ends the blocks of this source. `over` is set when the DAQ
+    has reported the end of the recording; `gone`, which may be None, when the DAQ process has
+    exited, which also ends the blocks.
     """
 
     def __init__(

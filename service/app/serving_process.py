@@ -73,13 +73,8 @@ async def serve_requests(
 ) -> None:
     """Serve API and dashboard until `stopped` is set.
 
-    Parameters
-    ----------
-    loops
-        Background loops of the process by name, which run while it serves.
-    on_ready
-        Coroutine function that is called with URL and set-up token (None if an account exists)
-        when requests are accepted.
+    `loops` run while it serves, by name. `on_ready` is called with URL and set-up token (None if an
+    account exists) when requests are accepted.
     """
     app = application(context, evidence)
     server = server_of(app, plant, context.origin)

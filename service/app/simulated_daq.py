@@ -179,12 +179,8 @@ def modbus_server(
 ) -> ModbusServer:
     """Return the Modbus server of a device at the address of a source, TCP or serial line.
 
-    Parameters
-    ----------
-    clock
-        Clock that paces the device; None to produce samples as fast as they are read.
-    patient
-        Whether the device starts to produce samples at the first request.
+    `clock` paces the device; None produces samples as fast as they are read. With `patient`, the
+    device starts to produce samples at the first request.
     """
     device.on_demand = clock is None
     if source.host is not None:
@@ -198,12 +194,8 @@ def daq_of(
 ) -> DaqServer:
     """Return a simulated DAQ of the kind of a unit's source.
 
-    Parameters
-    ----------
-    clock
-        Clock that paces the device; None to produce samples as fast as they are read.
-    recorded
-        Whether the feed is a recording: the device waits for its reader, without loss.
+    `clock` paces the device; None produces samples as fast as they are read. With `recorded`, the
+    feed is a recording: the device waits for its reader, without loss.
 
     Raises
     ------

@@ -25,12 +25,8 @@ log = structlog.get_logger()
 class LiveClient:
     """Present state of all units, alarms and films, from the reports of measuring processes.
 
-    Parameters
-    ----------
-    films
-        Store from which the baselines in force are read.
-    ask
-        Function that asks the measuring process; None if it cannot be asked.
+    Baselines in force are read from the store `films`. `ask` asks the measuring process; None if it
+    cannot be asked.
     """
 
     def __init__(

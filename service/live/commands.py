@@ -255,12 +255,7 @@ class CommandFailedError(Exception):
 class Operators(ABC):
     """Sender of operators' commands to the process that analyses the unit.
 
-    Parameters
-    ----------
-    store
-        Database from which stored alarms and references are read after a command.
-    alarms
-        Alarms of this process, updated after a command.
+    Stored alarms and references are read from `store` after a command, and `alarms` are updated.
     """
 
     def __init__(self, store: Store, alarms: LiveAlarms) -> None:

@@ -136,13 +136,9 @@ class LiveUnits:
     ) -> None:
         """Apply the latest report on a unit; a report that was applied before has no effect.
 
-        Parameters
-        ----------
-        n_beats
-            Sequence number of the report in its `process`.
-        is_direct
-            Whether the report comes directly from the process, so that the age of a first report
-            is known; False if it was read from the database.
+        `n_beats` is the sequence number of the report in its `process`. With `is_direct`, the
+        report comes directly from the process, so that the age of a first report is known;
+        otherwise it was read from the database.
         """
         latest, beat = self._latest[unit], (process, n_beats)
         if latest.beat == beat:
@@ -303,12 +299,8 @@ class ReportDelays:
     def delay_s(self, process: str, sent_s: float | None, received_s: float) -> float:
         """Return the delay of a report relative to the fastest report of the process, s.
 
-        Parameters
-        ----------
-        sent_s
-            Send time by the monotonic clock of the reporting process, s; None if not reported.
-        received_s
-            Arrival time by the monotonic clock of this process, s.
+        `sent_s` is the send time by the monotonic clock of the reporting process, s, None if not
+        reported; `received_s` is the arrival time by that of this process, s.
         """
         if sent_s is None:
             return 0.0

@@ -54,12 +54,8 @@ class ReceiverStatus:
 class ReceiverView:
     """State of a receiver and its messages, for the API and the metrics.
 
-    Parameters
-    ----------
-    receiver
-        Receiver in the plant file; None if it was removed, but has messages in the outbox.
-    backlog
-        Counts of the outbox messages of the receiver; None without messages.
+    `receiver` is None if it was removed from the plant file, but has messages in the outbox.
+    `backlog` counts these messages; None without messages.
     """
 
     name: str

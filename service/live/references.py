@@ -46,12 +46,8 @@ def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
 class ReferencesInForce:
     """Gap references in force: the newest stored reference of a bearing, or its plant-file gaps.
 
-    Parameters
-    ----------
-    units
-        Descriptions of the units, with the gap references of the plant file.
-    on_change
-        Function that receives the description of a unit whose gap reference has changed.
+    `units` have the gap references of the plant file; `on_change` receives the description of a
+    unit whose gap reference has changed.
     """
 
     def __init__(

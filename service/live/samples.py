@@ -114,12 +114,8 @@ def newest_blocks(
 ) -> tuple[list[SampleBlock], int, int]:
     """Return the blocks with the newest samples, the first sample index, and the sample count.
 
-    Parameters
-    ----------
-    blocks
-        At least one block, oldest first; only blocks of the newest epoch are returned.
-    n_samples
-        Requested number of samples; the returned number is smaller if the blocks have fewer.
+    `blocks` has at least one block, oldest first; only blocks of the newest epoch are returned.
+    The returned number of samples is below `n_samples` if the blocks have fewer.
     """
     newest = blocks[-1]
     since = newest.stop_index - n_samples

@@ -183,12 +183,8 @@ class CaptureStatus:
 class EvidenceStatus:
     """State of the collection of evidence about alarms.
 
-    Parameters
-    ----------
-    pending
-        Alarm id and occurrence number of each bundle that is still to be written.
-    capturing
-        Alarm id and occurrence number of each recording that is not linked to its bundle yet.
+    `pending` has alarm id and occurrence number of each bundle that is still to be written,
+    `capturing` those of each recording that is not linked to its bundle yet.
     """
 
     pending: frozenset[tuple[str, int]] = frozenset()

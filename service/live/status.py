@@ -70,12 +70,9 @@ class UnitStatus:
 class StoredResults:
     """Results of a unit in the database.
 
-    Parameters
-    ----------
-    n_writes
-        Number of transactions with results or gaps of the unit since the start.
-    newest_ns
-        Time of the newest stored result, UTC nanoseconds since 1970; 0 before the first.
+    `n_writes` is the number of transactions with results or gaps of the unit since the start;
+    `newest_ns` is the time of the newest stored result, UTC nanoseconds since 1970, 0 before the
+    first.
     """
 
     n_writes: int = 0
@@ -108,12 +105,8 @@ class CurrentBearing:
 def why_not_current(state: LinkState, age_s: float | None, stale_after_s: float) -> Reason | None:
     """Return the reason why data of a unit are not current; None if they are current.
 
-    Parameters
-    ----------
-    age_s
-        Age of the newest data in seconds; None before the first.
-    stale_after_s
-        Age in seconds above which the data are no longer current.
+    `age_s` is the age of the newest data, s, None before the first; data older than `stale_after_s`
+    are not current.
     """
     if state not in (LinkState.CONNECTED, LinkState.ENDED):
         return Reason.NOT_CONNECTED

@@ -104,12 +104,8 @@ class CommandExecutor:
 class Questions:
     """Handler of the questions that the serving process asks the measuring process.
 
-    Parameters
-    ----------
-    integrity
-        Monitor to which the serving process reports faults of the database of accounts.
-    metrics
-        Function that returns the metrics of the measuring process in the Prometheus text format.
+    Faults of the database of accounts are reported to `integrity`. `metrics` returns the metrics of
+    the measuring process in the Prometheus text format.
     """
 
     def __init__(

@@ -67,12 +67,8 @@ HealthProbe = Callable[[], ServiceHealth]
 class StreamStatus:
     """Status of a stream of blocks.
 
-    Parameters
-    ----------
-    trouble
-        Function that returns the reason why no blocks arrive; None if they arrive.
-    behind_s
-        Function that returns the delay of the newest analysed block, s.
+    `trouble` returns the reason why no blocks arrive, None if they arrive; `behind_s` returns the
+    delay of the newest analysed block, s.
     """
 
     trouble: Callable[[], str | None]

@@ -42,12 +42,8 @@ def simulated_history(
 ) -> Mapping[str, StiffnessHistory]:
     """Return simulated past readings by bearing; empty if the unit has no simulated machine life.
 
-    Parameters
-    ----------
-    now_ns
-        End of the readings, ns since 1970 UTC, and start of the live samples of the same life.
-    years
-        Length of the readings before `now_ns`.
+    The readings cover `years` before `now_ns`, ns since 1970 UTC, the start of the live samples of
+    the same life.
 
     Raises
     ------

@@ -137,12 +137,8 @@ class SnapshotBuilder:
 class SocketReports:
     """Builder of reports for the serving process, on the changes since the previous report.
 
-    Parameters
-    ----------
-    units
-        Ids of all reported units, with `PLANT` and `SHARED`.
-    plant
-        Function that returns the state of the measuring process.
+    `units` are the ids of all reported units, with `PLANT` and `SHARED`; `plant` returns the state
+    of the measuring process.
     """
 
     def __init__(

@@ -29,12 +29,8 @@ BEARER = "bearer"
 class Credentials:
     """Credentials of a request, not yet checked.
 
-    Parameters
-    ----------
-    means
-        Kind of credentials, session or API key; None without credentials.
-    secret
-        Session token or API key; empty if it is ambiguous, as with two cookies.
+    `means` is session or API key; None without credentials. `secret` is the session token or API
+    key; it is empty if ambiguous, as with two cookies.
     """
 
     means: Means | None = None
@@ -112,12 +108,8 @@ MAX_CACHED = 4096
 class Authenticator:
     """Authenticator of callers, with coroutines that run blocking operations in threads.
 
-    Parameters
-    ----------
-    local_role
-        Role of callers on this computer without credentials; None if these callers must log in.
-    hashing, limits
-        Password hasher and maximum durations of sessions; the defaults of `AccessService` if None.
+    `local_role` is the role of callers on this computer without credentials; None if these callers
+    must log in. `hashing` and `limits` are those of `AccessService`.
     """
 
     def __init__(
@@ -176,15 +168,9 @@ class Authenticator:
     async def change(self, do: Callable[[], T], *, hashes: bool = False) -> T:
         """Change accounts, sessions or keys in a thread, and clear the cache; return the result.
 
+        The function `do` blocks, and its errors are raised. With `hashes`, it hashes a password.
         Raises `TooManyLoginsError` if the function hashes a password and there are too many
         concurrent logins.
-
-        Parameters
-        ----------
-        do
-            Function that makes the change; it blocks. Its errors are raised.
-        hashes
-            Whether the function hashes a password.
         """
         try:
             return await (self.work.run_hashing(do) if hashes else self.work.run(do))

@@ -31,12 +31,8 @@ class Reach(StrEnum):
 class Needs:
     """Requirements of a route: permission, and units for which the permission must be valid.
 
-    Parameters
-    ----------
-    permission
-        Required permission; None for an open route, which requires no login.
-    reach
-        Units that the route concerns, if its path contains no unit; default: all units.
+    `permission` is None for an open route, which requires no login. `reach` are the units that the
+    route concerns if its path contains no unit; by default all.
     """
 
     permission: Permission | None

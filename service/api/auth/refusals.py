@@ -41,14 +41,8 @@ class Refusals:
     async def note(self, operation: str, reason: str, status: int) -> None:
         """Record a refused request; above the rate limit, count it for the next entry.
 
-        If the entry cannot be stored, the error is logged and the request is counted.
-
-        Parameters
-        ----------
-        operation
-            Method and path of the request.
-        reason, status
-            Reason in the answer, and its HTTP status.
+        If the entry cannot be stored, the error is logged and the request is counted. `operation`
+        is method and path of the request; `reason` and `status` are those of its answer.
         """
         if not self._allowance.take(self._clock.monotonic_s()):
             self.n_more += 1

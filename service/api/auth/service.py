@@ -61,12 +61,8 @@ class NotLoggedIn:
 class AccessService:
     """Service for logins, accounts and API keys; its methods block while the store is used.
 
-    Parameters
-    ----------
-    hashing
-        Password hasher; default: argon2id with the current parameters.
-    limits
-        Maximum durations of sessions; default values if None.
+    `hashing` is the password hasher, by default argon2id with the current parameters; `limits` are
+    the maximum durations of sessions.
     """
 
     def __init__(
@@ -227,12 +223,8 @@ class AccessService:
     ) -> tuple[ApiKey, str]:
         """Create an API key; return the stored record and the complete key, which is not stored.
 
-        Parameters
-        ----------
-        units
-            Units for which the key is valid; empty for all units.
-        days
-            Validity period, days.
+        `units` are the units for which the key is valid, empty for all units; `days` is the
+        validity period of the key, days.
 
         Raises
         ------

@@ -112,12 +112,8 @@ def read_page(
 ) -> tuple[Page, str | None]:
     """Return one page of the entries of all chains, newest first, and the cursor of the next page.
 
-    Parameters
-    ----------
-    query
-        Query for the entries of each chain; its limit is that of the page.
-    before
-        Entry number by chain; the page has only entries with smaller numbers.
+    `query` selects entries of each chain, and its limit is that of the page. `before` is an entry
+    number by chain; the page has only entries with smaller numbers.
     """
     found = {}
     for name, audit in chains.items():

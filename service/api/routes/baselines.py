@@ -57,12 +57,8 @@ def version_model(
 ) -> BaselineVersionModel:
     """Return the API model of a baseline version.
 
-    Parameters
-    ----------
-    versions
-        Version in force and rejected versions, after all steps.
-    steps
-        Steps in the history of all baselines of the bearing.
+    `versions` are those in force and rejected after all steps; `steps` are all steps in the history
+    of the baselines of the bearing.
     """
     own = [step for step in steps if step.version == entry.version]
     reasons = (step.reason for step in own if step.step is BaselineStep.LEARNED)

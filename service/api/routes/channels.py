@@ -220,12 +220,8 @@ def waveform_model(
 ) -> WaveformModel:
     """Return the API model of the samples in a window.
 
-    Parameters
-    ----------
-    channels
-        Identifiers of the channels in the window, at least one.
-    received_ns
-        Arrival time of the newest sample, UTC nanoseconds since 1970.
+    `channels` are the identifiers of the channels in the window, at least one; `received_ns` is the
+    arrival time of the newest sample, UTC nanoseconds since 1970.
     """
     units = {each.id: UNITS[each.measurand] for each in settings.channel}
     return WaveformModel.of(

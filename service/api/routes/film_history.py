@@ -209,12 +209,7 @@ CONDITION = (
 def film_table(model: FilmReadingsModel, found: FilmHistory, rows: list[int]) -> list[Column]:
     """Return the readings of a film as table columns.
 
-    Parameters
-    ----------
-    model
-        API model of the readings.
-    found, rows
-        History of the film, and the indices of its rows that the model contains.
+    `rows` are the indices of the rows of the history `found` that the model contains.
     """
     times = found.history.time_ns[rows].tolist()
     return [

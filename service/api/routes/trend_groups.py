@@ -26,12 +26,8 @@ BIN_TOLERANCE = 1e-9
 class TrendGroup:
     """Trend of the readings in one operating state, or one interval of the grouping quantity.
 
-    Parameters
-    ----------
-    name
-        Operating state, or bounds of the interval such as "0.35 to 0.4".
-    low, high
-        Bounds of the interval, in eccentricity ratio or °C; None for operating states.
+    `name` is the operating state, or the bounds of the interval such as "0.35 to 0.4"; `low` and
+    `high` are these bounds, in eccentricity ratio or °C, and None for operating states.
     """
 
     name: str
@@ -71,14 +67,9 @@ def trend_groups(
 ) -> list[TrendGroup]:
     """Return the trend of each group that contains readings, in the order of states or intervals.
 
-    Raises `ProblemError` with status 422 if there are more than `MAX_GROUPS` groups.
-
-    Parameters
-    ----------
-    by
-        Quantity that determines the group of a reading.
-    grid
-        Grid of operating conditions, which gives the widths of the intervals.
+    `by` is the quantity that determines the group of a reading; the grid of operating conditions
+    gives the widths of the intervals. Raises `ProblemError` with status 422 if there are more than
+    `MAX_GROUPS` groups.
     """
     if by == "state":
         found = _by_state(store, query)
