@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
+from functools import cache
 from operator import attrgetter
 
 
@@ -59,11 +60,13 @@ class Quality:
 GOOD = Quality(Level.GOOD, Reason.OK)
 
 
+@cache
 def uncertain(reason: Reason) -> Quality:
     """Return the quality of a doubtful value that may be shown."""
     return Quality(Level.UNCERTAIN, reason)
 
 
+@cache
 def bad(reason: Reason) -> Quality:
     """Return the quality of a value that must not be shown."""
     return Quality(Level.BAD, reason)
@@ -108,6 +111,7 @@ class Reading:
             raise ValueError(f"a reading of {level} quality cannot have the value {self.value}")
 
 
+@cache
 def missing(reason: Reason) -> Reading:
     """Return a bad reading without a value; `reason` states why the value is missing."""
     return Reading(None, bad(reason))

@@ -6,7 +6,7 @@ pymodbus is used for the simulated devices only; decision record 31 states the r
 import asyncio
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
-from itertools import count, repeat
+from itertools import chain, repeat
 
 from acquisition.delivery.network import KnownAddresses
 from acquisition.errors import ConfigError, FrameError, LinkError
@@ -79,7 +79,7 @@ class ModbusClient:
         self._settings = settings
         self._protocol = ReplyProtocol(settings.transport)
         self._addresses: KnownAddresses | None = None
-        self._transactions = (1 + n % _N_TRANSACTIONS for n in count())
+        self._transactions = chain.from_iterable(repeat(range(1, _N_TRANSACTIONS + 1)))
         self._n_interrupted = 0
         self._has_answered_several = False
         self.requests_in_flight = settings.requests_in_flight

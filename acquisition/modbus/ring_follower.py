@@ -98,13 +98,15 @@ class RingReader:
         return slot_records(await self._client.read_spans(spans), layout)
 
     def _slot_spans(self, layout: RingLayout, sequences: Sequence[int]) -> list[Span]:
-        spans: list[Span] = []
-        for sequence in sequences:
-            start, count = layout.slot_address(sequence), layout.slot_registers
-            if spans and spans[-1].stop == start:  # no padding between slots
-                start, count = spans[-1].address, spans.pop().count + count
-            spans.append(Span(start, count, self._header.function))
-        return spans
+        n_registers, starts, stops = layout.slot_registers, [], [-1]
+        for start in map(layout.slot_address, sequences):
+            if start == stops[-1]:  # no padding between slots
+                stops.pop()
+            else:
+                starts.append(start)
+            stops.append(start + n_registers)
+        function = self._header.function
+        return [Span(a, b - a, function) for a, b in zip(starts, stops[1:], strict=True)]
 
 
 _N_REREADS = 3

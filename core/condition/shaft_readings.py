@@ -133,7 +133,7 @@ def _gap(
     rows = [row for row, c in enumerate(unit.channels) if c.id == channel]
     if not rows or unit.channels[rows[0]].measurand is not Measurand.GAP_UM:
         return missing(Reason.NOT_MEASURED), np.empty(0)
-    gaps = [segment.reading(rows, float(segment.mean[rows[0]])) for segment in segments]
+    gaps = [segment.means[rows[0]] for segment in segments]
     mean = current_mean(gaps, is_grazed=segments[-1].is_grazed(rows[0]))
     return mean, numbers(gaps)
 

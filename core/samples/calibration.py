@@ -1,5 +1,6 @@
 """Calibration of one unit's device: conversion of counts to engineering units."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -64,7 +65,7 @@ class SlowCalibration:
 
     def reading(self, value: float) -> Reading:
         """Return a value of the channel as a reading; bad if not finite or out of range."""
-        if not np.isfinite(value):
+        if not math.isfinite(value):
             return missing(Reason.NOT_MEASURED)
         if not self.minimum <= value <= self.maximum:
             return missing(Reason.OUT_OF_RANGE)

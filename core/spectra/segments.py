@@ -133,6 +133,11 @@ class Segment:
         return uncertain(Reason.CLIPPED) if self.is_grazed(row) else self.order_quality[line][row]
 
     @cached_property
+    def means(self) -> tuple[Reading, ...]:
+        """Mean of each channel in its unit, in channel order; bad if the channel is."""
+        return self._of_channels(self.mean)
+
+    @cached_property
     def spans_um_pp(self) -> tuple[Reading, ...]:
         """Broad-band peak-to-peak displacement, in µm, of each channel; bad if not measured."""
         return self._of_channels(None if self.overall is None else self.overall.peak_to_peak_um)

@@ -42,7 +42,7 @@ from service.store.store import Store
 
 log = structlog.get_logger()
 
-TICK_S = 0.5
+TICK_S = 1.0
 
 WITHOUT_LINK = (LINK_LOST, MESSAGES_REFUSED)
 """Alarm kinds whose conditions are known even while no samples arrive."""
