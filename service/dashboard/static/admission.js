@@ -1,7 +1,7 @@
 /** Which page opens for an address, by login and permissions. */
 
 import { NO_PAGE, PAGES } from "./pages.js";
-import { forbiddenPage } from "./pages/forbidden.js";
+import { forbiddenPage } from "./pages/no_page.js";
 import { loginPage } from "./pages/login.js";
 import { passwordPage } from "./pages/password.js";
 import { setUpPage } from "./pages/set_up.js";

@@ -159,7 +159,7 @@ export function countWords(count) {
   const parts = [];
   if (active !== danger) parts.push(`${active} ${active === 1 ? "alarm" : "alarms"}`);
   if (danger) parts.push(`${danger} danger`);
-  if (unseen) parts.push(`${unseen} not acknowledged`);
+  if (unseen) parts.push(`${unseen} unacknowledged`);
   if (!active && !unseen) parts.push("No alarms");
   if (unjudged) parts.push(`${unjudged} not judged`);
   const look = danger ? "danger" : active ? "alert" : "quiet";

@@ -47,6 +47,12 @@ export async function ask(path, query = [], signal = undefined) {
   return body;
 }
 
+/** Readings of the film of a bearing, from `spanS` seconds before `endMs` until then. */
+export function askReadings(path, endMs, spanS, maxPoints, signal) {
+  const range = [["start", new Date(endMs - spanS * 1000).toISOString()], ["end", new Date(endMs).toISOString()]];
+  return ask([...path, "film", "readings"], [...range, ["max_points", String(maxPoints)]], signal);
+}
+
 /** Ask `/api/v1` to do something; `body` is sent as JSON. Null where there is nothing to answer. */
 export async function tell(path, body, method = "POST") {
   const headers = body === undefined ? JSON_ONLY : { ...JSON_ONLY, "Content-Type": "application/json" };

@@ -21,7 +21,7 @@ import { passwordPage } from "./pages/password.js";
 import { recordingsPage } from "./pages/recordings.js";
 import { sourcesPage } from "./pages/sources.js";
 import { unitPage } from "./pages/unit.js";
-import { unknownPage } from "./pages/unknown.js";
+import { unknownPage } from "./pages/no_page.js";
 import { waterfallPage } from "./pages/waterfall.js";
 
 export const PAGES = [

@@ -39,11 +39,11 @@ async def test_an_alarm_is_acknowledged_shelved_and_unshelved_by_keys(plant, pag
     await expect(row).to_contain_text("Link lost")
     await expect(row.locator(".mark")).to_have_text("Alert")
     head = page.locator("#alarms .mark")
-    await expect(head).to_contain_text("1 alarm, 1 not acknowledged")
+    await expect(head).to_contain_text("1 alarm, 1 unacknowledged")
     await expect(head).to_have_attribute("data-look", "alert")
     await expect(page.locator(".unjudged summary")).to_contain_text("cannot be evaluated now")
     await page.keyboard.press("Tab")
-    await expect(page.get_by_text("Skip to the numbers")).to_be_focused()
+    await expect(page.get_by_text("Skip navigation")).to_be_focused()
     await page.keyboard.press("Enter")
     await page.keyboard.press("Tab")
     assert await page.evaluate(IN_MAIN)
@@ -180,12 +180,12 @@ async def test_what_has_not_changed_is_not_sent_again_and_stays_on_the_page(plan
     async with page.expect_response(is_nothing_new):
         await expect(page.locator(LINK)).to_be_visible()
     await expect(page.locator(".alarms-head .mark")).to_be_hidden()
-    await expect(page.locator("#service")).to_contain_text("Service answered")
+    await expect(page.locator("#service")).to_contain_text("Connected")
 
 
 async def test_a_page_from_before_an_upgrade_says_so_and_loads_the_new_one(plant, page):
     await page.goto(plant.url)
-    await expect(page.locator("#service")).to_contain_text("Service answered")
+    await expect(page.locator("#service")).to_contain_text("Connected")
     await expect(page.locator("#upgrade")).to_be_hidden()
 
     async def of_a_later_service(route: Route) -> None:
@@ -197,5 +197,5 @@ async def test_a_page_from_before_an_upgrade_says_so_and_loads_the_new_one(plant
     await expect(page.get_by_text("has been upgraded")).to_be_visible()
     await page.unroute("**/api/v1/overview*")
     await page.get_by_role("button", name="Reload the page").click()
-    await expect(page.locator("#service")).to_contain_text("Service answered")
+    await expect(page.locator("#service")).to_contain_text("Connected")
     await expect(page.locator("#upgrade")).to_be_hidden()

@@ -55,7 +55,7 @@ async def addresses(page: Page, url: str) -> list[str]:
 async def open_settled(page: Page, address: str) -> None:
     """Open a page and wait until it has had the answers that it opens with."""
     await page.goto(address)
-    await expect(page.locator("#service")).to_contain_text("Service answered")
+    await expect(page.locator("#service")).to_contain_text("Connected")
     await expect(page.locator("#main").get_by_role("heading").first).to_be_attached()
     waiting = page.locator("#main").get_by_text(WAITING).filter(visible=True)
     await expect(waiting).to_have_count(0)
@@ -136,6 +136,7 @@ async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembe
     await page.emulate_media(color_scheme="dark")
     await page.goto(plant.url + BEARING)
     dark = await page.evaluate(BAND)
+    await page.get_by_text("Settings", exact=True).click()
     await page.get_by_label("Theme").select_option("light")
     light = await page.evaluate(BAND)
     assert light != dark
@@ -145,6 +146,7 @@ async def test_the_look_follows_the_system_until_somebody_chooses_and_is_remembe
     await expect(grid).to_be_attached()
     stroke = "node => node.style.stroke"
     drawn = await grid.evaluate(stroke)
+    await page.get_by_text("Settings", exact=True).click()
     await page.get_by_label("Theme").select_option("system")
     assert await page.evaluate(BAND) == dark
     await page.wait_for_function(REDRAWN, arg=drawn)
@@ -155,6 +157,7 @@ async def test_amplitudes_are_shown_zero_to_peak_or_twice_that_as_chosen(plant, 
     await page.goto(plant.url + BEARING)
     shaft = page.locator("[data-reading=order1_shaft_x_um_pk]")
     before = await number_with(shaft, "µm pk")
+    await page.get_by_text("Settings", exact=True).click()
     await page.get_by_label("Amplitudes").select_option("pp")
     after = await number_with(shaft, "µm pk-pk")
     assert after / before == pytest.approx(2.0, rel=0.1)  # the machine lives on in between

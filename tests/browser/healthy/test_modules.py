@@ -196,7 +196,7 @@ async def test_the_first_screen_needs_two_scripts_and_no_chart_library(plant, pa
 
     page.on("request", note)
     await page.goto(plant.url)
-    await expect(page.locator("#service")).to_contain_text("Service answered")
+    await expect(page.locator("#service")).to_contain_text("Connected")
     assert sorted(asked) == ["all.css", "all.js", "recover.js"]
 
 
@@ -210,7 +210,7 @@ async def test_a_page_whose_script_did_not_load_loads_itself_again(plant, page):
     await page.route("**/all.js", fail, times=1)
     await page.goto(plant.url)
 
-    await expect(page.locator("#service")).to_contain_text("Service answered")
+    await expect(page.locator("#service")).to_contain_text("Connected")
     assert len(failed) == 1
 
 
@@ -239,6 +239,6 @@ async def test_browsers_that_open_the_page_at_once_all_show_it(plant, browser):
     for page in pages:
         await page.goto(plant.url, wait_until="commit")
     for page in pages:
-        await expect(page.locator("#service")).to_contain_text("Service answered")
+        await expect(page.locator("#service")).to_contain_text("Connected")
     for context in contexts:
         await context.close()

@@ -110,7 +110,7 @@ ALARM |= {"id": "U2:LJB:film_stiffness", "kind": "film_stiffness", "directions":
 ALARM |= {"is_acknowledged": False, "condition": "active", "value_unit": "%", "limit": -3.5}
 ALARMS = {"alarms": [ALARM], "unjudged": []}
 MAX_WORDS = 150
-COUNT_WORDS = "document.querySelector('#main').innerText.split(/\\s+/).filter(Boolean).length"
+COUNT_WORDS = "document.body.innerText.split(/\\s+/).filter(Boolean).length"
 LOOKS = "marks => marks.map((mark) => mark.dataset.look)"
 
 
@@ -125,9 +125,14 @@ async def test_the_first_screen_says_which_bearing_is_unwell_by_how_much_since_w
     for shown in (page, phone_page):
         overview = await freeze(shown, plant.url, has_stiffness)
         other = copy.deepcopy(overview["units"][0]) | {"id": "U2", "name": "Unit 2"}
+        overview["units"].append(other)
+        await shown.goto(plant.url)
+        await expect(
+            shown.locator("[data-unit=U2] [data-bearing=LJB] .film-brief")
+        ).to_contain_text(WORDS)
+        assert await shown.evaluate(COUNT_WORDS) <= MAX_WORDS
         film = other["bearings"][1]["film"]
         film |= {"x": film["x"] | UNWELL, "y": film["y"] | UNWELL}
-        overview["units"].append(other)
         await shown.route("**/api/v1/alarms", lambda route: route.fulfill(json=ALARMS))
         await shown.goto(plant.url)
         row = shown.locator("[data-unit=U2] [data-bearing=LJB]")

@@ -8,6 +8,11 @@ import { onTheme } from "../theme.js";
 import { plotly } from "./plotly.js";
 import { CONFIG, coloured } from "./style.js";
 
+let queue = Promise.resolve();
+
+/** Resolves when it is the turn of a chart: each is painted before the next one is made. */
+const turn = () => (queue = queue.then(() => new Promise((resolve) => setTimeout(resolve))));
+
 /** Returns `{ node, show(traces, layout, caption), explain(sentence), trouble(sentence), fail(failure), draw(ageS, currentWords) }`. */
 export function panel(title, name, ...controls) {
   const chart = element("div", { class: "chart", hidden: "" });
@@ -45,6 +50,7 @@ export function panel(title, name, ...controls) {
     },
     async show(traces, layout, words) {
       const library = await plotly();
+      await turn();
       reveal(chart, sentence, foot, true);
       chart.setAttribute("role", "img");
       chart.setAttribute("aria-label", `${title}. ${words}`);

@@ -1,4 +1,4 @@
-/** The chart library, loaded when the first chart needs it and tried again if that failed. */
+/** The chart library, loaded when the first chart needs it, after the numbers, and tried again if that failed. */
 
 import { LIBRARIES } from "../libraries.js";
 
@@ -6,11 +6,16 @@ let library = null;
 
 /** Resolves to Plotly; rejects when its file cannot be had now. */
 export function plotly() {
-  library ??= loaded().catch((failure) => {
+  library ??= painted().then(loaded).catch((failure) => {
     library = null;
     throw failure;
   });
   return library;
+}
+
+/** Resolves once the page as it is now has been painted: running the library takes half a second. */
+function painted() {
+  return new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve)));
 }
 
 function loaded() {

@@ -1,8 +1,8 @@
 /** Change of the stiffness of a film against time, with its limits. */
 
+import { askReadings } from "../api.js";
 import { panel } from "../charts/panel.js";
 import { X_COLOUR, Y_COLOUR, axis, baseLayout } from "../charts/style.js";
-import { askReadings } from "../film_readings.js";
 import { limitWords } from "../film_words.js";
 import { formatTime } from "../format.js";
 import { choice } from "../parts/choice.js";

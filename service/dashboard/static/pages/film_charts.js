@@ -1,10 +1,10 @@
 /** The baseline map, and stiffness against the condition that it was read under. */
 
+import { askReadings } from "../api.js";
 import { cellsOf, mapCaption, mapLayout, mapTraces } from "../charts/baseline_map.js";
 import { AXES, conditionCaption, conditionLayout, conditionTraces, pointsOf } from "../charts/condition.js";
 import { panel } from "../charts/panel.js";
 import { element } from "../dom.js";
-import { askReadings } from "../film_readings.js";
 import { learningSentence } from "../film_words.js";
 import { choice } from "../parts/choice.js";
 import { poll } from "../poll.js";

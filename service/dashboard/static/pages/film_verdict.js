@@ -11,10 +11,8 @@ export function verdictPanel(link = "") {
   const sentence = element("p", { class: "sentence", role: "status" }, "Asking the service.");
   const rows = ["x", "y"].map(directionRow);
   const facts = element("p", { class: "film-facts" });
-  const [limits, condition] = [element("span"), element("span")];
-  const compared = element("span");
-  const due = element("span");
-  facts.append(limits, condition, compared, due);
+  const [cause, limits, condition, compared, due] = Array.from({ length: 5 }, () => element("span"));
+  facts.append(cause, limits, condition, compared, due);
   const verdicts = element("div", { class: "verdicts", hidden: "" }, ...rows.map((row) => row.node));
   const head = element("div", { class: "panel-head" }, element("h2", {}, "Film against its baseline"), link);
   facts.hidden = true;
@@ -25,8 +23,10 @@ export function verdictPanel(link = "") {
       sentence.hidden = film.is_watched;
       setText(sentence, film.is_watched ? "" : `This film is not watched: ${film.why_not}.`);
       if (!film.is_watched) return;
-      rows[0].draw(film.x, film.limits);
-      rows[1].draw(film.y, film.limits);
+      const causes = [film.x, film.y].map((one) => causeSentence(one.cause));
+      const isShared = causes[0] === causes[1]; // then it is said once
+      setText(cause, isShared ? causes[0] : "");
+      rows.forEach((row, n) => row.draw(film["xy"[n]], film.limits, isShared ? "" : causes[n]));
       setText(limits, `${limitWords(film.limits)}.`);
       setText(condition, conditionWords(film.condition));
       setText(compared, comparedWords(film));
@@ -46,12 +46,12 @@ function directionRow(direction) {
   const said = element("span", { class: "said" });
   return {
     node: element("div", { class: "verdict", "data-direction": direction }, element("span", { class: "axis" }, direction), verdict.node, element("span", {}, change, " ", said)),
-    draw(found, limits) {
+    draw(found, limits, cause) {
       const now = { ...found, deviation_percent: found.deviation?.percent ?? null };
       const onlyDamped = found.level === null && found.damping.level !== null;
       verdict.draw(...(onlyDamped ? [found.damping.level, "c/k changed"] : verdictMark(now, limits)));
       setText(change, nowSentence(now));
-      setText(said, [whyUnjudged(found), changeSentence(found), pendingSentence(found, limits), causeSentence(found.cause), dampingSentences(found.damping)].filter(Boolean).join(" "));
+      setText(said, [whyUnjudged(found), changeSentence(found), pendingSentence(found, limits), cause, dampingSentences(found.damping)].filter(Boolean).join(" "));
     },
   };
 }

@@ -1,7 +1,7 @@
 /** The plant at a glance: every unit, every bearing, verdicts on top. */
 
+import { askReadings } from "../api.js";
 import { element, setText } from "../dom.js";
-import { askReadings } from "../film_readings.js";
 import { alarmsToAcknowledge } from "../parts/alarm_brief.js";
 import { mark } from "../parts/mark.js";
 import { openAlarms } from "../parts/unit_alarm_mark.js";
@@ -22,7 +22,7 @@ export function overviewPage(main) {
   const summary = element("p", { class: "summary" });
   const units = element("div");
   const unseen = alarmsToAcknowledge();
-  main.append(element("h1", { class: "hidden" }, "Plant overview"), summary, element("p", { class: "help", hidden: "" }, TILE_LEGEND), units, unseen.node);
+  main.append(element("h1", { class: "hidden" }, "Plant"), summary, element("p", { class: "help", hidden: "" }, TILE_LEGEND), units, unseen.node);
   const tally = tallyView(summary);
   const alarms = openAlarms();
   const histories = new Map();
@@ -41,7 +41,7 @@ export function overviewPage(main) {
   function build(view) {
     const isLarge = view.units.length > N_CARDS;
     const viewOf = isLarge ? unitTile : unitCard;
-    drawn = view.units.map((unit) => viewOf(unit, alarms.markOf(unit.id)));
+    drawn = view.units.map((unit, n) => viewOf(unit, alarms.markOf(unit.id), n === 0));
     units.className = isLarge ? "unit-tiles" : "units";
     units.replaceChildren(...drawn.map((one) => one.node));
     summary.nextSibling.hidden = !isLarge;

@@ -5,14 +5,14 @@ import { element, setText } from "../dom.js";
 import { formatAge } from "../format.js";
 import { CURRENT_LIMIT_S, ageAt, moment, secondsBetween } from "../live.js";
 import { listing } from "../parts/listing.js";
-import { losses } from "../parts/losses.js";
 import { mark } from "../parts/mark.js";
 import { poll } from "../poll.js";
 import { serviceTimeMs } from "../server_time.js";
-import { isAboutSamples, troubleOf } from "../source_words.js";
+import { isAboutSamples, rejected, troubleOf } from "../source_words.js";
 import { HEADS, sourceRow } from "./source_row.js";
 
 const PERIOD_S = 2;
+const LOSS_SPAN_MS = 60_000;
 
 const READING_HELP =
   "Samples are counted per channel since the service started; what is missing never arrived, what is rejected arrived and could not be used. " +
@@ -87,4 +87,18 @@ function countSentence(judged) {
   const connected = judged.filter(({ source }) => source.state === "connected").length;
   const rest = wrong === 0 ? "Nothing is wrong with any of them." : `Something is wrong with ${wrong}: see ${wrong === 1 ? "the first line" : "the first lines"}.`;
   return `${connected} of ${judged.length} connected. ${rest}`;
+}
+
+/** Returns `{ of(source) }`: samples missing or rejected in the last minute that this page has seen; counts are since the start. */
+function losses() {
+  const seen = new Map();
+  return {
+    of(source) {
+      const now = performance.now();
+      const count = source.n_gap + rejected(source);
+      const earlier = (seen.get(source.unit) ?? []).filter(({ at, total }) => at >= now - LOSS_SPAN_MS && total <= count);
+      seen.set(source.unit, [...earlier, { at: now, total: count }]);
+      return earlier.length ? count - earlier[0].total : 0;
+    },
+  };
 }

@@ -25,10 +25,14 @@ const HEADS = [
 const STIFFNESS = ["stiffness_xx_n_per_m", "stiffness_yy_n_per_m"];
 const NO_SPREAD = () => null;
 
-/** Returns `{ node, draw(unit, alarmsOf, historyOf) }`; `alarm` is the unit's mark of open alarms. */
-export function unitCard(unit, alarm) {
+/**
+ * Returns `{ node, draw(unit, alarmsOf, historyOf) }`.
+ *
+ * `alarm` is the unit's mark of open alarms. The heads of columns are shown for the first unit and read out for each.
+ */
+export function unitCard(unit, alarm, isFirst) {
   const rows = unit.bearings.map((one) => bearingRow(unit.id, one));
-  const heads = HEADS.map(([words, of]) => [words, " ", element("small", {}, of)]);
+  const heads = HEADS.map(([words, of]) => (isFirst ? [words, " ", element("small", {}, of)] : element("span", { role: "img", "aria-label": `${words} ${of}` })));
   const table = tableOf(`Bearings of ${unit.name}`, heads, ...rows.map((row) => row.node));
   const head = unitTitle(unit, alarm, "unit-head");
   const node = element("section", { class: "unit-card", "data-unit": unit.id }, head.node, table);

@@ -26,7 +26,7 @@ export const unitAlarms = (unit) => alarmBrief("Open alarms", (alarm) => isAbout
 export const bearingAlarms = (unit, bearing) => alarmBrief("Open alarms", (alarm) => alarm.unit === unit && alarm.subject === bearing);
 
 /** The unacknowledged alarms of the plant, by name only; hidden if there are none. */
-export const alarmsToAcknowledge = () => alarmBrief("Not acknowledged", (alarm) => !alarm.is_acknowledged, null, true);
+export const alarmsToAcknowledge = () => alarmBrief("Unacknowledged", (alarm) => !alarm.is_acknowledged, null, true);
 
 function alarmBrief(title, isMine, sentenceOf = null, isShort = false) {
   const sentence = element("p", { class: "sentence", role: "status" }, "Asking the service.");

@@ -11,7 +11,8 @@ export function navigation(pages) {
   const list = element("ul", {}, ...links.map(([, link]) => element("li", {}, link)));
   const look = select("Theme", THEMES, theme(), chooseTheme);
   const amplitude = select("Amplitudes", AMPLITUDES, amplitudes(), chooseAmplitudes);
-  const node = element("div", { id: "menu", class: "menu" }, element("nav", { "aria-label": "Pages" }, list), look, amplitude);
+  const settings = element("details", { class: "settings" }, element("summary", {}, "Settings"), look, amplitude);
+  const node = element("div", { id: "menu", class: "menu" }, element("nav", { "aria-label": "Pages" }, list), settings);
   const isOpen = () => opener.getAttribute("aria-expanded") === "true";
   const opener = button("Menu", () => unfold(!isOpen()), { class: "menu-button", "aria-expanded": "false", "aria-controls": "menu" });
   const unfold = (open) => setAttribute(opener, "aria-expanded", String(open));
