@@ -9,10 +9,16 @@ file has the tables of accounts, sessions and keys, the other file has the table
 file has its own audit trail.
 """
 
+import sqlite3
+from collections.abc import Iterable
+from contextlib import closing
+from functools import cache
+
 from service.store.access.schema import ACCESS_TABLES
 from service.store.audit import AUDIT_TABLES
 from service.store.films import FILM_TABLES
 from service.store.outbox import OUTBOX_TABLES
+from service.store.port import StoreError
 from service.store.references import VECTOR_REFERENCE_TABLES
 from service.store.retention import RETENTION_TABLES
 from service.store.rollups.rows import ROLLUP_TABLES
@@ -169,3 +175,42 @@ def migration_of(number: int, *, is_access: bool) -> str:
     """
     script = MIGRATIONS[number]
     return script if script == AUDIT_TABLES or (script == ACCESS_TABLES) == is_access else ""
+
+
+COLUMNS = (
+    "SELECT tables.name, columns.name"
+    " FROM sqlite_master AS tables, pragma_table_info(tables.name) AS columns"
+    " WHERE tables.type = 'table' AND tables.name NOT LIKE 'sqlite_%'"
+)
+"""Query for the table and the name of each column of a SQLite file."""
+
+
+def require_columns(found: Iterable[tuple[str, str]], scripts: tuple[str, ...], name: str) -> None:
+    """Check that a migrated database has all columns: a developer may have edited a migration.
+
+    Parameters
+    ----------
+    found
+        Table and name of each column of the database.
+    scripts
+        All migrations of the database.
+    name
+        Name of the database in the message.
+
+    Raises
+    ------
+    StoreError
+        If a column is missing.
+    """
+    for table, column in sorted(_columns_after(scripts).difference(found)):
+        raise StoreError(
+            f"{name} was written by another version of padwatch (its table {table} has no column"
+            f" {column}); run that version, or choose an empty data folder or database"
+        )
+
+
+@cache
+def _columns_after(scripts: tuple[str, ...]) -> frozenset[tuple[str, str]]:
+    with closing(sqlite3.connect(":memory:")) as connection:
+        connection.executescript("".join(scripts))
+        return frozenset(connection.execute(COLUMNS))

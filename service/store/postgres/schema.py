@@ -129,6 +129,12 @@ N_TABLES = """
 """
 
 
+COLUMNS = """
+    SELECT table_name, column_name FROM information_schema.columns
+    WHERE table_schema = current_schema()
+"""
+
+
 def migrate(session: Session, where: str, origin: Origin) -> None:
     """Migrate a database to the current schema in one transaction, under an advisory lock.
 
@@ -137,7 +143,7 @@ def migrate(session: Session, where: str, origin: Origin) -> None:
     Raises
     ------
     StoreError
-        If the database belongs to another program or a newer padwatch, or has another origin.
+        If the database belongs to another program or another padwatch, or has another origin.
     """
     with session.transaction():
         session.execute("SELECT pg_advisory_xact_lock(%s)", (MIGRATING,))
@@ -153,6 +159,7 @@ def migrate(session: Session, where: str, origin: Origin) -> None:
                 session.execute(statement.encode())
         if before < newest:
             session.execute("UPDATE padwatch SET schema_number = %s", (newest,))
+        schema.require_columns(session.execute(COLUMNS).fetchall(), schema.MIGRATIONS, where)
         if before == 0 and session.execute(HAS_TIMESCALE).fetchone():
             session.execute(HYPERTABLE)
 

@@ -29,7 +29,7 @@ def migrate(connection: sqlite3.Connection, name: str, origin: Origin | None = O
     Raises
     ------
     StoreError
-        If the file belongs to another program or a newer padwatch, or has another origin.
+        If the file belongs to another program or another padwatch, or has another origin.
     """
     connection.execute("BEGIN")  # consistent values: another process may be migrating
     n_tables = int(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
@@ -45,9 +45,12 @@ def migrate(connection: sqlite3.Connection, name: str, origin: Origin | None = O
             f"{name} has schema {version}, this padwatch supports up to {len(schema.MIGRATIONS)};"
             " run the padwatch that wrote it, or restore a backup"
         )
-    for number in range(version, len(schema.MIGRATIONS)):
-        if script := schema.migration_of(number, is_access=origin is None):
-            _step(connection, number, script, application_id_of(origin))
+    numbers = range(len(schema.MIGRATIONS))
+    scripts = [schema.migration_of(number, is_access=origin is None) for number in numbers]
+    for number in numbers[version:]:
+        if scripts[number]:
+            _step(connection, number, scripts[number], application_id_of(origin))
+    schema.require_columns(connection.execute(schema.COLUMNS), tuple(scripts), name)
 
 
 def _require_origin(application: int, name: str, origin: Origin) -> None:

@@ -293,6 +293,14 @@ def test_a_migration_keeps_the_data_and_is_done_once(store_place, monkeypatch):
     assert store_place.execute("SELECT count(*) FROM more") == [(0,)]
 
 
+def test_a_database_of_another_version_with_the_same_number_is_refused_in_words(store_place):
+    store_place.open().close()
+    store_place.execute("ALTER TABLE film_reading RENAME COLUMN ln_ck_x TO ln_ck")
+
+    with pytest.raises(StoreError, match=r"another version of padwatch \(its table film_reading"):
+        store_place.open()
+
+
 def test_two_commands_that_upgrade_at_the_same_moment_find_the_newest_schema(tmp_path):
     for round_ in range(10):
         path = tmp_path / f"{round_}.sqlite3"
