@@ -14,6 +14,7 @@ import { NOT_CURRENT, reasonSentence, reasonWords } from "../words.js";
 import { centreTrail, trendPanels } from "./trend_panels.js";
 
 const PERIOD_S = 5;
+const ORBIT_S = 2;
 
 /** Returns `{ node, draw(latest, unit, view), close() }`. */
 export function bearingCharts(path) {
@@ -39,24 +40,23 @@ export function bearingCharts(path) {
  *
  * Until the bearing has its first result there is nothing to ask for: `absence()` says so.
  */
-function asking(box, path, show, absence = () => null) {
+function asking(box, path, show, absence = () => null, query = []) {
   return poll(async (signal) => {
-    if (absence() === null) await show(await ask(path, [], signal));
+    if (absence() === null) await show(await ask(path, query, signal));
     else box.explain(absence());
   }, () => PERIOD_S, (failure) => box.fail(failure));
 }
 
 function orbitChart(path) {
   const box = panel("Orbit", "orbit", element("a", { href: orbitAddress(path[1], path[3]) }, "Orbit player"));
-  return resultChart(box, [...path, "orbit"], (orbit) =>
-    box.show(orbitTraces(orbit), orbitLayout(orbit), orbitCaption(orbit)),
-  );
+  const show = (motion) => box.show(orbitTraces(motion), orbitLayout(motion), orbitCaption(motion));
+  return resultChart(box, [...path, "motion"], show, [["seconds", ORBIT_S]]);
 }
 
 /** A chart that one question fills, asked as soon as the bearing has a result. */
-function resultChart(box, path, show) {
+function resultChart(box, path, show, query = []) {
   let latest = null;
-  const questions = asking(box, path, show, () => absenceWords(latest));
+  const questions = asking(box, path, show, () => absenceWords(latest), query);
   return {
     node: box.node,
     draw(newest, notCurrent) {
@@ -74,8 +74,8 @@ function absenceWords(latest) {
   return latest.time === null ? `No result yet. ${reasonSentence(latest.quality.reason)}` : null;
 }
 
-function orbitCaption(orbit) {
-  return `Shaft relative to bearing, the last ${formatFixed(orbit.duration_s, 1)} s, mean removed. Cross: newest sample.`;
+function orbitCaption(motion) {
+  return `Shaft relative to bearing, the last ${formatFixed(motion.n_samples / motion.rate_hz, 1)} s, mean removed. Cross: newest sample.`;
 }
 
 function spectrumChart(path) {
