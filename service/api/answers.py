@@ -4,8 +4,9 @@ import asyncio
 import gzip
 import re
 import secrets
+import time
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable, Hashable, Mapping
+from collections.abc import Awaitable, Callable, Hashable, Iterable, Mapping
 from contextvars import copy_context
 from dataclasses import dataclass, field
 from hashlib import blake2b
@@ -20,10 +21,11 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from acquisition.clock import Clock
-from service.api.auth.authenticator import CALLER
+from service.api.auth.authenticator import CALLER, Caller
 from service.api.problems import ProblemError
 from service.runtime.asker import ASKER, Asker
 from service.runtime.times import rfc3339
+from service.store.access.identities import Identity
 from service.store.port import StoreError
 
 T = TypeVar("T")
@@ -114,7 +116,7 @@ class Answers:
 
     If the bodies exceed `max_bytes` together, the least recently used answers are dropped.
     Concurrent requests for the same answer wait for one computation of it. Answered requests are
-    remembered by caller, so that `Repetition` can answer them again without routing.
+    remembered by caller, so that `Unrouted` and `Repetition` can answer them again.
     """
 
     def __init__(self, max_bytes: int = MAX_CACHE_BYTES) -> None:
@@ -142,35 +144,56 @@ class Answers:
             Function from the parameter ``since`` of a repeated request, which may differ, to the
             `make` of the answer; None if a repeated request must be routed again.
         """
-        if lasting is not None:
-            self._known[_asked(request.scope)[0]] = revision, lasting, request.scope.get("route")
+        scope = request.scope
+        if lasting is not None and (asked := _asked(scope)) is not None:
+            identity = scope["state"][CALLER].identity
+            self._known[identity, asked[0]] = revision, lasting, scope["route"]
             if len(self._known) > MAX_KNOWN:
                 self._known.popitem(last=False)
-        return await self._of(request.scope, revision, make)
+        return await self._of(scope, revision, make)
 
     async def repeated(self, scope: Scope) -> Response | None:
         """Return the answer to a request that was answered before; None if it must be routed."""
-        asked, since = _asked(scope)
-        if scope["method"] != "GET" or asked not in self._known:
-            return None
-        self._known.move_to_end(asked)
-        revision, lasting, scope["route"] = self._known[asked]
+        found = self._find(scope, scope["state"][CALLER].identity)
         try:
-            return await self._of(scope, revision, lasting(since))
+            return found and await self._of(scope, found[0], found[1])
         except (ProblemError, StoreError):
             return None  # the route raises it again
 
+    def at_once(self, scope: Scope, identity: Identity | None) -> Response | None:
+        """Return the answer to a request of a caller that was answered before.
+
+        None if the answer is not in the cache, here or of the client.
+        """
+        found = self._find(scope, identity)
+        try:
+            return found and self._ready(scope, found[0])[1]
+        except (ProblemError, StoreError):
+            return None
+
+    def _find(self, scope: Scope, identity: Identity | None) -> tuple[Revision, Make] | None:
+        asked = _asked(scope)
+        if asked is None or (identity, asked[0]) not in self._known:
+            return None
+        self._known.move_to_end((identity, asked[0]))
+        revision, lasting, scope["route"] = self._known[identity, asked[0]]
+        return revision, lasting(asked[1])
+
     async def _of(self, scope: Scope, revision: Revision, make: Make) -> Response:
+        key, ready = self._ready(scope, revision)
+        return ready or await self._made(key, make)
+
+    def _ready(self, scope: Scope, revision: Revision) -> tuple[tuple[str, str], Response | None]:
+        """Return the key of an answer in the cache, and the answer if it need not be made."""
         headers = Headers(scope=scope)
         url = scope["path"].encode() + b"?" + scope["query_string"]
         tag = tag_of(self.started.encode(), url, repr(revision()).encode())
-        if is_known(tag, headers.get("if-none-match")):
-            return Response(status_code=304, headers={"ETag": tag})
         key = (tag, encoding_of(headers))
+        if is_known(tag, headers.get("if-none-match")):
+            return key, Response(status_code=304, headers={"ETag": tag})
         if (kept := self._kept.get(key)) is not None:
             self._kept.move_to_end(key)
-            return kept
-        return await self._made(key, make)
+        return key, kept
 
     async def _made(self, key: tuple[str, str], make: Make) -> Response:
         making = self._making.get(key)
@@ -225,20 +248,28 @@ SINCE = re.compile(rb"since=([0-9a-f]+-[0-9]{1,18})")
 """Query of a request for changes after a revision, which differs from poll to poll."""
 
 
-def _asked(scope: Scope) -> tuple[Hashable, str | None]:
+def _asked(scope: Scope) -> tuple[Hashable, str | None] | None:
     """Return what an answer depends on, and the value of ``since`` if it is the only parameter.
 
-    The former are caller, URL without that value, and headers that select or describe content. The
-    state of a request contains its caller below `CALLER`.
+    The former are URL without that value, server address, and the headers that select an answer or
+    its host. None for a request that is not repeated: with a body, or another method than GET.
     """
-    caller, query = scope.get("state", {}).get(CALLER), scope["query_string"]
-    headers = tuple(h for h in scope["headers"] if h[0] in (b"accept", b"content-length"))
+    if scope["method"] != "GET":
+        return None
+    headers = tuple(header for header in scope["headers"] if header[0] in SELECTING)
+    if any(name not in (b"accept", b"host") for name, _ in headers):
+        return None
+    query = scope["query_string"]
     found = SINCE.fullmatch(query)
-    asked = caller and caller.identity, scope["path"], b"since" if found else query, headers
+    asked = scope["path"], b"since" if found else query, headers, scope.get("server")
     return asked, found[1].decode() if found else None
 
 
-class Repetition:
+SELECTING = (b"accept", b"host", b"content-length", b"transfer-encoding")
+"""Headers by which requests for the same URL differ."""
+
+
+class Unrouted:
     """ASGI middleware that answers requests without routing if they were answered before.
 
     It applies to requests that the same caller with the same rights has made before: permission
@@ -254,8 +285,67 @@ class Repetition:
         await (answer or self._app)(scope, receive, send)
 
 
+class Repetition:
+    """ASGI middleware around all others that repeats answers which are in the cache.
+
+    It applies to requests as of `Unrouted`, also to the same host as before. Nothing is computed,
+    so that there are no deadline and no refusal.
+
+    Parameters
+    ----------
+    caller
+        Coroutine function that authenticates the caller of a request.
+    observe
+        Function that receives route, status and duration, s, of an answered request.
+    headers
+        Headers of all answers of the server, in addition to those of `AnswerHeaders`.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        headers: Iterable[tuple[str, str]],
+        *,
+        answers: Answers,
+        caller: Callable[[Scope], Awaitable[Caller]],
+        observe: Callable[[str, int, float], None],
+        clock: Clock,
+    ) -> None:
+        self._app, self._answers, self._caller = app, answers, caller
+        self._observe, self._clock = observe, clock
+        added = MutableHeaders(dict(headers))
+        del added["Cache-Control"]
+        _add_cache_headers(added)
+        self._headers = added.raw
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or forward it."""
+        began_s = time.perf_counter()
+        answer = await self._repeated(scope)
+        if answer is None:
+            await self._app(scope, receive, send)
+            return
+        date = (_TIME, rfc3339(self._clock.now_ns()).encode())
+        headers = [*answer.raw_headers, date, *self._headers]
+        status = answer.status_code
+        await send({"type": "http.response.start", "status": status, "headers": headers})
+        await send({"type": "http.response.body", "body": answer.body})
+        self._observe(scope["route"].path, status, time.perf_counter() - began_s)
+
+    async def _repeated(self, scope: Scope) -> Response | None:
+        if scope["method"] != "GET" or not scope["path"].startswith("/api/"):
+            return None
+        try:
+            caller = await self._caller(scope)
+        except StoreError:
+            return None
+        return self._answers.at_once(scope, caller.identity)
+
+
 TIME_HEADER = "Padwatch-Time"
 """Name of the header with the time of the answer, from which clients compute ages."""
+
+_TIME = TIME_HEADER.lower().encode()
 
 CACHE_CONTROL = "private, no-cache"
 """Value of the header Cache-Control: private caches only, revalidation before each use."""

@@ -1,12 +1,14 @@
 """HTTP application of the service: routers, middleware, and the OpenAPI document."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from importlib.metadata import version
 from threading import Lock
 from typing import Any
 
 from fastapi import APIRouter, Depends, FastAPI, Request, Response
 from fastapi.routing import APIRoute
+from starlette.types import ASGIApp
 
 from service.api.answers import (
     EDITION_HEADER,
@@ -16,6 +18,7 @@ from service.api.answers import (
     AnswerHeaders,
     Answers,
     Repetition,
+    Unrouted,
 )
 from service.api.auth.accounts import account_router, key_router
 from service.api.auth.authenticator import COOKIE
@@ -157,6 +160,9 @@ def describe_access(document: dict[str, Any], operations: Mapping[str, Declared]
                 responses.setdefault(str(status), {**responses["default"], **words})
 
 
+Repeating = Callable[[ASGIApp, Iterable[tuple[str, str]]], ASGIApp]
+
+
 class GuardedApi(FastAPI):
     """FastAPI application in which every route declares the permission that it requires.
 
@@ -172,6 +178,8 @@ class GuardedApi(FastAPI):
         super().__init__(dependencies=[Depends(require_declared)], **options)
         self.declared: Mapping[str, Declared] = {}
         """Operations with their required permissions, by method and path such as ``GET /livez``."""
+        self.repeating: Repeating | None = None
+        """Function that puts the whole application with its server's headers into `Repetition`."""
         self._answers, self._describing = answers, Lock()
 
     def setup(self) -> None:
@@ -218,8 +226,15 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
     )
     app.state.clock = context.clock
     authenticator, requests = context.access, RequestMetrics()
+    app.repeating = partial(
+        Repetition,
+        answers=context.answers,
+        caller=authenticator.caller,
+        observe=requests.observe,
+        clock=context.clock,
+    )
     # the last one runs first
-    app.add_middleware(Repetition, answers=context.answers)
+    app.add_middleware(Unrouted, answers=context.answers)
     app.add_middleware(AnswerHeaders, clock=context.clock)
     app.add_middleware(Gate, declared=lambda: app.declared, authenticator=authenticator)
     app.add_middleware(TimedRequests, metrics=requests)

@@ -77,7 +77,7 @@ async def serve_requests(
     account exists) when requests are accepted.
     """
     app = application(context, evidence)
-    server = server_of(app, plant, context.origin)
+    server = server_of(app, plant, context.origin, app.repeating)
     beats = Heartbeats(context.clock)
     async with asyncio.TaskGroup() as tasks:
         running = beats.start(loops, tasks)

@@ -1,5 +1,6 @@
 """HTTP server of a plant file: application, access control and socket."""
 
+from collections.abc import Iterable
 from urllib.parse import urlsplit
 
 import structlog
@@ -7,7 +8,7 @@ from starlette.types import ASGIApp
 
 from acquisition.clock import Clock
 from service.api.answers import EDITION_HEADER, ORIGIN_HEADER
-from service.api.app import GuardedApi, create_app
+from service.api.app import GuardedApi, Repeating, create_app
 from service.api.auth.authenticator import Authenticator
 from service.api.context import Context
 from service.api.http.middleware import TrustedProxy
@@ -27,15 +28,24 @@ HSTS = ("Strict-Transport-Security", "max-age=31536000")
 """HTTP Strict Transport Security header: browsers then use HTTPS only."""
 
 
-def server_of(app: ASGIApp, plant: PlantFile, origin: Origin) -> HttpServer:
-    """Return an HTTP server for `app` with the limits, host names and TLS of the plant file."""
+def server_of(
+    app: ASGIApp, plant: PlantFile, origin: Origin, repeating: Repeating | None = None
+) -> HttpServer:
+    """Return an HTTP server for `app` with the limits, host names and TLS of the plant file.
+
+    `repeating` is `GuardedApi.repeating`; without it, no answers are repeated.
+    """
     service, tls = plant.service, tls_of(plant)
-    if service.socket is not None:
-        app = TrustedProxy(app)
+
+    def around(complete: ASGIApp, added: Iterable[tuple[str, str]]) -> ASGIApp:
+        if repeating is not None:
+            complete = repeating(complete, added)
+        return complete if service.socket is None else TrustedProxy(complete)
+
     headers = [(ORIGIN_HEADER, origin.value), (EDITION_HEADER, edition())]
     if tls is not None:
         headers.append(HSTS)
-    return http_server(app, service.limits, _names(plant), headers, tls)
+    return http_server(app, service.limits, _names(plant), headers, tls, around)
 
 
 def _names(plant: PlantFile) -> list[str]:

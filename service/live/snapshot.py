@@ -1,8 +1,10 @@
 """Snapshots of units and of the measuring process, and their encoding as documents."""
 
+import pickle
 import zlib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
 from importlib.metadata import version
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
@@ -30,6 +32,30 @@ class UnreadableSnapshotError(Exception):
     """Error raised if a document of a unit's state is damaged or of another program version."""
 
 
+class PickledBudgets(Mapping[str, Budget]):
+    """Uncertainty budgets by quantity, unpickled at the first access.
+
+    They are a third of a snapshot, and hardly ever read.
+    """
+
+    def __init__(self, pickled: bytes) -> None:
+        self._pickled = pickled
+
+    @cached_property
+    def _budgets(self) -> Mapping[str, Budget]:
+        budgets: Mapping[str, Budget] = pickle.loads(self._pickled)  # noqa: S301  our own
+        return budgets
+
+    def __getitem__(self, quantity: str) -> Budget:
+        return self._budgets[quantity]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._budgets)
+
+    def __len__(self) -> int:
+        return len(self._budgets)
+
+
 @dataclass(frozen=True)
 class BearingSnapshot:
     """Newest result of a bearing: an `Assessment` without spectrum, orbit and recent values.
@@ -49,6 +75,11 @@ class BearingSnapshot:
     clipped_share: Mapping[str, float]
     evidence: Evidence
     condition: BearingCondition | None
+
+    def __reduce__(self) -> tuple[object, ...]:
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        values["budgets"] = PickledBudgets(pickle.dumps(self.budgets, pickle.HIGHEST_PROTOCOL))
+        return type(self), tuple(values.values())
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """HTTP server: uvicorn, configured through its public options."""
 
 import socket
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from ssl import SSLContext
 from typing import Any, cast
@@ -48,6 +48,7 @@ def http_server(
     hosts: Iterable[str],
     headers: Sequence[tuple[str, str]] = (),
     tls: SSLContext | None = None,
+    around: Callable[[ASGIApp, Sequence[tuple[str, str]]], ASGIApp] = lambda app, _: app,
 ) -> HttpServer:
     """Return an HTTP server for an ASGI application.
 
@@ -59,9 +60,11 @@ def http_server(
         Headers of all answers, in addition to `SECURITY_HEADERS`.
     tls
         TLS context; None for plain HTTP.
+    around
+        Function that puts the application with its headers, both complete, into more middleware.
     """
-    checked = CheckedRequests(app, hosts, limits.answer_s)
-    complete = AddedHeaders(checked, [*SECURITY_HEADERS, *headers])
+    checked, added = CheckedRequests(app, hosts, limits.answer_s), [*SECURITY_HEADERS, *headers]
+    complete = around(AddedHeaders(checked, added), added)
     return HttpServer(
         uvicorn.Config(
             cast(Any, complete),  # Starlette and uvicorn declare different types

@@ -7,9 +7,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import httpx2
 from starlette.requests import Request
 
 from service.api.answers import Answers, json_of
+from service.api.http.middleware import SECURITY_HEADERS, AddedHeaders
 from service.live.status import LinkState
 from service.measuring.recorder import Findings
 from service.runtime.asker import ASKER
@@ -101,6 +103,49 @@ async def test_whatever_changes_is_news(running, assessments):
         change()
         for path, tag in zip(paths, before, strict=True):
             assert (await ask(running, path, tag)).status_code == 200, path
+
+
+async def test_an_answer_is_repeated_for_the_same_caller_and_host_until_it_changes(running):
+    """A repeated answer is the first one; all others pass through the whole application."""
+    routed, added = [], [*SECURITY_HEADERS, ("padwatch-origin", "live")]
+    complete = AddedHeaders(running.app, added)
+
+    async def noted(scope: Any, *channels: Any) -> None:
+        routed.append(scope["path"])
+        await complete(scope, *channels)
+
+    app = running.app.repeating(noted, added)
+
+    async def ask(path: str, host: str = "localhost", **options: Any) -> tuple[int, Any]:
+        before = len(routed)
+        transport = httpx2.ASGITransport(app, client=options.pop("client", ("127.0.0.1", 1)))
+        async with httpx2.AsyncClient(transport=transport, base_url=f"http://{host}") as client:
+            answer = await client.request("GET", f"/api/v1/{path}", **options)
+        return len(routed) - before, answer
+
+    for path in ("overview", "alarms", "units/U1/bearings/UJB/latest"):
+        (_, first), (n_routed, again) = await ask(path), await ask(path)
+        assert (n_routed, again.status_code, again.content) == (0, 200, first.content), path
+        assert sorted(again.headers.raw) == sorted(first.headers.raw)
+        known = {"If-None-Match": first.headers["etag"]}
+        _, same = await ask(path, headers=known | {"Accept": "*/*;q=0.5"})
+        n_routed, repeated = await ask(path, headers=known)
+        assert (n_routed, repeated.status_code, same.status_code) == (0, 304, 304)
+        assert sorted(repeated.headers.raw) == sorted(same.headers.raw)
+
+    for others in (
+        {"host": "127.0.0.1"},
+        {"content": b"{}"},
+        {"client": ("10.0.0.9", 1)},
+        {"headers": {"X-Forwarded-For": "10.0.0.9"}},
+        {"headers": {"Authorization": "Bearer pw_x"}},
+    ):
+        assert (await ask("overview", **others))[0] == 1, others
+    running.live.set_link("U1", LinkState.NOT_CONNECTED, "no answer")
+    await running.client.get("/livez")  # takes the report of measuring
+    n_routed, news = await ask("overview")
+    assert n_routed == 1
+    assert "no answer" in news.text
 
 
 async def test_the_last_hours_are_others_later(running):
