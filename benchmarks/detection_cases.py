@@ -124,6 +124,7 @@ def find_damage(
     damage = Damage(case.kind, bearing, onset_ns, case.size, case.ramp_days, case.directions)
     later = unit.later([damage])
     end = _end(later, onset, case)
+    later = later.rows(0, end + ATTRIBUTED_AFTER_H * ROWS_PER_H)
     alarms = [
         (int(row), (bearing, QUANTITIES[quantity].direction))
         for quantity in QUANTITIES
@@ -137,7 +138,7 @@ def find_damage(
     if not alarms:
         return Found(None, by_fixed)
     row, place = min(alarms)
-    later_row = min(row + ATTRIBUTED_AFTER_H * ROWS_PER_H, time_ns.size - 1)
+    later_row = min(row + ATTRIBUTED_AFTER_H * ROWS_PER_H, later.time_ns.size - 1)
     causes = (unit.attribution(later, place, r).cause for r in (row, later_row))
     return Found((row - onset) / ROWS_PER_H, by_fixed, *causes)
 
@@ -157,8 +158,9 @@ def _fixed(
 
 
 def false_alarms(unit: LearnedUnit, band: float) -> tuple[int, int]:
-    """Alarms of a healthy unit: by the sequential test, and by a fixed threshold."""
-    return _alarms(unit, unit.healthy, 0, unit.healthy.time_ns.size, band)
+    """Alarms of a healthy unit: by decision and shaft line, and by a fixed threshold."""
+    decisions, crossings = _alarms(unit, unit.healthy, 0, unit.healthy.time_ns.size, band)
+    return decisions + len(unit.line_alarms(unit.healthy)), crossings
 
 
 def _alarms(unit: LearnedUnit, later: Later, first: int, end: int, band: float) -> tuple[int, int]:

@@ -110,6 +110,8 @@ def tell(unit: LearnedUnit, case: CauseCase, random: np.random.Generator) -> Tol
     levels = {
         quantity: bool(unit.decide(later, bearing, quantity).level[-1]) for quantity in QUANTITIES
     }
+    for direction, line in unit.lines(later, later.time_ns.size - 1).items():
+        levels[f"k_{direction}"] |= line.is_alarming and line.bearing == bearing
     by_k, by_ck = (any(levels[f"{name}_{d}"] for d in DIRECTIONS) for name in ("k", "ck"))
     if not by_k and not by_ck:
         return Told(False, False)

@@ -7,7 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from acquisition.simulated.life.damage import Damage
-from acquisition.simulated.life.life import live
+from acquisition.simulated.life.inputs import draw_inputs
+from acquisition.simulated.life.life import life_of, live
 from acquisition.simulated.life.operation import HeldLoad
 from acquisition.simulated.life.shaft import ConditionChange
 from acquisition.simulated.life.truth import UnitLife
@@ -21,10 +22,10 @@ from core.baseline.settings import BaselineSettings
 from core.change.backtest import DecisionHistory, decide_all, last_decision, operation_history
 from core.change.cause import Attribution, UnitReadings, attribute
 from core.change.damping_cause import FilmEvidence, cause_by_damping, line_finding
-from core.change.decision import JUDGED
 from core.change.evidence import Finding
 from core.change.film_judge import MAX_RECENT
 from core.change.settings import ChangeLimits, FilmRules
+from core.change.shaft_line import LineFinding
 from core.change.shaft_response import MEAN_READINGS, FilmDirection, film_columns, learn_response
 from core.condition.operating_state import OperatingLimits
 
@@ -67,7 +68,8 @@ class LearnedUnit:
 
     def __init__(self, seed: int, held: HeldLoad | None = None) -> None:
         self.seed, self.held = seed, held
-        life = live(seed, START_NS, YEARS, held=held)
+        self._inputs = draw_inputs(seed, START_NS, YEARS, held=held)
+        life = life_of(self._inputs, (), self._inputs.operation.is_turning)
         settled, n = _settled(life), _n_learning(life)
         learning = {bearing: history.rows(0, n) for bearing, history in life.readings.items()}
         self.baselines = {
@@ -76,13 +78,18 @@ class LearnedUnit:
         }
         self.response = learn_response(learning, settled[:n])
         self.fixed = _fixed(life, settled, n)
-        self.healthy = _later(life)
+        self.healthy = _later(life, settled)
 
     def later(
         self, damage: Iterable[Damage] = (), changes: Iterable[ConditionChange] = ()
     ) -> Later:
-        """The same life, damaged or changed."""
-        return _later(live(self.seed, START_NS, YEARS, damage, changes, held=self.held))
+        """The same life, damaged or changed; damage alone does not change operation or oil."""
+        if changes := tuple(changes):
+            life = live(self.seed, START_NS, YEARS, damage, changes, held=self.held)
+            return _later(life, _settled(life))
+        life = life_of(self._inputs, tuple(damage), self._inputs.operation.is_turning)
+        n = _n_learning(life)
+        return Later(_rows(life, n), self.healthy.is_settled)
 
     def decide(self, later: Later, bearing: str, quantity: str) -> DecisionHistory:
         columns = later.histories[bearing], later.is_settled
@@ -103,24 +110,42 @@ class LearnedUnit:
         return [(bearing, direction) for bearing in self.baselines for direction in DIRECTIONS]
 
     def judged_rows(self, bearing: str) -> npt.NDArray[np.int64]:
-        """Rows in which the healthy bearing is judged in both directions."""
-        verdicts = [self.decide(self.healthy, bearing, q).verdict for q in ("k_x", "k_y")]
-        return np.flatnonzero(np.all(np.isin(verdicts, [int(v) for v in JUDGED]), axis=0))
+        """Rows in which the healthy bearing is compared with its baseline in both directions."""
+        known = [np.isfinite(self._deviation(self.healthy, bearing, d)) for d in DIRECTIONS]
+        return np.flatnonzero(np.logical_and.reduce(known))
 
     def attribution(self, later: Later, place: FilmDirection, row: int) -> Attribution:
         """What a change at a place is put down to after a row."""
         readings = self.place_readings(later)
         known = np.isfinite(readings.deviation[self.places().index(place), : row + 1])
-        newest = readings.columns(np.flatnonzero(known)[-MAX_RECENT:])
+        newest = readings.columns(np.flatnonzero(known)[-MEAN_READINGS:])
         brackets = np.array([BRACKETS_N_PER_M[bearing] for bearing, _ in self.places()])
-        found = attribute(
-            *(place, self.response, newest.columns(slice(-MEAN_READINGS, None))),
-            brackets,
-        )
+        found = attribute(place, self.response, newest, brackets)
         before = later.rows(max(0, row - EVIDENCE_ROWS), row + 1)
-        lines = {d: line_finding((place[0], d), self.response, newest) for d in DIRECTIONS}
+        lines = self.lines(later, row)
         evidence = {p: self._evidence(before, *p) for p in self.places()}
         return cause_by_damping(place, found, evidence, lines)
+
+    def lines(self, later: Later, row: int) -> dict[str, LineFinding]:
+        """Findings by the lines of the shaft after a row."""
+        before = later.rows(max(0, row - 2 * MAX_RECENT), row + 1)
+        settled = np.flatnonzero(before.is_settled)[-MAX_RECENT:]
+        readings = self.place_readings(before).columns(settled)
+        return {d: line_finding(d, self.response, readings) for d in DIRECTIONS}
+
+    def line_alarms(self, later: Later) -> list[tuple[int, str, str | None]]:
+        """Row, direction and bearing of the gains that the lines show, asked every four hours."""
+        settled = np.flatnonzero(later.is_settled)
+        readings, found, active = self.place_readings(later), [], dict[str, str | None]()
+        for end in range(MEAN_READINGS, settled.size, MEAN_READINGS):
+            newest = readings.columns(settled[max(0, end - MAX_RECENT) : end])
+            for d in DIRECTIONS:
+                line = line_finding(d, self.response, newest)
+                now = line.bearing if line.is_alarming else None
+                if now is not None and now != active.get(d):
+                    found.append((int(settled[end - 1]), d, now))
+                active[d] = now
+        return found
 
     def _evidence(self, later: Later, bearing: str, direction: str) -> FilmEvidence:
         return FilmEvidence(
@@ -158,7 +183,8 @@ class LearnedUnit:
 def fixed_false_alarms(seed: int) -> tuple[float, list[int]]:
     """Years of a healthy unit after learning, and how often a fixed threshold alarms, by band."""
     life = live(seed, START_NS, YEARS)
-    fixed, later = _fixed(life, _settled(life), _n_learning(life)), _later(life)
+    settled = _settled(life)
+    fixed, later = _fixed(life, settled, _n_learning(life)), _later(life, settled)
     return later.years, [
         sum(
             threshold.raised(
@@ -193,12 +219,13 @@ def _n_learning(life: UnitLife) -> int:
     return int(np.searchsorted(life.operation.time_ns, START_NS + LEARNING_DAYS * DAY_NS))
 
 
-def _later(life: UnitLife) -> Later:
+def _later(life: UnitLife, settled: npt.NDArray[np.bool_]) -> Later:
     n = _n_learning(life)
-    return Later(
-        {bearing: history.rows(n, len(history)) for bearing, history in life.readings.items()},
-        _settled(life)[n:],
-    )
+    return Later(_rows(life, n), settled[n:])
+
+
+def _rows(life: UnitLife, first: int) -> dict[str, StiffnessHistory]:
+    return {bearing: one.rows(first, len(one)) for bearing, one in life.readings.items()}
 
 
 def _origin(seed: int, bearing: str) -> Origin:

@@ -141,27 +141,17 @@ def _mean(each: Sequence[_Bearing]) -> _Bearing:
 
 
 def line_finding(
-    film: FilmDirection, response: ShaftResponse | None, readings: UnitReadings
+    direction: str, response: ShaftResponse | None, readings: UnitReadings
 ) -> LineFinding:
-    """Return the finding on the transducers of a film, by the learned line of the shaft."""
-    line = next((x for x in response.lines if x.direction == film[1]), None) if response else None
-    if (
-        line is None
-        or response is None
-        or film[0] not in line.bearings
-        or readings.motion_um.size == 0
-    ):
+    """Return the finding on the transducers of a direction, by the learned line of the shaft."""
+    line = next((x for x in response.lines if x.direction == direction), None) if response else None
+    if line is None or response is None or readings.motion_um.size == 0:
         return LineFinding()
-    rows = [response.places.index((bearing, film[1])) for bearing in line.bearings]
-    row = rows[line.bearings.index(film[0])]
-    changes, rises = readings.deviation[row], readings.rise[row]
-    angle = np.radians(readings.attitude_deg[row])
-    outward = np.cos(angle if film[1] == "x" else angle - np.pi / 2.0) ** 2
-    if not np.isfinite(changes).any():
-        return LineFinding()
-    ln_k, rise = float(np.nanmean(changes)), float(np.nan_to_num(np.nanmean(rises * outward)))
+    rows = [response.places.index((bearing, direction)) for bearing in line.bearings]
+    angle = np.radians(readings.attitude_deg[rows])
+    outward = np.cos(angle if direction == "x" else angle - np.pi / 2.0) ** 2
     shaft, motion = readings.motion_um[:, rows]
-    return line.judge(film[0], shaft, motion, ln_k, rise)
+    return line.judge(shaft, motion, readings.deviation[rows], readings.rise[rows] * outward)
 
 
 def cause_by_damping(
@@ -179,10 +169,10 @@ def cause_by_damping(
     evidence
         Mean deviations by bearing and direction. Bearings without c/k in x and y do not count.
     lines
-        Findings on the transducers of the bearing by the line of the shaft, by direction.
+        Findings on the transducers by the line of the shaft, by direction.
     """
     for direction, line in lines.items():
-        if line.verdict in (LineVerdict.PROBE, LineVerdict.ACCELEROMETER):
+        if line.bearing == film[0]:
             why = f"gain of the {line.verdict} of {film[0]} in {direction}: {line.words}"
             return replace(found, cause=Cause.TRANSDUCER, reason=why)
     own = _bearing(evidence, film[0])

@@ -15,6 +15,7 @@ from core.change.damping_cause import FilmEvidence, cause_by_damping, line_findi
 from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, outcomes, step
 from core.change.film_reading import FilmReading
 from core.change.settings import ChangeLimits, FilmRules, percent_of
+from core.change.shaft_line import WINDOWS, LineFinding, LineVerdict
 from core.change.shaft_response import MEAN_READINGS, FilmDirection, ShaftResponse
 from core.condition.operating_state import OilSettling, Operation
 from core.limits import AlarmLevel, Judgement, unknown
@@ -63,6 +64,13 @@ class FilmFinding:
     def rank(self) -> tuple[int, float]:
         """Sort key of findings: level (0 for none), then absolute change relative to the limit."""
         return self.level or 0, abs(math.expm1(self.change or 0.0)) / self.limit
+
+    def in_alert(self) -> "FilmFinding":
+        """Return this finding with at least an alert, as for a gain that the shaft line shows."""
+        if self.level is not None:
+            return self
+        verdict = Verdict.ALERT if self.verdict is Verdict.NORMAL else self.verdict
+        return replace(self, level=AlarmLevel.ALERT, verdict=verdict)
 
     @property
     def deviation_95_percent(self) -> tuple[float, float] | None:
@@ -155,8 +163,8 @@ class FilmNews:
         return ranks.index(max(ranks))
 
 
-MAX_RECENT = 12 * MEAN_READINGS
-"""Number of newest reading times kept to find causes; readings without a deviation are not used."""
+MAX_RECENT = WINDOWS[-1]
+"""Number of newest reading times kept to find causes: six days."""
 
 
 class FilmJudge:
@@ -180,6 +188,7 @@ class FilmJudge:
         known = [k for k in stiffness if k is not None]
         self._brackets = np.array(known) if len(known) == len(stiffness) else None
         self._recent: deque[FloatArray] = deque(maxlen=MAX_RECENT)
+        self._gains: dict[str, LineFinding] = {}
 
     def baseline(self, bearing: str) -> BearingBaseline | None:
         """Return the active baseline of a bearing; None if it has none."""
@@ -247,10 +256,16 @@ class FilmJudge:
             for name in QUANTITIES
         }
         self._remember(readings, found)
+        lines = self._lines()
+        for direction, line in self._gains.items():
+            key = str(line.bearing), f"k_{direction}"
+            if key in found:
+                found[key] = found[key].in_alert()
         for (bearing, name), finding in found.items():
             if finding.level is not None:
                 film = bearing, QUANTITIES[name].direction
-                found[bearing, name] = replace(finding, attribution=self._attribution(film))
+                cause = self._attribution(film, lines)
+                found[bearing, name] = replace(finding, attribution=cause)
         news = []
         for reading in readings:
             keys = [(reading.bearing, name) for name in QUANTITIES]
@@ -307,18 +322,26 @@ class FilmJudge:
             )
         self._recent.append(np.array(rows).T)
 
-    def _attribution(self, film: FilmDirection) -> Attribution:
+    def _lines(self) -> Mapping[str, LineFinding]:
+        """Return the findings by the lines of the shaft; update the gains that are in alarm."""
+        if not self._recent or self.response is None or not self.response.lines:
+            return {}
+        readings = UnitReadings.of(np.stack(self._recent, axis=-1))
+        lines = {d: line_finding(d, self.response, readings) for d in DIRECTIONS}
+        for direction, line in lines.items():
+            if line.is_alarming:
+                self._gains[direction] = line
+            elif line.verdict is not LineVerdict.BROKEN:
+                self._gains.pop(direction, None)
+        return lines
+
+    def _attribution(self, film: FilmDirection, lines: Mapping[str, LineFinding]) -> Attribution:
         """Return the cause of a film's change, from its newest readings that have a deviation."""
         row = self._films.index(film)
         newest = [column for column in self._recent if np.isfinite(column[2, row])]
-        columns = newest or [np.full((9, len(self._films)), np.nan)]
+        columns = newest[-MEAN_READINGS:] or [np.full((9, len(self._films)), np.nan)]
         readings = UnitReadings.of(np.stack(columns, axis=-1))
-        latest = readings.columns(slice(-MEAN_READINGS, None))
-        found = attribute(film, self.response, latest, self._brackets)
-        lines = {
-            direction: line_finding((film[0], direction), self.response, readings)
-            for direction in DIRECTIONS
-        }
+        found = attribute(film, self.response, readings, self._brackets)
         evidence = {each: self._evidence(*each) for each in self._films}
         return cause_by_damping(film, found, evidence, lines)
 

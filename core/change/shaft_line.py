@@ -23,8 +23,11 @@ MEANS_OF = 24
 MIN_READINGS = 1200
 """Number of settled readings required to learn a line."""
 
-LASTING = 0.06
+LASTING = 0.03
 """Fraction of the variance of such means that further averaging does not reduce, as assumed."""
+
+WINDOWS = (96, 288, 864)
+"""Numbers of newest readings averaged to find a broken line: 16 h, 48 h and 6 days."""
 
 PARTS, ROUNDS = 6, 4
 """Number of folds of the cross-validation, and of reweightings of the robust fit."""
@@ -49,6 +52,10 @@ HOLDS, BROKEN = 3.5, 6.0
 """Distance from the line, in standard uncertainties, up to which it holds, and from which it is
 broken."""
 
+MINOR = 0.3
+"""Largest distance from the line, relative to that of a gain that explains the largest change of k,
+up to which a broken line still holds: a changed motion shows errors of the fitted line."""
+
 MIN_PROBE_RISE = 0.2
 """Smallest change of ln k per change of ln of a probe's gain that is assumed. A learned surface may
 fall with eccentricity by chance, and then no gain would be too large to explain a change."""
@@ -56,12 +63,16 @@ fall with eccentricity by chance, and then no gain would be too large to explain
 GAIN_SPREAD, GAIN_STD = 0.25, 0.012
 """Standard uncertainty of the gain that a change of stiffness predicts: relative, and absolute."""
 
+MIN_GAIN_CHANGE = 0.03
+"""Smallest relative change of a gain that raises an alert: that of the limit of k, without its
+margin, because the line determines gains better than a baseline does k."""
+
 PHASE_SPREAD = 0.1
 """Standard uncertainty of the direction in which a changed gain moves the sum, rad."""
 
-FITS, CLEAR = 3.0, 3.0
-"""Largest distance of a broken line from that of a changed gain, in standard uncertainties, and
-smallest difference of the log likelihoods of both gains."""
+FITS, CLEAR = 16.0, 6.0
+"""Largest misfit of a changed gain that is named, as the sum of squares in standard uncertainties,
+and smallest difference to the misfit of any other transducer."""
 
 
 class LineVerdict(StrEnum):
@@ -78,19 +89,41 @@ class LineVerdict(StrEnum):
 class LineFinding:
     """Verdict on transducers, and distance of the motion from the line with its uncertainty.
 
-    The fields in µm are None if unknown.
+    Parameters
+    ----------
+    distance_um, std_um
+        None if unknown.
+    bearing, ln_gain
+        Bearing of the transducer that changed its gain, and ln of the gain over that learned; None
+        unless the verdict is `PROBE` or `ACCELEROMETER`.
     """
 
     verdict: LineVerdict = LineVerdict.UNKNOWN
     distance_um: float | None = None
     std_um: float | None = None
+    bearing: str | None = None
+    ln_gain: float | None = None
+
+    @property
+    def significance(self) -> float:
+        """Distance divided by its standard uncertainty; 0 if unknown."""
+        return (self.distance_um or 0.0) / (self.std_um or 1.0)
+
+    @property
+    def is_alarming(self) -> bool:
+        """Whether the gain of a transducer has changed by at least `MIN_GAIN_CHANGE`."""
+        return self.ln_gain is not None and abs(math.expm1(self.ln_gain)) >= MIN_GAIN_CHANGE
 
     @property
     def words(self) -> str:
-        """Distance from the line of the shaft ± standard uncertainty as text; empty if unknown."""
+        """Gain, and distance from the line of the shaft, as text; empty if unknown."""
         if self.distance_um is None:
             return ""
-        return f"{self.distance_um:.2f} ± {self.std_um:.2f} µm off the line of the shaft"
+        gain = "" if self.ln_gain is None else f"{100.0 * math.expm1(self.ln_gain):+.1f} %, "
+        return f"{gain}{self.distance_um:.2f} ± {self.std_um:.2f} µm off the line of the shaft"
+
+
+UNKNOWN = LineFinding()
 
 
 @dataclass(frozen=True)
@@ -117,56 +150,81 @@ class ShaftLine:
     std_um: float
 
     def judge(
-        self, bearing: str, shaft: ComplexArray, motion: ComplexArray, ln_k: float, rise: float
+        self, shaft: ComplexArray, motion: ComplexArray, ln_k: FloatArray, rise: FloatArray
     ) -> LineFinding:
-        """Return the finding on the transducers of a bearing whose stiffness has changed.
+        """Return the finding on the transducers over the longest of the `WINDOWS`.
+
+        If the line is broken over any of them, it is that over the one that shows it best.
 
         Parameters
         ----------
         shaft, motion : (n_bearings, n)
             1× phasors in µm of the shaft relative to the bearings, and of the bearings; NaN if
             unknown.
-        ln_k
-            Change of ln of the bearing's stiffness in this direction.
-        rise
-            Change of the expected ln k per change of ln of the probe's gain.
+        ln_k : (n_bearings, n)
+            Changes of ln of the stiffness in this direction; NaN if unknown.
+        rise : (n_bearings, n)
+            Change of the expected ln k per change of ln of the probe's gain; NaN if unknown.
         """
-        usable = np.all(np.isfinite(shaft) & np.isfinite(motion), axis=0)
-        if not usable.any():
-            return LineFinding()
-        shaft, motion = np.mean(shaft[:, usable], axis=1), np.mean(motion[:, usable], axis=1)
-        off = complex(np.array(self.probe) @ shaft + np.array(self.accelerometer) @ motion)
-        off -= complex(*self.offset_um)
-        std = self.std_um * max(MEANS_OF / int(usable.sum()), LASTING) ** 0.5
-        row = self.bearings.index(bearing)
-        gains = {
-            LineVerdict.PROBE: (
-                -ln_k / max(1.0 + rise, MIN_PROBE_RISE),
-                self.probe[row] * shaft[row],
-            ),
-            LineVerdict.ACCELEROMETER: (ln_k, self.accelerometer[row] * motion[row]),
-        }
-        return LineFinding(_verdict(off, std, gains), abs(off), std)
+        usable = np.flatnonzero(np.all(np.isfinite(shaft) & np.isfinite(motion), axis=0))
+        found = [
+            self._finding(shaft[:, rows], motion[:, rows], ln_k[:, rows], rise[:, rows])
+            for rows in (usable[-n:] for n in WINDOWS)
+            if rows.size
+        ]
+        broken = [each for each in found if each.significance >= BROKEN]
+        return max(broken, key=lambda x: x.significance, default=found[-1] if found else UNKNOWN)
+
+    def _finding(
+        self, shaft: ComplexArray, motion: ComplexArray, ln_k: FloatArray, rise: FloatArray
+    ) -> LineFinding:
+        std = self.std_um * max(MEANS_OF / shaft.shape[1], LASTING) ** 0.5
+        signals = np.array(
+            [self.probe * shaft.mean(axis=1), self.accelerometer * motion.mean(axis=1)]
+        )
+        off = complex(signals.sum()) - complex(*self.offset_um)
+        change, rises = _known_mean(ln_k), np.nan_to_num(_known_mean(rise))
+        largest = int(np.argmax(np.abs(np.nan_to_num(change))))
+        shows = np.min(np.abs(np.expm1(change[largest]) * signals[:, largest]))
+        if abs(off) < BROKEN * std:
+            is_sure = abs(off) <= HOLDS * std and shows >= BROKEN * std
+            return LineFinding(LineVerdict.HOLDS if is_sure else LineVerdict.UNKNOWN, abs(off), std)
+        effects = np.array([-np.maximum(1.0 + rises, MIN_PROBE_RISE), np.ones(len(rises))])
+        gains, misfits = _gains(off, std, signals, change, effects)
+        best, other = np.argsort(misfits, axis=None)[:2]
+        if not misfits.flat[best] <= min(FITS, misfits.flat[other] - CLEAR):
+            is_minor = abs(off) <= MINOR * shows
+            return LineFinding(LineVerdict.HOLDS if is_minor else LineVerdict.BROKEN, abs(off), std)
+        part, row = divmod(int(best), len(self.bearings))
+        verdict = (LineVerdict.PROBE, LineVerdict.ACCELEROMETER)[part]
+        return LineFinding(verdict, abs(off), std, self.bearings[row], float(gains.flat[best]))
 
 
-def _verdict(
-    off: complex, std: float, gains: Mapping[LineVerdict, tuple[float, complex]]
-) -> LineVerdict:
-    distance, score = {}, {}
-    for which, (ln_gain, signal) in gains.items():
-        step = -math.expm1(-ln_gain) * signal  # of a signal that already has the gain
-        along = math.hypot(std, abs(signal) * math.hypot(GAIN_SPREAD * ln_gain, GAIN_STD))
-        across = math.hypot(std, PHASE_SPREAD * abs(step))
-        rest = (off - step) * signal.conjugate() / abs(signal)  # a gain moves along its signal
-        distance[which] = math.hypot(rest.real / along, rest.imag / across)
-        score[which] = distance[which] ** 2 / 2.0 + math.log(along * across)
-    if abs(off) < BROKEN * std:
-        shows = min(abs(math.expm1(gain) * signal) for gain, signal in gains.values())
-        is_sure = abs(off) <= HOLDS * std and shows >= BROKEN * std
-        return LineVerdict.HOLDS if is_sure else LineVerdict.UNKNOWN
-    best, other = sorted(score, key=score.__getitem__)
-    is_clear = distance[best] <= FITS and score[other] - score[best] >= CLEAR
-    return best if is_clear else LineVerdict.BROKEN
+def _known_mean(values: FloatArray) -> FloatArray:
+    """Return the mean (n_bearings,) of the values that are known; NaN if none is."""
+    known = np.isfinite(values)
+    n = known.sum(axis=1)
+    return np.where(n > 0, np.where(known, values, 0.0).sum(axis=1) / np.maximum(n, 1), np.nan)
+
+
+def _gains(
+    off: complex, std: float, signals: ComplexArray, change: FloatArray, effects: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return ln of the gain by which each transducer alone explains a broken line, and the misfit.
+
+    The arrays are (2, n_bearings), for probes and accelerometers. `effects` is the change of ln k
+    of the bearing per ln gain; films of the other bearings do not change. The misfit is a sum of
+    squares in standard uncertainties: infinite if the change of the bearing's ln k is unknown.
+    """
+    ratio = off / signals  # of a signal that already has the gain
+    along, across = ratio.real, ratio.imag * np.abs(signals)
+    gains = -np.log1p(-np.clip(along, -1.0, 0.5))
+    across_std = np.hypot(std, PHASE_SPREAD * np.abs(gains * signals))
+    k_std = np.hypot(GAIN_STD, GAIN_SPREAD * gains * effects)
+    unchanged = np.nan_to_num(change / GAIN_STD) ** 2
+    own = ((change - gains * effects) / k_std) ** 2 + 2.0 * np.log(k_std / GAIN_STD)
+    misfits = (across / across_std) ** 2 + own + unchanged.sum() - unchanged
+    return gains, np.where(np.isfinite(misfits) & (np.abs(along) < 0.5), misfits, np.inf)
 
 
 def learn_lines(

@@ -24,8 +24,9 @@ from service.store.baselines import BaselineStep, StoredStep, Versions, versions
 from service.store.film_readings import FilmHistory, FilmQuery
 from service.store.films import FilmStore
 
-TAIL_NS = 2 * DAY_NS
-"""Length, ns, of the history from which the operating state is computed; exceeds the warm-up."""
+TAIL_NS = 7 * DAY_NS
+"""Length, ns, of the history from which the operating state and the readings that show causes are
+restored; exceeds the warm-up, and `MAX_RECENT` readings of a unit that runs."""
 
 CATCH_UP_NS = 21 * DAY_NS
 """Length of the history from which decisions are computed, ns; a multiple of the longest mean."""

@@ -1,5 +1,6 @@
 """Simulation of years of stiffness readings of a unit, together with the true state."""
 
+import copy
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -203,11 +204,11 @@ def life_of(
     lives = [_bearing_life(one, turns, turning, damage) for one in inputs.bearings]
     order1 = _order1(lives, turning, grade_mm_s)
     truth = {life.bearing.id: _truth(life, order1[life.bearing.id]) for life in lives}
+    # a seed counts the streams spawned from it; a copy gives the same streams each time
+    noise = map(np.random.default_rng, copy.deepcopy(inputs.noise))
     measured = {
-        life.bearing.id: readings(
-            np.random.default_rng(seed), life.bearing, truth[life.bearing.id], life.chain, turning
-        )
-        for life, seed in zip(lives, inputs.noise, strict=True)
+        life.bearing.id: readings(random, life.bearing, truth[life.bearing.id], life.chain, turning)
+        for life, random in zip(lives, noise, strict=True)
     }
     return UnitLife(
         inputs.unit_seed,

@@ -1,5 +1,7 @@
 """What c/k and the line of the shaft say of the cause of a change."""
 
+from dataclasses import replace
+
 import pytest
 
 from core.change.cause import PROBE_REASON, Attribution, Cause
@@ -58,12 +60,14 @@ def test_oil_clearance_and_bracket_are_told_by_what_c_over_k_does(own, others, c
 
 @pytest.mark.parametrize("which", [LineVerdict.PROBE, LineVerdict.ACCELEROMETER])
 def test_a_broken_line_names_the_transducer_whatever_c_over_k_does(which):
-    broken = LineFinding(which, 0.8, 0.03)
+    broken = LineFinding(which, 0.8, 0.03, "UJB", -0.05)
     found = told(evidence(-0.1, -0.02, 0.012), line=broken)
     assert found.cause is Cause.TRANSDUCER
     assert f"{which} of UJB in x" in found.reason
-    assert "0.80 ± 0.03 µm" in found.reason
+    assert "-4.9 %, 0.80 ± 0.03 µm" in found.reason
     assert told({}, line=broken).cause is Cause.TRANSDUCER
+    elsewhere = replace(broken, bearing="TJB")
+    assert told(evidence(-0.3, -0.28, 0.03), line=elsewhere).cause is Cause.CLEARANCE
 
 
 def test_without_a_line_a_bracket_is_not_told_from_transducers():
