@@ -230,3 +230,15 @@ async def test_the_reference_of_the_api_needs_no_other_site(plant, page, complai
     await expect(page.locator(".responses-table.live-responses-table")).to_contain_text("200")
     assert elsewhere == []
     assert complaints == []
+
+
+@pytest.mark.long
+async def test_browsers_that_open_the_page_at_once_all_show_it(plant, browser):
+    contexts = [await browser.new_context() for _ in range(4)]
+    pages = [await context.new_page() for context in contexts]
+    for page in pages:
+        await page.goto(plant.url, wait_until="commit")
+    for page in pages:
+        await expect(page.locator("#service")).to_contain_text("Connected")
+    for context in contexts:
+        await context.close()
