@@ -17,6 +17,8 @@ MEANINGS = {
     "used_by": "Uses of the channel in the plant file: bearing identifier with key of the bearing,"
     " or key of the unit.",
     # persons and their entries
+    "time": "Time to which the entry refers.",
+    "number": "Number of the entry in its history, from 1 without gaps.",
     "role": "Role, which determines the permissions.",
     "created": "Time of creation.",
     "actor": "Person, API key or program that acted; empty if unknown.",
@@ -56,7 +58,6 @@ MEANINGS = {
     "shaft_x_um": "Displacement in x without its mean, µm; null if the sample is missing or bad.",
     "shaft_y_um": "Displacement in y without its mean, µm; null if the sample is missing or bad.",
     # alarms
-    "alarm": "Identifier of the alarm: unit, subject and kind, separated by colons.",
     "occurrence": "Number of the occurrence of the alarm.",
     "change": "Kind of alarm event.",
     "n_waiting": "Number of messages waiting for delivery.",

@@ -60,10 +60,6 @@ _START = time_query("Start, RFC 3339 with offset.", "2026-11-21T08:00:00Z")
 _END = time_query("End, RFC 3339 with offset.", "2026-11-21T09:00:00Z")
 
 
-def _bound(description: str, example: float) -> Any:
-    return Query(allow_inf_nan=False, description=description, examples=[example])
-
-
 def duration(longest_s: float, description: str, **options: Any) -> Any:
     """Return the declaration of a query parameter for a duration of at most `longest_s` seconds."""
     return Query(gt=0.0, le=longest_s, allow_inf_nan=False, description=description, **options)
@@ -118,42 +114,40 @@ async def optional_time_range(
     return start_ns, end_ns
 
 
-async def eccentricity_range(
-    eccentricity_min: Annotated[float | None, _bound("Minimum eccentricity ratio.", 0.2)] = None,
-    eccentricity_max: Annotated[float | None, _bound("Maximum eccentricity ratio.", 0.4)] = None,
-) -> ValueRange:
-    """Check and return the requested range of eccentricity ratios; unlimited by default."""
-    return _ordered(eccentricity_min, eccentricity_max, "eccentricity_min")
+def range_of(name: str, words: str, low: float, high: float) -> Any:
+    """Return the dependency on the parameters ``name_min`` and ``name_max``: a `ValueRange`.
 
+    `words` name the quantity with its unit; `low` and `high` are examples of the bounds.
+    """
 
-async def oil_temperature_range(
-    oil_temperature_min: Annotated[float | None, _bound("Minimum temperature, °C.", 40.0)] = None,
-    oil_temperature_max: Annotated[float | None, _bound("Maximum temperature, °C.", 50.0)] = None,
-) -> ValueRange:
-    """Check and return the requested range of oil temperatures, °C; unlimited by default."""
-    return _ordered(oil_temperature_min, oil_temperature_max, "oil_temperature_min")
+    def bound(end: str, example: float) -> Any:
+        return Query(
+            alias=f"{name}_{end[:3].lower()}",
+            allow_inf_nan=False,
+            description=f"{end} {words}.",
+            examples=[example],
+        )
 
+    async def given(
+        minimum: Annotated[float | None, bound("Minimum", low)] = None,
+        maximum: Annotated[float | None, bound("Maximum", high)] = None,
+    ) -> ValueRange:
+        if minimum is not None and maximum is not None and minimum > maximum:
+            parameter = f"{name}_min"
+            detail = (
+                f"{parameter} must be at most {maximum:g}, the requested maximum, got {minimum:g}"
+            )
+            raise ProblemError(422, "Wrong parameter", detail, parameter)
+        return ValueRange(minimum, maximum)
 
-async def attitude_range(
-    attitude_min: Annotated[float | None, _bound("Minimum attitude angle, degrees.", 40.0)] = None,
-    attitude_max: Annotated[float | None, _bound("Maximum, degrees.", 50.0)] = None,
-) -> ValueRange:
-    """Check and return the requested range of attitude angles, degrees; unlimited by default."""
-    return _ordered(attitude_min, attitude_max, "attitude_min")
+    return Depends(given)
 
 
 TimeRange = Annotated[tuple[int, int], Depends(time_range)]
 OptionalTimeRange = Annotated[tuple[int, int], Depends(optional_time_range)]
-Eccentricity = Annotated[ValueRange, Depends(eccentricity_range)]
-OilTemperature = Annotated[ValueRange, Depends(oil_temperature_range)]
-Attitude = Annotated[ValueRange, Depends(attitude_range)]
-
-
-def _ordered(low: float | None, high: float | None, parameter: str) -> ValueRange:
-    if low is not None and high is not None and low > high:
-        detail = f"{parameter} must be at most {high:g}, the requested maximum, got {low:g}"
-        raise ProblemError(422, "Wrong parameter", detail, parameter)
-    return ValueRange(low, high)
+Eccentricity = Annotated[ValueRange, range_of("eccentricity", "eccentricity ratio", 0.2, 0.4)]
+OilTemperature = Annotated[ValueRange, range_of("oil_temperature", "temperature, °C", 40.0, 50.0)]
+Attitude = Annotated[ValueRange, range_of("attitude", "attitude angle, degrees", 40.0, 50.0)]
 
 
 States = Annotated[

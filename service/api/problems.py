@@ -11,8 +11,18 @@ from fastapi.responses import Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
+from core.alarms.operation import ActionRefusedError
 from service.api.auth.declared import allowed_methods
-from service.live.commands import CommandFailedError, NotAvailableError
+from service.api.auth.passwords import PasswordRefusedError, TooManyLoginsError
+from service.live.commands import (
+    BaselineRefusedError,
+    CommandFailedError,
+    NotAvailableError,
+    ReferenceRefusedError,
+)
+from service.recordings.motion import NoMotionError
+from service.store.access.identities import NameRefusedError
+from service.store.access.tables import AccessRefusedError, UnknownAccountError
 from service.store.port import QueryTooLargeError, StoreError
 
 DETAIL = "detail"
@@ -53,6 +63,19 @@ OF_FASTAPI = {
     404: ("Unknown address", "there is no such address; /docs lists all"),
 }
 """Titles and details of problems that FastAPI finds, by status, in place of FastAPI's own."""
+
+REFUSALS: Mapping[type[Exception], tuple[int, str, str | None]] = {
+    ActionRefusedError: (409, "Conflict", None),
+    BaselineRefusedError: (409, "Conflict", None),
+    ReferenceRefusedError: (409, "No reference", None),
+    NoMotionError: (409, "No samples", None),
+    NotAvailableError: (409, "Not available here", None),
+    NameRefusedError: (422, "Wrong parameter", "name"),
+    PasswordRefusedError: (422, "Wrong parameter", "password"),
+    UnknownAccountError: (404, "Unknown account", None),
+    AccessRefusedError: (409, "Conflict", None),
+}
+"""Status, title and wrong parameter of the problem by error; the error's message is its detail."""
 
 log = structlog.get_logger()
 
@@ -205,9 +228,19 @@ def install_problem_handlers(app: FastAPI) -> None:
         log.error("database query failed", path=request.url.path, reason=str(error))
         return _render(request, 503, "Store not available", STORE_FAILS)
 
-    @app.exception_handler(NotAvailableError)
-    async def _not_here(request: Request, error: NotAvailableError) -> Response:
-        return _render(request, 409, "Not available here", str(error))
+    async def _refused(request: Request, error: Exception) -> Response:
+        kinds = (kind for kind in REFUSALS if isinstance(error, kind))
+        status, title, parameter = REFUSALS[next(kinds)]
+        mistakes = [Mistake(parameter=parameter, detail=str(error))] if parameter else []
+        return _render(request, status, title, str(error), mistakes)
+
+    for kind in REFUSALS:
+        app.add_exception_handler(kind, _refused)
+
+    @app.exception_handler(TooManyLoginsError)
+    async def _busy(request: Request, _: TooManyLoginsError) -> Response:
+        detail, wait = "too many concurrent logins; try again", {"Retry-After": "1"}
+        return _render(request, 503, "Busy", detail, headers=wait)
 
     @app.exception_handler(CommandFailedError)
     async def _not_carried_out(request: Request, error: CommandFailedError) -> Response:

@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from fastapi import Depends, Query, Request
 from fastapi.responses import StreamingResponse
+from pydantic import BaseModel
 
 from service.api.downloads import attachment
 from service.runtime.times import rfc3339
@@ -79,6 +80,27 @@ class Column:
     def heading(self) -> str:
         """Column heading: the name, with the unit in brackets."""
         return harmless(self.name if self.unit is None else f"{self.name} [{self.unit}]")
+
+
+UNITS = {
+    "_n_per_m": "N/m",
+    "_of_kb": "1",
+    "_um_pk": "µm 0-pk",
+    "_percent": "%",
+    "_rpm": "r/min",
+    "_mw": "MW",
+    "_ratio": "1",
+    "_deg": "deg",
+    "_c": "°C",
+    "_s": "s",
+}
+"""Units of table columns, by suffix of the column name."""
+
+
+def column_of(model: type[BaseModel], name: str, values: Sequence[Any], prefix: str = "") -> Column:
+    """Return the column of a field of a model: kind and unit are those of the field."""
+    unit = next((unit for end, unit in UNITS.items() if name.endswith(end)), None)
+    return Column(prefix + name, kind_of(model.model_fields[name].annotation), values, unit)
 
 
 async def wanted_format(

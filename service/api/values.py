@@ -172,9 +172,7 @@ class FilmConditionModel(ApiModel):
     operating_state: Annotated[OperatingStateName, ByName]
     is_settled: bool
     cell: CellModel | None
-
     time: Time
-    """Time to which the operating condition refers."""
 
 
 PlaceName = Literal["shaft_x", "shaft_y", "bearing_x", "bearing_y"]

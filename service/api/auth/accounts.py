@@ -1,7 +1,5 @@
 """Routes for administrators: accounts of persons and API keys of machines."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Path, Request
@@ -10,7 +8,7 @@ from pydantic import FailFast, Field
 from service.api.auth.authenticator import Authenticator
 from service.api.auth.declared import Reach, subject_router
 from service.api.auth.gate import identity_of, name_caller
-from service.api.auth.passwords import MAX_LENGTH, PasswordRefusedError, TooManyLoginsError
+from service.api.auth.passwords import MAX_LENGTH
 from service.api.context import Context
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel, Time
@@ -18,11 +16,10 @@ from service.store.access.identities import (
     MAX_DAYS,
     MAX_NAME,
     Means,
-    NameRefusedError,
     Permission,
     Role,
 )
-from service.store.access.tables import AccessRefusedError, Account, UnknownAccountError
+from service.store.access.tables import Account
 
 RoleName = Literal["viewer", "operator", "engineer", "admin"]
 
@@ -31,14 +28,19 @@ LoginName = Annotated[
     str,
     Field(
         max_length=4 * MAX_NAME,
-        description="Name, of the characters a-z 0-9 . _ @ -.",
+        description="Name of the characters a-z 0-9 . _ @ -; not case-sensitive.",
         examples=["anna"],
     ),
 ]
 
 
 Password = Annotated[
-    str, Field(max_length=4 * MAX_LENGTH, examples=["a long and unusual sentence"])
+    str,
+    Field(
+        max_length=4 * MAX_LENGTH,
+        description="Password of 12 to 256 characters, at least 6 of them different.",
+        examples=["a long and unusual sentence"],
+    ),
 ]
 
 
@@ -62,12 +64,8 @@ class NewAccountModel(RequestModel):
     """Request to add an account of a person."""
 
     role: Annotated[RoleName, Field(examples=["operator"])]
-
     name: LoginName
-    """Login name, of the characters a-z 0-9 . _ @ -."""
-
     password: Password
-    """Initial password: 12 to 256 characters, at least 6 of them different."""
 
 
 class SetRoleModel(RequestModel):
@@ -80,7 +78,6 @@ class SetPasswordModel(RequestModel):
     """Request to set the password of an account."""
 
     password: Password
-    """New password: 12 to 256 characters, at least 6 of them different."""
 
 
 class KeyModel(ApiModel):
@@ -115,9 +112,7 @@ class NewKeyModel(RequestModel):
     """Request to create an API key for a machine."""
 
     role: Annotated[RoleName, Field(examples=["viewer"])]
-
     name: LoginName
-    """Name of the key, of the characters a-z 0-9 . _ @ -."""
 
     units: Annotated[list[UnitName], FailFast(), Field(max_length=200, default_factory=list)]
     """Units for which the key is valid; empty if it is valid for all units."""
@@ -136,27 +131,6 @@ class CreatedKeyModel(KeyModel):
 def account_model(account: Account) -> AccountModel:
     """Return the API model of an account, without its password hash."""
     return AccountModel.of(account, password_set=account.password_ns)
-
-
-@contextmanager
-def refusals_as_problems(password: str = "password") -> Iterator[None]:  # noqa: S107
-    """Return a context that converts errors of names, passwords and keys to `ProblemError`.
-
-    `password` is the name of the request parameter with the new password, for the error.
-    """
-    try:
-        yield
-    except NameRefusedError as error:
-        raise ProblemError(422, "Wrong parameter", str(error), "name") from error
-    except PasswordRefusedError as error:
-        raise ProblemError(422, "Wrong parameter", str(error), password) from error
-    except UnknownAccountError as error:
-        raise ProblemError(404, "Unknown account", "the account does not exist") from error
-    except AccessRefusedError as error:
-        raise ProblemError(409, "Conflict", str(error)) from error
-    except TooManyLoginsError as error:
-        detail = "too many concurrent logins; try again"
-        raise ProblemError(503, "Busy", detail, headers={"Retry-After": "1"}) from error
 
 
 AccountName = Annotated[
@@ -194,16 +168,14 @@ def account_router(authenticator: Authenticator) -> APIRouter:
     async def add_account(asked: NewAccountModel) -> AccountModel:
         """Add an account; its password must be changed at the first login."""
         new = asked.name, Role(asked.role), asked.password
-        with refusals_as_problems():
-            return await one(
-                await change(lambda: service.add(*new, now_ns(), must_change=True), hashes=True)
-            )
+        return await one(
+            await change(lambda: service.add(*new, now_ns(), must_change=True), hashes=True)
+        )
 
     @router.put("/{name}/role", responses=CHANGE_PROBLEMS)
     async def set_role(name: AccountName, asked: SetRoleModel) -> AccountModel:
         """Change the role of an account, effective from the next request of the person."""
-        with refusals_as_problems():
-            await change(lambda: stored.set_role(name, Role(asked.role), now_ns()))
+        await change(lambda: stored.set_role(name, Role(asked.role), now_ns()))
         return await one(name)
 
     @router.put("/{name}/password", responses=CHANGE_PROBLEMS)
@@ -217,18 +189,14 @@ def account_router(authenticator: Authenticator) -> APIRouter:
         _require_other(request, name, "use POST /session/password to change your own password")
         await one(name)  # before hashing, which is slow
         new = name, asked.password
-        with refusals_as_problems():
-            await change(
-                lambda: service.set_password(*new, now_ns(), must_change=True), hashes=True
-            )
+        await change(lambda: service.set_password(*new, now_ns(), must_change=True), hashes=True)
         return await one(name)
 
     @router.delete("/{name}", status_code=204, responses=CHANGE_PROBLEMS)
     async def remove_account(request: Request, name: AccountName) -> None:
         """Remove the account of another person, and end the sessions of the account."""
         _require_other(request, name, "you cannot remove your own account")
-        with refusals_as_problems():
-            await change(lambda: stored.remove(name, now_ns()))
+        await change(lambda: stored.remove(name, now_ns()))
 
     return router
 
@@ -265,10 +233,9 @@ def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
                 detail = f"unknown unit {unit!r}; known units: {', '.join(context.units)}"
                 raise ProblemError(422, "Wrong parameter", detail, "units")
         new, now_ns = (asked.name, Role(asked.role), asked.units, asked.days), clock.now_ns()
-        with refusals_as_problems():
-            made, shown = await authenticator.change(
-                lambda: authenticator.service.create_key(*new, now_ns)
-            )
+        made, shown = await authenticator.change(
+            lambda: authenticator.service.create_key(*new, now_ns)
+        )
         return CreatedKeyModel.of(made, state=made.state(now_ns), key=shown)
 
     @router.delete("/{key}", status_code=204, responses=CHANGE_PROBLEMS)

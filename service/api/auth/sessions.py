@@ -6,7 +6,7 @@ from typing import Annotated
 from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
-from service.api.auth.accounts import LoginName, Password, RoleName, refusals_as_problems
+from service.api.auth.accounts import LoginName, Password, RoleName
 from service.api.auth.authenticator import (
     COOKIE,
     PLAIN_COOKIE,
@@ -15,6 +15,7 @@ from service.api.auth.authenticator import (
 )
 from service.api.auth.declared import OPEN, Reach, needs
 from service.api.auth.gate import BEARER_ONLY, caller_of, identity_of
+from service.api.auth.passwords import PasswordRefusedError
 from service.api.auth.service import LoggedIn, NotLoggedIn
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel
@@ -48,33 +49,26 @@ class LoginModel(RequestModel):
     """Request to log in."""
 
     name: LoginName
-    """Login name; not case-sensitive."""
-
     password: Password
-    """Password of the account."""
 
 
 class NewPasswordModel(RequestModel):
     """Request to change the password of the caller."""
 
+    new_password: Password
+
     password: Password
     """Current password."""
-
-    new_password: Password
-    """New password: 12 to 256 characters, at least 6 of them different."""
 
 
 class SetUpModel(RequestModel):
     """Request to create the first account."""
 
+    name: LoginName
+    password: Password
+
     token: Annotated[str, Field(max_length=256, examples=["the token that the service printed"])]
     """Set-up token that the service printed when it started."""
-
-    name: LoginName
-    """Login name, of the characters a-z 0-9 . _ @ -."""
-
-    password: Password
-    """Password of the account: 12 to 256 characters, at least 6 of them different."""
 
 
 LOGIN_PROBLEMS = problem_responses(
@@ -109,8 +103,7 @@ def session_router(authenticator: Authenticator) -> APIRouter:
     @router.post("/session", status_code=201, responses=LOGIN_PROBLEMS, dependencies=[OPEN])
     async def log_in(request: Request, response: Response, asked: LoginModel) -> SessionModel:
         """Log in: start a session and set its cookie; an earlier session of the browser ends."""
-        with refusals_as_problems():
-            found = await authenticator.log_in(asked.name, asked.password, _peer(request))
+        found = await authenticator.log_in(asked.name, asked.password, _peer(request))
         logged_in, shown = _logged_in(found), caller_of(request).shown
         if shown.means is Means.SESSION:
             await authenticator.log_out(shown.secret, is_replaced=True)
@@ -141,18 +134,19 @@ def session_router(authenticator: Authenticator) -> APIRouter:
             raise ProblemError(409, "No password", detail)
         given = identity.name, asked.password, asked.new_password, _peer(request)
         change, times = authenticator.service.change_password, authenticator.now
-        with refusals_as_problems("new_password"):
+        try:
             found = await authenticator.change(lambda: change(*given, *times), hashes=True)
+        except PasswordRefusedError as error:
+            raise ProblemError(422, "Wrong parameter", str(error), "new_password") from error
         return await _begun(authenticator, request, response, _logged_in(found))
 
     @router.post("/set-up", status_code=201, responses=SET_UP_PROBLEMS, dependencies=[OPEN])
     async def create_first_account(request: Request, asked: SetUpModel) -> SessionModel:
         """Create the first account, an administrator, with the token that the service printed."""
         given, now_ns = (asked.token, asked.name, asked.password), authenticator.clock.now_ns()
-        with refusals_as_problems():
-            is_made = await authenticator.work.run_hashing(
-                lambda: authenticator.service.set_up(*given, now_ns), is_known=False
-            )
+        is_made = await authenticator.work.run_hashing(
+            lambda: authenticator.service.set_up(*given, now_ns), is_known=False
+        )
         if not is_made:
             detail = "the token is wrong or was used, or an account exists already"
             raise ProblemError(403, "Setup rejected", detail)

@@ -29,7 +29,13 @@ from service.store.port import StoredEvent, ValueRange
 
 ConditionName = Literal["active", "within_limits", "unknown"]
 
-AlarmIdText = Annotated[str, Field(examples=["U1:ujb_shaft_x:channel_not_ok"])]
+AlarmIdText = Annotated[
+    str,
+    Field(
+        description="Identifier of the alarm: unit, subject and kind, separated by colons.",
+        examples=["U1:ujb_shaft_x:channel_not_ok"],
+    ),
+]
 
 
 class HoldModel(ApiModel):
@@ -89,7 +95,6 @@ class AlarmModel(AlarmFactsModel):
     """Alarm with its current state."""
 
     id: AlarmIdText
-    """Stable identifier of the alarm: unit, subject and kind, separated by colons."""
 
     state: AlarmState
     """State of the alarm in the alarm life cycle of ISA-18.2."""
@@ -165,8 +170,6 @@ class AlarmEventModel(AlarmFactsModel):
 
     alarm: AlarmIdText
     number: int
-    """Number of the event in the history of the alarm, from 1 without gaps."""
-
     change: AlarmChange
 
     level: Annotated[AlarmLevelName, ByName] | None

@@ -11,7 +11,6 @@ from pydantic import Field
 from core.alarms.operation import (
     Acknowledge,
     Action,
-    ActionRefusedError,
     Comment,
     Reset,
     ReturnToService,
@@ -50,8 +49,8 @@ from service.api.routes.alarm_models import (
     grid_of,
     is_raised_within,
 )
-from service.api.tables import Column, Format, kind_of, table_content, table_response
-from service.api.values import ActorModel, ApiModel, NoteText, ReasonText, states_named
+from service.api.tables import Column, Format, column_of, table_content, table_response
+from service.api.values import ActorModel, NoteText, ReasonText, states_named
 from service.settings.alarm_kinds import AlarmKindName, AlarmLevelName
 from service.store.access.identities import Permission
 from service.store.port import AlarmQuery, StoredEvent
@@ -87,33 +86,18 @@ class ShelveModel(OutageModel):
     """Duration of the shelving, s; the plant file sets the maximum."""
 
 
-RAISED_AT = {
-    "operating_state": None,
-    "eccentricity_ratio": "1",
-    "attitude_deg": "deg",
-    "oil_temperature_c": "°C",
-}
-"""Units of the columns for the operating condition in which an alarm was raised, by column."""
-
-
 def event_table(events: Sequence[StoredEvent], grid: CellGrid) -> list[Column]:
     """Return alarm events as table columns: ``time_utc``, and columns named as the JSON fields."""
     rows = [event_model(stored, grid) for stored in events]
     times = Column("time_utc", "time", [stored.event.time_ns for stored in events])
     flat = [name for name in AlarmEventModel.model_fields if name not in ("time", "raised_at")]
-    points = [row.raised_at for row in rows]
+    points = [name for name in RaisedAtModel.model_fields if name != "cell"]
+    at = [row.raised_at for row in rows]
     return [
         times,
-        *(_column(AlarmEventModel, name, rows) for name in flat),
-        *(_column(RaisedAtModel, name, points, unit) for name, unit in RAISED_AT.items()),
+        *(column_of(AlarmEventModel, name, [getattr(e, name) for e in rows]) for name in flat),
+        *(column_of(RaisedAtModel, n, [e and getattr(e, n) for e in at]) for n in points),
     ]
-
-
-def _column(
-    model: type[ApiModel], name: str, rows: Sequence[ApiModel | None], unit: str | None = None
-) -> Column:
-    kind = kind_of(model.model_fields[name].annotation)
-    return Column(name, kind, [row and getattr(row, name) for row in rows], unit)
 
 
 MAX_EVENTS = 1000
@@ -356,8 +340,6 @@ async def _done(context: Context, id_: str, action: Action) -> AlarmModel:
         alarm = await context.operators.operate(id_, action)
     except LookupError as error:
         raise _unknown(id_) from error
-    except ActionRefusedError as error:
-        raise ProblemError(409, "Conflict", f"alarm {id_}: {error}") from error
     return alarm_model(context.alarms, context.films, alarm)
 
 

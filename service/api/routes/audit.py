@@ -23,16 +23,12 @@ class AuditEntryModel(ApiModel):
 
     actor: Annotated[str, Field(examples=["A. Name"])]
     reason: str
+    number: Annotated[int, Field(examples=[117])]
+    time: Time
 
     chain: Annotated[str, Field(examples=["access"])]
     """Chain of the entry. With SQLite, `access` has logins, accounts, keys and refused requests,
     and `padwatch` has everything else; with PostgreSQL, the only chain is `postgresql`."""
-
-    number: Annotated[int, Field(examples=[117])]
-    """Number of the entry in its chain, from 1 without gaps."""
-
-    time: Time
-    """Time of the action."""
 
     source: Source
     """Source of the action: API, command line, or padwatch itself."""

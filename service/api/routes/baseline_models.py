@@ -171,15 +171,13 @@ class BaselineStepModel(ApiModel):
 
     actor: str
     reason: str
+    time: Time
 
     step: BaselineStep
     """Kind of step."""
 
     version: int | None
     """Version of the baseline; null for "renewed"."""
-
-    time: Time
-    """Time of the step."""
 
     event_time: Time | None
     """For "renewed", time of the machine event; earlier readings are not used."""

@@ -34,7 +34,6 @@ from service.api.values import bounds, listed
 from service.live.commands import (
     Accept,
     BaselineAction,
-    BaselineRefusedError,
     Freeze,
     Reject,
     Renew,
@@ -223,10 +222,7 @@ async def _done(
 ) -> BaselinesModel:
     """Execute an action on baselines; return the baselines after the action is stored."""
     place = watched_place(context, unit, bearing)
-    try:
-        await context.operators.act(place, action, actor_or(asked.actor), asked.reason)
-    except BaselineRefusedError as error:
-        raise ProblemError(409, "Conflict", f"{unit} {bearing}: {error}") from error
+    await context.operators.act(place, action, actor_or(asked.actor), asked.reason)
     return await asyncio.to_thread(_baselines, context, unit, bearing)
 
 

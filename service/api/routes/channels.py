@@ -7,8 +7,8 @@ import numpy as np
 from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
+from acquisition.delivery.units import UNIT_OF
 from core.arrays import SampleArray
-from core.machine.channel import Measurand
 from core.quality import Level, Quality, Reason, bad, missing, worst
 from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
@@ -26,7 +26,7 @@ from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.units import UnitSettings
 
 ChannelUnit = Annotated[
-    Literal["um", "mm/s", "m/s2", "V"], Field(examples=["um"], description="Engineering unit.")
+    str, Field(examples=["um"], description="Engineering unit: um, mm/s, m/s2 or V.")
 ]
 
 
@@ -41,9 +41,7 @@ class WaveformChannelModel(ChannelModel):
     """Settings of a waveform channel, and its samples in the newest block."""
 
     settings: ChannelSettings
-
     unit: ChannelUnit
-    """Engineering unit of the samples."""
 
     direction: Literal[1, -1]
     """+1 if the reading increases with motion along the positive bearing axis, else -1."""
@@ -91,9 +89,7 @@ class ChannelSamplesModel(ApiModel):
     """Samples of one waveform channel."""
 
     quality: QualityModel
-
     unit: ChannelUnit
-    """Engineering unit of the samples."""
 
     sample: list[float | None]
     """Samples at consecutive indices; null if a sample is missing or the channel was bad."""
@@ -112,15 +108,6 @@ class WaveformModel(SampleRange):
     channels: dict[str, ChannelSamplesModel]
     """Samples of the requested channels, by identifier of the channel."""
 
-
-UNITS: dict[Measurand, ChannelUnit] = {
-    Measurand.GAP_UM: "um",
-    Measurand.DISPLACEMENT_UM: "um",
-    Measurand.VELOCITY_MM_S: "mm/s",
-    Measurand.ACCELERATION_M_S2: "m/s2",
-    Measurand.KEY_PHASE_V: "V",
-}
-"""Engineering units of waveform channels by measurand, written as in exported recordings."""
 
 USES = (*CHANNEL_KEYS, *OPTIONAL_CHANNEL_KEYS, *GAP_KEYS, "oil_temperature")
 """Keys of a bearing in the plant file that contain channel identifiers."""
@@ -174,7 +161,7 @@ def _waveform(
     quality = bad(why) if block is None else worst(block.channel_quality[row] for row in rows)
     return WaveformChannelModel.of(
         settings=channel,
-        unit=UNITS[channel.measurand],
+        unit=UNIT_OF[channel.measurand],
         direction=channel.sign,
         used_by=used_by,
         quality=quality,
@@ -223,7 +210,7 @@ def waveform_model(
     `channels` are the identifiers of the channels in the window, at least one; `received_ns` is the
     arrival time of the newest sample, UTC nanoseconds since 1970.
     """
-    units = {each.id: UNITS[each.measurand] for each in settings.channel}
+    units = {each.id: UNIT_OF[each.measurand] for each in settings.channel}
     return WaveformModel.of(
         window,
         unit=settings.id,

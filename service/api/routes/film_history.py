@@ -20,7 +20,7 @@ from service.api.parameters import Eccentricity, OilTemperature, States, TimeRan
 from service.api.problems import problem_responses
 from service.api.routes.film_models import VerdictName
 from service.api.routes.films import watched_place
-from service.api.tables import Column, Format, kind_of, table_content, table_response
+from service.api.tables import Column, Format, column_of, table_content, table_response
 from service.api.values import (
     ApiModel,
     BearingHistory,
@@ -185,20 +185,6 @@ def _series(found: FilmHistory, direction: int, rows: Rows) -> FilmSeriesModel:
     )
 
 
-UNITS = {
-    "_n_per_m": "N/m",
-    "_of_kb": "1",
-    "_um_pk": "µm 0-pk",
-    "_percent": "%",
-    "_rpm": "r/min",
-    "_mw": "MW",
-    "_ratio": "1",
-    "_deg": "deg",
-    "_c": "°C",
-    "_s": "s",
-}
-"""Units of table columns, by suffix of the column name."""
-
 CONDITION = (
     *("provenance", "operating_state", "is_settled", "speed_rpm", "power_mw"),
     *("eccentricity_ratio", "attitude_deg", "oil_temperature_c", "baseline_version"),
@@ -222,9 +208,7 @@ def film_table(model: FilmReadingsModel, found: FilmHistory, rows: list[int]) ->
 
 def _columns(model: ApiModel, names: Iterable[str], prefix: str = "") -> Iterator[Column]:
     for name in names:
-        unit = next((unit for end, unit in UNITS.items() if name.endswith(end)), None)
-        kind = kind_of(type(model).model_fields[name].annotation)
-        yield Column(prefix + name, kind, getattr(model, name), unit)
+        yield column_of(type(model), name, getattr(model, name), prefix)
 
 
 MAX_POINTS = 20_000

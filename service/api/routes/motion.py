@@ -28,7 +28,6 @@ from service.live.samples import newest_blocks, sample_window
 from service.live.status import HELD_S
 from service.recordings.library import RecordingEntry
 from service.recordings.motion import (
-    NoMotionError,
     Order1,
     RecordedMotion,
     ShaftMotion,
@@ -238,9 +237,6 @@ def recorded_motion_router(context: Context) -> APIRouter:
             _require_few(seconds, kept.manifest.rate_hz)
         try:
             return await rendered(lambda: _recorded(context, kept.name, watched, start_s, seconds))
-        except NoMotionError as error:
-            detail = f"recording {recording}: {error}"
-            raise ProblemError(409, "No samples", detail) from error
         except ConfigError as error:
             raise damaged_recording(recording, error) from error
 

@@ -21,9 +21,7 @@ class NoteModel(ApiModel):
 
     bearing: str | None
     author: str
-
     time: Time
-    """Time to which the note refers."""
 
     text: str
     """Text of the note."""

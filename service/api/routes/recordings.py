@@ -8,6 +8,7 @@ from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import StreamingResponse
 from pydantic import Field
 
+from acquisition.delivery.units import UNIT_OF
 from acquisition.errors import ConfigError
 from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
@@ -15,7 +16,8 @@ from service.api.context import Context
 from service.api.downloads import attachment, file_content
 from service.api.parameters import only
 from service.api.problems import ProblemError, problem_responses
-from service.api.routes.channels import UNITS, ChannelUnit
+from service.api.routes.alarm_models import AlarmIdText
+from service.api.routes.channels import ChannelUnit
 from service.api.values import ApiModel, Time
 from service.recordings.library import RecordingEntry, RecordingLibrary
 from service.store.waveforms import WaveformKind
@@ -24,7 +26,7 @@ from service.store.waveforms import WaveformKind
 class RunningRecordingModel(ApiModel):
     """Recording in progress, identified by the alarm that caused it."""
 
-    alarm: Annotated[str, Field(examples=["U1:UJB:shaft_x"])]
+    alarm: AlarmIdText
     occurrence: int
 
 
@@ -32,12 +34,10 @@ class RecordingAlarmModel(RunningRecordingModel):
     """Alarm event that caused a recording."""
 
     change: Annotated[str, Field(examples=["raised"])]
+    time: Time
 
     level: str | None
     """Level of the alarm at the time of the event; null without a level."""
-
-    time: Time
-    """Time of the event."""
 
 
 class RecordingModel(ApiModel):
@@ -151,7 +151,7 @@ def recording_info(shelf: RecordingLibrary, kept: RecordingEntry) -> RecordingIn
         manifest,
         recording=recording_model(kept),
         end=summary.stop_ns,
-        channels={each.id: UNITS[each.measurand] for each in manifest.channels},
+        channels={each.id: UNIT_OF[each.measurand] for each in manifest.channels},
         slow_channels={each.id: each.unit for each in manifest.slow_channels},
     )
 

@@ -9,7 +9,7 @@ from pydantic import Field
 from service.api.auth.declared import needs, subject_router
 from service.api.auth.gate import actor_or
 from service.api.context import BearingId, Context, UnitId
-from service.api.problems import ProblemError, problem_responses
+from service.api.problems import problem_responses
 from service.api.routes.bearings import Author, MicrometrePair, Note
 from service.api.values import (
     ActorModel,
@@ -21,7 +21,7 @@ from service.api.values import (
     PlaceName,
     Time,
 )
-from service.live.commands import ReferenceRefusedError, TakeReference
+from service.live.commands import TakeReference
 from service.store.access.identities import Permission
 from service.store.references import GapReference, SetVectorReference
 
@@ -120,11 +120,7 @@ def reference_router(context: Context) -> APIRouter:
         """Store the 1× vectors of the newest result as reference for its operating state."""
         context.bearing(unit, bearing)
         command = TakeReference(unit, bearing, actor_or(asked.actor), asked.note)
-        try:
-            return _model(await context.operators.take_reference(command))
-        except ReferenceRefusedError as error:
-            detail = f"unit {unit} bearing {bearing}: {error}"
-            raise ProblemError(409, "No reference", detail) from error
+        return _model(await context.operators.take_reference(command))
 
     return router
 
