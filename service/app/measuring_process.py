@@ -11,14 +11,7 @@ from acquisition.clock import Clock
 from core.alarms.alarm import AlarmNews
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
-from service.app.kept_files import (
-    captures_of,
-    evidence_of,
-    space_watch,
-    tape_of,
-    watch,
-    waveform_keeper,
-)
+from service.app import kept_files
 from service.app.notifications import receivers_of
 from service.app.service_health import Pressure, health_of
 from service.cluster.measuring_side import CommandWorker, Reporter, process_name
@@ -180,11 +173,11 @@ async def analysis_on(
         on_stored=deliveries.wake,
         finds_again=stream is not None,
     )
-    captures = captures_of(plant, origin, clock)
-    recordings = waveform_keeper(plant, store, clock)
+    captures = kept_files.captures_of(plant, origin, clock)
+    recordings = kept_files.waveform_keeper(plant, store, clock)
     pressure = Pressure(bus, recordings.is_full)
-    tape = tape_of(plant, origin, clock, pressure.look)
-    space = space_watch(plant, clock)
+    tape = kept_files.tape_of(plant, origin, clock, pressure.look)
+    space = kept_files.space_watch(plant, clock)
     look = health_of(
         monitors, live, recorder, captures, bus, space, tape, recordings, soundness, stream
     )
@@ -210,8 +203,8 @@ async def analysis_on(
     for unit, memory in memories.items():
         films.resume(unit, memory.films)
     alarm_context.watch_films(films.newest)
-    evidence = evidence_of(plant, origin, live, films, store, captures, clock)
-    watch(evidence, alarms, captures, origin)
+    evidence = kept_files.evidence_of(plant, origin, live, films, store, captures, clock)
+    kept_files.watch(evidence, alarms, captures, origin)
     references = ReferencesInForce(
         *(machines.values(), store, clock),
         on_change=lambda unit: monitors[unit.id].replace_description(unit),

@@ -22,11 +22,8 @@ from service.store.store import Store
 class Reporter:
     """Writer of reports on units to the database, from which the serving processes read them.
 
-    Parameters
-    ----------
-    held
-        Function that returns the ids of the units that this process is responsible for, also
-        `PLANT` if it reports the alarms without a unit, `SHARED` if it runs the plant-wide tasks.
+    `held` returns the ids of the units that this process is responsible for, also `PLANT` if it
+    reports the alarms without a unit, `SHARED` if it runs the plant-wide tasks.
     """
 
     def __init__(

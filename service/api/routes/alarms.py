@@ -8,16 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from pydantic import Field
 
-from core.alarms.operation import (
-    Acknowledge,
-    Action,
-    Comment,
-    Reset,
-    ReturnToService,
-    Shelve,
-    TakeOutOfService,
-    Unshelve,
-)
+from core.alarms import operation
 from core.condition.cells import CellGrid
 from core.limits import AlarmLevel
 from core.units import ns_from_s
@@ -253,7 +244,7 @@ def operation_router(context: Context) -> APIRouter:
     async def acknowledge(alarm: AlarmId, asked: AcknowledgeModel) -> AlarmModel:
         """Acknowledge an occurrence of an alarm; repeating the request changes nothing."""
         return await _done(
-            context, alarm, Acknowledge(**{**dict(asked), "actor": actor_or(asked.actor)})
+            context, alarm, operation.Acknowledge(**{**dict(asked), "actor": actor_or(asked.actor)})
         )
 
     @router.post("/shelve", responses=ACTION_PROBLEMS)
@@ -263,33 +254,37 @@ def operation_router(context: Context) -> APIRouter:
             detail = f"duration_s must be at most {context.max_shelf_s:g}, got {asked.duration_s:g}"
             raise ProblemError(422, "Wrong parameter", detail, "duration_s")
         until_ns = context.clock.now_ns() + ns_from_s(asked.duration_s)
-        return await _done(context, alarm, Shelve(actor_or(asked.actor), asked.reason, until_ns))
+        return await _done(
+            context, alarm, operation.Shelve(actor_or(asked.actor), asked.reason, until_ns)
+        )
 
     @router.post("/unshelve", responses=ACTION_PROBLEMS)
     async def unshelve(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """End the shelving of an alarm early."""
-        return await _done(context, alarm, Unshelve(actor_or(asked.actor)))
+        return await _done(context, alarm, operation.Unshelve(actor_or(asked.actor)))
 
     @router.post("/out-of-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
     async def take_out_of_service(alarm: AlarmId, asked: OutageModel) -> AlarmModel:
         """Hide an alarm until it is returned to service, for example for maintenance."""
-        return await _done(context, alarm, TakeOutOfService(actor_or(asked.actor), asked.reason))
+        return await _done(
+            context, alarm, operation.TakeOutOfService(actor_or(asked.actor), asked.reason)
+        )
 
     @router.post("/return-to-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
     async def return_to_service(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """Return an alarm to service; an active alarm is announced again."""
-        return await _done(context, alarm, ReturnToService(actor_or(asked.actor)))
+        return await _done(context, alarm, operation.ReturnToService(actor_or(asked.actor)))
 
     @router.post("/reset", responses=ACTION_PROBLEMS)
     async def reset_latched_alarm(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """Release the latch of an acknowledged alarm whose condition has cleared."""
-        return await _done(context, alarm, Reset(actor_or(asked.actor)))
+        return await _done(context, alarm, operation.Reset(actor_or(asked.actor)))
 
     @router.post("/comment", responses=ACTION_PROBLEMS | COMMENT_LIMIT)
     async def comment(request: Request, alarm: AlarmId, asked: CommentModel) -> AlarmModel:
         """Add a comment to the events of an alarm; the state of the alarm does not change."""
         allowances.take(request, context.clock.monotonic_s())
-        return await _done(context, alarm, Comment(actor_or(asked.actor), asked.text))
+        return await _done(context, alarm, operation.Comment(actor_or(asked.actor), asked.text))
 
     return router
 
@@ -334,7 +329,7 @@ async def event_query(
     )
 
 
-async def _done(context: Context, id_: str, action: Action) -> AlarmModel:
+async def _done(context: Context, id_: str, action: operation.Action) -> AlarmModel:
     """Execute an operation on an alarm; return the alarm after the operation is stored."""
     try:
         alarm = await context.operators.operate(id_, action)

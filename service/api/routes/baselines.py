@@ -31,14 +31,7 @@ from service.api.routes.baseline_models import (
 )
 from service.api.routes.films import watched_place
 from service.api.values import bounds, listed
-from service.live.commands import (
-    Accept,
-    BaselineAction,
-    Freeze,
-    Reject,
-    Renew,
-    Thaw,
-)
+from service.live import commands
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
 from service.store.baselines import (
@@ -178,7 +171,7 @@ def baseline_action_router(context: Context) -> APIRouter:
     ) -> BaselinesModel:
         """Accept a baseline version, which is in force from the next reading."""
         await asyncio.to_thread(_require_version, context, unit, bearing, version)
-        return await _done(context, unit, bearing, Accept(version), asked)
+        return await _done(context, unit, bearing, commands.Accept(version), asked)
 
     @router.post("/{version}/reject", responses=ACTION_PROBLEMS)
     async def reject_baseline(
@@ -186,21 +179,21 @@ def baseline_action_router(context: Context) -> APIRouter:
     ) -> BaselinesModel:
         """Reject a version; if it was in force, none is in force until another is accepted."""
         await asyncio.to_thread(_require_version, context, unit, bearing, version)
-        return await _done(context, unit, bearing, Reject(version), asked)
+        return await _done(context, unit, bearing, commands.Reject(version), asked)
 
     @router.post("/freeze", responses=ACTION_PROBLEMS)
     async def freeze_baseline(
         unit: UnitId, bearing: BearingId, asked: BaselineActionModel
     ) -> BaselinesModel:
         """Suspend the learning of baselines; the version in force does not change."""
-        return await _done(context, unit, bearing, Freeze(), asked)
+        return await _done(context, unit, bearing, commands.Freeze(), asked)
 
     @router.post("/thaw", responses=ACTION_PROBLEMS)
     async def thaw_baseline(
         unit: UnitId, bearing: BearingId, asked: BaselineActionModel
     ) -> BaselinesModel:
         """Resume learning after a freeze, until the end of the learning period."""
-        return await _done(context, unit, bearing, Thaw(), asked)
+        return await _done(context, unit, bearing, commands.Thaw(), asked)
 
     @router.post("/renew", responses=ACTION_PROBLEMS)
     async def renew_baseline(unit: UnitId, bearing: BearingId, asked: RenewModel) -> BaselinesModel:
@@ -212,13 +205,17 @@ def baseline_action_router(context: Context) -> APIRouter:
         if from_ns < 0:
             detail = f"event_time must not be before 1970, got {rfc3339(from_ns)}"
             raise ProblemError(422, "Wrong parameter", detail, "event_time")
-        return await _done(context, unit, bearing, Renew(from_ns), asked)
+        return await _done(context, unit, bearing, commands.Renew(from_ns), asked)
 
     return router
 
 
 async def _done(
-    context: Context, unit: str, bearing: str, action: BaselineAction, asked: BaselineActionModel
+    context: Context,
+    unit: str,
+    bearing: str,
+    action: commands.BaselineAction,
+    asked: BaselineActionModel,
 ) -> BaselinesModel:
     """Execute an action on baselines; return the baselines after the action is stored."""
     place = watched_place(context, unit, bearing)
