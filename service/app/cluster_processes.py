@@ -4,6 +4,7 @@ import asyncio
 import socket
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
+from functools import partial
 
 from prometheus_client.process_collector import ProcessCollector
 
@@ -29,9 +30,10 @@ from service.measuring.live_view import LiveView
 from service.measuring.service_alarms import StreamStatus
 from service.measuring.sources import WatchedUnit
 from service.notifications.message import LiveContext
-from service.runtime.heartbeats import Heartbeats, Pulse
+from service.runtime.heartbeats import Heartbeats, Loop
 from service.runtime.listening import url_of
 from service.runtime.metrics import MEASURED, Families
+from service.runtime.periodic import periodic
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.core_values import stale_after_s
 from service.settings.plant import PlantFile
@@ -208,13 +210,10 @@ class Analysing:
         after_s = silences_s(process.plant.unit, self._settings.silent_after_s)
         silence = SilenceWatch(after_s, analysis.analyser, process.live, clock)
 
-        async def watch(pulse: Pulse) -> None:
-            """Check periodically that this process holds its units, and which units are silent."""
-            while True:
-                pulse.beat(WATCH_EVERY_S)
-                await asyncio.to_thread(self._holds.require)
-                silence.look(consumer.units, consumer.trouble, consumer.waiting)
-                await clock.sleep(WATCH_EVERY_S)
+        async def watch() -> None:
+            """Check that this process holds its units, and which units are silent."""
+            await asyncio.to_thread(self._holds.require)
+            silence.look(consumer.units, consumer.trouble, consumer.waiting)
 
         def held() -> list[str]:
             """Return the units and shared parts whose state this process publishes now."""
@@ -223,11 +222,11 @@ class Analysing:
 
         shared = {**analysis.shared_loops, "silent units": silent.run}
         leadership = Leadership(store.hold, shared, process.beats, clock)
-        loops = {
+        loops: dict[str, Loop] = {
             "lead": leadership.run,
             "record": analysis.recorder.run,
             "stream": consumer.run,
-            "watch": watch,
+            "watch": partial(periodic, watch, WATCH_EVERY_S, clock),
             **reporting_loops(analysis, held),
             **analysis.own_loops,
         }

@@ -35,8 +35,9 @@ from service.live.references import ReferencesInForce
 from service.live.snapshot import Report
 from service.reports.archive import EvidenceArchive
 from service.reports.routes import EvidenceService
-from service.runtime.heartbeats import Heartbeats, Loop, Pulse
+from service.runtime.heartbeats import Heartbeats, Loop
 from service.runtime.listening import url_of
+from service.runtime.periodic import periodic
 from service.runtime.process import (
     exempt_start,
     leave,
@@ -139,18 +140,11 @@ def evidence_of(
 ACCESS_EVERY_S = 10.0
 
 
-def access_reports(access: AccessStore, exchange: ServingEnd, clock: Clock) -> Loop:
-    """Return a loop that reports faults of the database of accounts to the measuring process."""
-
-    async def report(pulse: Pulse) -> None:
-        while True:
-            pulse.beat(ACCESS_EVERY_S)
-            trouble = await asyncio.to_thread(lambda: access.trouble)
-            with suppress(MeasuringGoneError):  # the next report repeats it
-                await exchange.ask("access", json.dumps([trouble]))
-            await clock.sleep(ACCESS_EVERY_S)
-
-    return report
+async def report_access(access: AccessStore, exchange: ServingEnd) -> None:
+    """Report a fault of the database of accounts, or that it has none, to the measuring process."""
+    trouble = await asyncio.to_thread(lambda: access.trouble)
+    with suppress(MeasuringGoneError):  # the next report repeats it
+        await exchange.ask("access", json.dumps([trouble]))
 
 
 async def serve_beside(
@@ -208,9 +202,10 @@ async def serve_beside(
                 await exchange.ask("ready", json.dumps([url, token]))
 
         try:
-            loops = {
+            report = partial(report_access, access, exchange)
+            loops: dict[str, Loop] = {
                 "references": references.run,
-                "access": access_reports(access, exchange, clock),
+                "access": partial(periodic, report, ACCESS_EVERY_S, clock),
             }
             await serve_requests(context, plant, listener, desk, loops, stopped, ready, evidence)
         finally:

@@ -7,6 +7,7 @@ import structlog
 from acquisition.clock import Clock
 from service.measuring.live_view import LiveView
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.periodic import periodic
 from service.store.access.audit_entries import AuditAction
 from service.store.port import StoreError
 from service.store.seals import Place
@@ -60,10 +61,7 @@ class IntegrityMonitor:
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Check the database periodically, until cancelled; `pulse` gets heartbeats."""
-        while True:
-            await self.look()
-            pulse.beat(LOOK_EVERY_S)
-            await self._clock.sleep(LOOK_EVERY_S)
+        await periodic(self.look, LOOK_EVERY_S, self._clock, pulse)
 
     async def look(self) -> None:
         """Check the database file and stored rows once; log and audit new faults."""

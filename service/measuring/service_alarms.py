@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import structlog
 
 from acquisition.clock import Clock
+from acquisition.delivery.arrival import Arrival
 from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.board import AlarmBoard, AlarmMemory
 from core.alarms.kinds import watch
@@ -83,19 +84,16 @@ class HostTime:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._seen: tuple[int, float] | None = None
+        self._seen: Arrival | None = None
 
     def look(self) -> tuple[int, bool]:
         """Return the time, ns since 1970 UTC, and whether the clock was set since the last call."""
-        now_ns, steady_s = self._clock.now_ns(), self._clock.monotonic_s()
-        before, self._seen = self._seen, (now_ns, steady_s)
-        if before is None:
-            return now_ns, False
-        step_s = (now_ns - before[0]) / NS_PER_S - (steady_s - before[1])
-        if abs(step_s) <= CLOCK_STEP_S:
-            return now_ns, False
-        log.warning("the clock of this host was set", by_s=round(step_s, 3))
-        return now_ns, True
+        before, self._seen = self._seen, Arrival.now(self._clock)
+        step_s = self._seen.step_s_since(before) if before else 0.0
+        was_set = abs(step_s) > CLOCK_STEP_S
+        if was_set:
+            log.warning("the clock of this host was set", by_s=round(step_s, 3))
+        return self._seen.host_ns, was_set
 
 
 FULL_SHARE = 0.9

@@ -52,9 +52,6 @@ class ReceiverModel(ApiModel):
     state: SenderStateName
     """State of the delivery of messages to the receiver."""
 
-    is_failing: bool
-    """Whether the newest delivery attempt failed."""
-
     n_failures: int
     """Number of failed delivery attempts since the last success."""
 
@@ -118,7 +115,6 @@ def _receiver(view: ReceiverView) -> ReceiverModel:
         kind=receiver and receiver.kind,
         address=receiver and receiver.address,
         state=status.state if receiver else "not_in_the_plant_file",
-        is_failing=status.n_failures > 0,
         waiting_since=backlog.oldest_ns,
         last_dead=dead
         and DeadLetterModel.of(dead, outcome=dead.state, reason=dead.answer, time=dead.done_ns),

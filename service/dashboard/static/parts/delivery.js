@@ -25,14 +25,14 @@ export function deliveryView() {
   };
 }
 
-const isTroubled = (one) => one.is_failing || one.n_waiting > 0 || one.n_dead > 0 || one.state === "store_fails";
+const isTroubled = (one) => one.n_failures > 0 || one.n_waiting > 0 || one.n_dead > 0 || one.state === "store_fails";
 
-const lookOf = (one) => (one.is_failing || one.state === "store_fails" ? "bad" : "uncertain");
+const lookOf = (one) => (one.n_failures > 0 || one.state === "store_fails" ? "bad" : "uncertain");
 
 /** `maximo: not reached since 12:03:05, 7 attempts: Connection refused; 12 messages wait` */
 export function lineWords(one) {
   const words = [];
-  if (one.is_failing) {
+  if (one.n_failures > 0) {
     const attempts = one.n_failures === 1 ? "1 attempt" : `${one.n_failures} attempts`;
     words.push(`not delivered since ${time(one.failing_since)}, ${attempts}: ${one.reason}`);
   }
