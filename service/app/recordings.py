@@ -4,7 +4,6 @@ import threading
 from collections.abc import AsyncGenerator, AsyncIterator, Iterable
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 from acquisition.clock import Clock
@@ -15,7 +14,7 @@ from acquisition.recordings.source import RecordingSource, Selection, select
 from acquisition.recordings.writer import RecordingWriter
 from acquisition.source import SampleSource
 from core.samples.blocks import SampleBlock
-from core.units import NS_PER_S
+from service.runtime.times import compact
 from service.settings.adapter_values import recorded_unit
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.plant import PlantFile
@@ -88,9 +87,8 @@ def replayed_plant(plant: PlantFile, units: Iterable[str], folder: Path) -> Plan
 
 def replay_folder(plant: PlantFile, recordings: Iterable[Path], now_ns: int) -> Path:
     """Return the folder for the results of a replay, named after its recordings and the time."""
-    moment = datetime.fromtimestamp(now_ns // NS_PER_S, UTC).strftime("%Y%m%dT%H%M%SZ")
     name = "+".join(path.resolve().name for path in recordings)[:80]
-    return Path(plant.service.data_folder) / REPLAYS / f"{name}-{moment}"
+    return Path(plant.service.data_folder) / REPLAYS / f"{name}-{compact(now_ns)}"
 
 
 class PlayedOut:

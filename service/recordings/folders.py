@@ -4,14 +4,13 @@ import os
 import re
 import uuid
 from collections.abc import Container, Iterator
-from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
 
 from acquisition.recordings.manifest import BLOCKS, MANIFEST, SAMPLES
 from acquisition.recordings.writer import INCOMPLETE
-from core.units import NS_PER_S
 from service.runtime.files import write_whole
+from service.runtime.times import compact
 
 CONTINUOUS = "continuous"
 """Last part of the name of a continuous recording; a capture name ends with the alarm kind."""
@@ -40,9 +39,7 @@ _NAME = re.compile(r"(.+)-\d{8}T\d{6}\.\d{3}Z-")
 
 def new_folder(root: Path, unit: str, time_ns: int, kind: str) -> Path:
     """Return an unused path for a recording's folder; its name has unit, start time and `kind`."""
-    seconds, ns = divmod(time_ns, NS_PER_S)
-    moment = f"{datetime.fromtimestamp(seconds, UTC):%Y%m%dT%H%M%S}.{ns // 1_000_000:03d}Z"
-    return _free(root / f"{unit}-{moment}-{kind}", "", PARTS, INCOMPLETE)
+    return _free(root / f"{unit}-{compact(time_ns)}-{kind}", "", PARTS, INCOMPLETE)
 
 
 def unit_of(name: str) -> str | None:

@@ -211,7 +211,7 @@ async def test_before_its_end_a_lost_link_is_lost_and_a_daq_that_is_gone_is_not_
 def test_results_of_a_replay_lie_apart_under_what_was_played_and_when(deploy):
     plant = load_plant_file(deploy / "demo.toml")
     folder = replay_folder(plant, [Path("runs/march"), Path("runs/april")], NEW_YEAR_NS)
-    assert folder == Path("var/demo/replays/march+april-20260101T000000Z")
+    assert folder == Path("var/demo/replays/march+april-20260101T000000.000Z")
     played = replayed_plant(plant, ["U2"], folder)
     assert [unit.id for unit in played.unit] == ["U2"]
     assert played.service.data_folder == str(folder)
