@@ -14,8 +14,6 @@ MEANINGS = {
     "label": "Description of the quantity in words.",
     "estimator": "Estimator of the stiffness; null if the film is not watched.",
     "clearance_um": "Radial clearance in operation, µm.",
-    "used_by": "Uses of the channel in the plant file: bearing identifier with key of the bearing,"
-    " or key of the unit.",
     # persons and their entries
     "time": "Time to which the entry refers.",
     "number": "Number of the entry in its history, from 1 without gaps.",
@@ -55,12 +53,9 @@ MEANINGS = {
     " which their age counts; null for recorded samples, and without samples.",
     "rejected": "Number of rejected samples, by reason.",
     "frequency_hz": "Frequencies of the spectral lines, Hz.",
-    "shaft_x_um": "Displacement in x without its mean, µm; null if the sample is missing or bad.",
-    "shaft_y_um": "Displacement in y without its mean, µm; null if the sample is missing or bad.",
     # alarms
     "occurrence": "Number of the occurrence of the alarm.",
     "change": "Kind of alarm event.",
-    "n_waiting": "Number of messages waiting for delivery.",
     # films and baselines
     "x": "Values in the direction x; null if the film is not watched, or without a baseline.",
     "y": "Values in the direction y; null if the film is not watched, or without a baseline.",
@@ -77,8 +72,6 @@ MEANINGS = {
     "ck_level": "Alarm level of damping over stiffness in force; null without a level.",
     "ck_change_percent": "Most significant mean change of damping over stiffness, %; null if"
     " unknown.",
-    "scatter_percent": "Standard deviation of single readings about the fitted surface, %.",
-    "time_scale_h": "Averaging time, running hours.",
     # answers
     "origin": "Origin of the data: live, or replay of a recording.",
     "low_95": "Lower end of the 95 % coverage interval.",

@@ -253,6 +253,7 @@ class BaselineDirectionModel(ApiModel):
     """Learned stiffness of an oil film in one direction, x or y."""
 
     scatter_percent: float
+    """Standard deviation of single readings about the fitted surface, %."""
 
     cells: BaselineCellsModel
     """Cells with readings, and cells between them."""

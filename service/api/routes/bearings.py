@@ -35,17 +35,14 @@ from service.store.references import GapReference
 MicrometrePair = Annotated[
     list[float], Field(min_length=2, max_length=2, examples=[[1998.5, 2003.1]])
 ]
-SetTime = Annotated[Time, Field(description="Time at which the reference was set.")]
-Author = Annotated[str, Field(description="Person who set the reference.", examples=["A. Name"])]
-Note = Annotated[str, Field(description="Note of the author.", examples=["after the overhaul"])]
 
 
 class ReferenceModel(ApiModel):
     """Origin of the gap reference in force: source, time and author."""
 
-    set: SetTime | None
-    author: Author | None
-    note: Note | None
+    set: Time | None
+    author: str | None
+    note: str | None
 
     source: Literal["plant_file", "given", "measured"]
     """Source: plant file, values entered by hand ("given"), or mean measured gaps ("measured")."""

@@ -34,6 +34,9 @@ class ChannelModel(ApiModel):
     """Base class of the models of channels."""
 
     used_by: Annotated[list[str], Field(examples=[["UJB shaft_x"]])]
+    """Uses of the channel in the plant file: bearing identifier with key of the bearing, or key of
+    the unit."""
+
     quality: QualityModel
 
 

@@ -32,6 +32,7 @@ class FilmChangeModel(ApiModel):
     """Mean deviation from the baseline over the averaging time at which it is most significant."""
 
     time_scale_h: Annotated[float, Field(examples=[4.0])]
+    """Averaging time, running hours."""
 
     percent: Annotated[float, Field(examples=[-19.2])]
     """Mean change, % of the expected value; negative if softer. The alarm limits apply to it.

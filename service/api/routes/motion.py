@@ -76,8 +76,13 @@ class MotionModel(SampleRange, BearingAnswer):
     start: Time
     received: Time | None
     n_samples: int
+
     shaft_x_um: list[float | None]
+    """Displacement in x without its mean, µm; null if the sample is missing or bad."""
+
     shaft_y_um: list[float | None]
+    """Displacement in y without its mean, µm; null if the sample is missing or bad."""
+
     clearance_um: float
 
     recording: Annotated[str | None, Field(examples=["U1-20261121T090312.400Z-shaft_x"])]

@@ -39,6 +39,7 @@ class ReceiverModel(ApiModel):
     """Receiver of alarm messages, with waiting, failed and undeliverable messages."""
 
     n_waiting: int
+    """Number of messages waiting for delivery."""
 
     id: Annotated[str, Field(examples=["control-room"])]
     """Name of the receiver in the plant file; for mail, followed by the recipient."""

@@ -10,7 +10,7 @@ from service.api.auth.declared import needs, subject_router
 from service.api.auth.gate import actor_or
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import problem_responses
-from service.api.routes.bearings import Author, MicrometrePair, Note
+from service.api.routes.bearings import MicrometrePair
 from service.api.values import (
     ActorModel,
     ApiModel,
@@ -30,8 +30,8 @@ class SetReferenceModel(ApiModel):
     """Stored gap reference of a bearing: probe gaps with the shaft centred."""
 
     set: Time
-    author: Author
-    note: Note | None
+    author: str
+    note: str | None
 
     gap_reference_um: MicrometrePair
     """Probe gaps [x, y] with the shaft centred, µm."""
