@@ -4,7 +4,7 @@ import asyncio
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import closing, nullcontext
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from socket import create_server, socket
@@ -51,23 +51,6 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> Begun:
     past = partial(simulated_history, years=PAST_YEARS)
     monkeypatch.setattr("service.measuring.simulated_sources.simulated_history", past)
     return found
-
-
-@pytest.mark.long
-def test_the_demo_begins_with_a_past_that_it_is_given_once(begun, tmp_path):
-    first, again = (padwatch("demo", "--port", 0, "--data-folder", tmp_path) for _ in range(2))
-
-    assert (first.exit_code, again.exit_code) == (0, 0), first.output
-    assert "simulating the year before this start" in first.stdout
-    assert "simulating" not in again.stdout
-    for plant, port in begun:
-        assert {unit.id: unit.source.port for unit in plant.unit} == PORTS
-        assert port != 0
-    with closing(SqliteStore(tmp_path / "padwatch.sqlite3")) as store:
-        for unit in PORTS:
-            film = store.films.history(FilmQuery(unit, "LJB", Estimator.DYNAMIC))
-            assert film.is_simulated.all()
-            assert versions_after(store.films.steps(unit, "LJB")).in_force == 1
 
 
 def test_a_port_in_use_is_reported_before_a_year_is_simulated(begun, tmp_path):

@@ -3,8 +3,6 @@
 import math
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from acquisition.modbus.cells import ByteOrder, Cell, NumberType
 from acquisition.modbus.decoding import MapDecoder, MapReading, ValueState
@@ -38,34 +36,6 @@ class Device:
 
     def read(self) -> MapReading:
         return self.decoder.read(self.content())
-
-
-@given(
-    st.sampled_from(list(NumberType)[:-1]),
-    st.sampled_from(list(ByteOrder)),
-    st.floats(-100.0, 100.0),
-    st.sampled_from([1.0, 0.01, -0.5]),
-    st.sampled_from([0.0, -40.0]),
-)
-def test_a_value_comes_back_within_its_registers_resolution(type_, order, number, scale, offset):
-    value = MapValue(
-        id="v",
-        cell=Cell(address=3, type=type_, byte_order=order),
-        scale=scale,
-        offset=offset,
-        flags=(FlagCheck(cell=Cell(address=9), mask=1, set_means=Meaning.BAD),),
-    )
-    device = Device(value)
-    wanted = (number - offset) / scale
-    if type_.value.startswith("u"):
-        wanted = abs(wanted)
-        number = wanted * scale + offset
-
-    device.image.put_value(value, number)
-    reading = device.read()
-
-    resolution = 1e-5 if type_.value.startswith("float") else 0.5 * abs(scale) + 1e-9
-    assert reading.values[0] == pytest.approx(number, abs=resolution)
 
 
 @pytest.mark.parametrize("number", [-250.0, 0.0, 0.3, 1999.5])

@@ -154,24 +154,6 @@ def test_the_growth_of_the_gaps_wanders_and_moves_nothing_else(build_unit, full_
     assert one.truth().bearings["UJB"].centre_x_um == other.truth().bearings["UJB"].centre_x_um
 
 
-def test_the_speed_channel_follows_a_wandering_speed_exactly(build_unit, quiet):
-    unit = build_unit(replace(quiet, speed_wander=0.003, wander_time_s=60.0))
-    blocks = [unit.advance(60) for _ in range(3000)]
-    speed_rpm = np.array([block.side.slow[0, 0] for block in blocks])
-    shaft = np.concatenate([block.counts for block in blocks], axis=1)[0].astype(np.float64)
-
-    # what the waveform itself says: the angle of 1× advances by the integral of the speed
-    turns = np.concatenate([[0.0], np.cumsum((speed_rpm[1:] + speed_rpm[:-1]) / 2 / 60 * 0.1)])
-    spun = (shaft - shaft.mean()) * np.exp(
-        -2j * np.pi * np.interp(np.arange(shaft.size) / 60.0, np.arange(3000), turns)
-    )
-    carried = spun[: 390 * 450].reshape(-1, 3900).mean(axis=1)
-
-    assert 0.004 * 92.3 < np.ptp(speed_rpm) <= 0.006 * 92.3
-    assert np.ptp(np.unwrap(np.angle(carried))) < 0.01
-    assert unit.truth().speed_rpm == unit.advance(1).side.slow[0, 0]
-
-
 def test_noise_of_an_accelerometer_passes_its_own_corner(machine, quiet):
     silent = replace(quiet, unbalance_grade_mm_s=0.0)
     noisy = replace(

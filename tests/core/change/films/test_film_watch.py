@@ -10,7 +10,7 @@ import pytest
 from core.baseline.history import ReadingOutcome
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
-from core.change.backtest import decide_all, last_decision, last_operation, operation_history
+from core.change.backtest import last_decision, last_operation, operation_history
 from core.change.decision import JUDGED, Verdict
 from core.change.film_judge import FilmFinding, FilmJudge, alarm_condition, unjudged
 from core.change.film_reading import film_reading
@@ -25,29 +25,6 @@ S = 1_000_000_000
 
 def loss(size: float, day: float) -> Callable[[np.ndarray], np.ndarray]:
     return lambda hours: np.where(hours > day * 24.0, np.log(1.0 - size), 0.0)
-
-
-@pytest.mark.long
-def test_results_one_by_one_are_judged_as_their_whole_history_is(films, rules):
-    history = films.later(change=loss(0.2, 106.0))
-    news = films.watched(history)
-
-    said = history.rows(1, len(history))  # the first interval may have begun before
-    settled = operation_history(
-        history.time_ns, history.speed_rpm, history.power_mw, rules.operating
-    ).is_settled[1:]
-    assert [n.reading.time_ns for n in news] == said.time_ns.tolist()
-    assert [n.reading.condition.is_settled for n in news] == settled.tolist()
-    for row, direction in enumerate("xy"):
-        learned = films.baseline.of(f"k_{direction}")
-        whole = decide_all(said, settled, f"k_{direction}", learned, rules.change)
-        findings = [n.findings[row] for n in news]
-        assert [f.verdict for f in findings] == whole.verdict.tolist()
-        assert [f.level or 0 for f in findings] == whole.level.tolist()
-        change = [np.nan if f.change is None else f.change for f in findings]
-        np.testing.assert_allclose(change, whole.change, rtol=1e-12)
-        assert findings[-1].level is not None
-        assert findings[-1].baseline_version == 4
 
 
 def test_a_restart_in_the_middle_changes_no_verdict(films, rules):
