@@ -14,9 +14,7 @@ export function plotly() {
 }
 
 /** Resolves once the page as it is now has been painted: running the library takes half a second. */
-function painted() {
-  return new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve)));
-}
+const painted = () => new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve)));
 
 function loaded() {
   return new Promise((resolve, reject) => {

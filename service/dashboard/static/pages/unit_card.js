@@ -25,6 +25,9 @@ const HEADS = [
 const STIFFNESS = ["stiffness_xx_n_per_m", "stiffness_yy_n_per_m"];
 const NO_SPREAD = () => null;
 
+/** The age of data that are not good is shown above this; a result is due every 12 s. */
+const OLD_S = 20;
+
 /**
  * Returns `{ node, draw(unit, alarmsOf, historyOf) }`.
  *
@@ -89,7 +92,7 @@ function bearingRow(unit, { bearing, name }) {
       film.draw(itsFilm, alarms);
       quality.node.hidden = whole.level === "good";
       drawQuality(quality, whole);
-      setText(age, whole.level === "good" || latest.age_s === null ? "" : `${formatAge(latest.age_s)} old`);
+      setText(age, whole.level !== "good" && latest.age_s > OLD_S ? `${formatAge(latest.age_s)} old` : "");
     },
   };
 }

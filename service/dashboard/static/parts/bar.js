@@ -9,9 +9,7 @@ import { mark } from "./mark.js";
 import { navigation } from "./navigation.js";
 import { personView } from "./person.js";
 
-/** The age of an answer is not shown while it is below this: two periods of the question. */
-const FRESH_S = 4;
-
+const FRESH_S = 4; // two periods of the question
 const part = (id) => document.getElementById(id);
 
 /** Returns `{ draw(view), show(page) }`; `show` marks the page that is open. */
@@ -52,7 +50,7 @@ function drawBanner(view) {
 function serviceSentence(view) {
   if (isLocked()) return mustChangePassword() ? "The password must be changed." : "You are not logged in.";
   if (view.silenceS === null) return "Waiting for the service’s first answer.";
-  return view.silenceS < FRESH_S ? "Connected" : `Service answered ${formatAge(view.silenceS)} ago`;
+  return view.silenceS < FRESH_S && view.failure === null ? "Connected" : `Service answered ${formatAge(view.silenceS)} ago`;
 }
 
 function failureAge(view) {
