@@ -19,10 +19,11 @@ from core.baseline.baseline import Origin, QuantityBaseline
 from core.baseline.history import DIRECTIONS, QUANTITIES, StiffnessHistory
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
-from core.change.backtest import DecisionHistory, decide_all, last_decision, operation_history
+from core.change.backtest import DecisionHistory, decide_all, operation_history
 from core.change.cause import Attribution, UnitReadings, attribute
 from core.change.damping_cause import FilmEvidence, cause_by_damping, line_finding
-from core.change.evidence import Finding
+from core.change.decision import Verdict, outcomes
+from core.change.evidence import NO_EVIDENCE, Finding
 from core.change.film_judge import MAX_RECENT
 from core.change.settings import ChangeLimits, FilmRules
 from core.change.shaft_line import LineFinding
@@ -153,9 +154,16 @@ class LearnedUnit:
         )
 
     def _findings(self, later: Later, bearing: str, quantity: str) -> list[Finding]:
-        learned = self.learned(bearing, quantity)
-        last = last_decision(later.histories[bearing], later.is_settled, learned, RULES)
-        return last.evidence.findings(learned)
+        history, learned, found = (
+            later.histories[bearing],
+            self.learned(bearing, quantity),
+            NO_EVIDENCE,
+        )
+        columns = history.conditions, *history.of(quantity), later.is_settled
+        for outcome in outcomes(*columns, learned):
+            if not isinstance(outcome, Verdict):
+                found = found.step(outcome, learned)
+        return found.findings(learned)
 
     def last_change(self, later: Later, bearing: str, quantity: str) -> float:
         """The most significant change after the last reading."""

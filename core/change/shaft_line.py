@@ -54,7 +54,7 @@ broken."""
 
 MINOR = 0.3
 """Largest distance from the line, relative to that of a gain that explains the largest change of k,
-up to which a broken line still holds: a changed motion shows errors of the fitted line."""
+up to which the line holds nevertheless: a changed motion shows errors of the fitted line."""
 
 MIN_PROBE_RISE = 0.2
 """Smallest change of ln k per change of ln of a probe's gain that is assumed. A learned surface may
@@ -186,15 +186,15 @@ class ShaftLine:
         change, rises = _known_mean(ln_k), np.nan_to_num(_known_mean(rise))
         largest = int(np.argmax(np.abs(np.nan_to_num(change))))
         shows = np.min(np.abs(np.expm1(change[largest]) * signals[:, largest]))
+        is_near = abs(off) <= max(HOLDS * std, MINOR * shows)
+        holds = LineVerdict.HOLDS if is_near and shows >= BROKEN * std else LineVerdict.UNKNOWN
         if abs(off) < BROKEN * std:
-            is_sure = abs(off) <= HOLDS * std and shows >= BROKEN * std
-            return LineFinding(LineVerdict.HOLDS if is_sure else LineVerdict.UNKNOWN, abs(off), std)
+            return LineFinding(holds, abs(off), std)
         effects = np.array([-np.maximum(1.0 + rises, MIN_PROBE_RISE), np.ones(len(rises))])
         gains, misfits = _gains(off, std, signals, change, effects)
         best, other = np.argsort(misfits, axis=None)[:2]
         if not misfits.flat[best] <= min(FITS, misfits.flat[other] - CLEAR):
-            is_minor = abs(off) <= MINOR * shows
-            return LineFinding(LineVerdict.HOLDS if is_minor else LineVerdict.BROKEN, abs(off), std)
+            return LineFinding(LineVerdict.HOLDS if is_near else LineVerdict.BROKEN, abs(off), std)
         part, row = divmod(int(best), len(self.bearings))
         verdict = (LineVerdict.PROBE, LineVerdict.ACCELEROMETER)[part]
         return LineFinding(verdict, abs(off), std, self.bearings[row], float(gains.flat[best]))
