@@ -145,16 +145,15 @@ class Answers:
             `make` of the answer; None if a repeated request must be routed again.
         """
         scope = request.scope
-        if lasting is not None and (asked := _asked(scope)) is not None:
-            identity = scope["state"][CALLER].identity
-            self._known[identity, asked[0]] = revision, lasting, scope["route"]
+        if lasting is not None and (asked := _asked(scope, _identity(scope))) is not None:
+            self._known[asked[0]] = revision, lasting, scope["route"]
             if len(self._known) > MAX_KNOWN:
                 self._known.popitem(last=False)
         return await self._of(scope, revision, make)
 
     async def repeated(self, scope: Scope) -> Response | None:
         """Return the answer to a request that was answered before; None if it must be routed."""
-        found = self._find(scope, scope["state"][CALLER].identity)
+        found = self._find(scope, _identity(scope))
         try:
             return found and await self._of(scope, found[0], found[1])
         except (ProblemError, StoreError):
@@ -172,11 +171,11 @@ class Answers:
             return None
 
     def _find(self, scope: Scope, identity: Identity | None) -> tuple[Revision, Make] | None:
-        asked = _asked(scope)
-        if asked is None or (identity, asked[0]) not in self._known:
+        asked = _asked(scope, identity)
+        if asked is None or asked[0] not in self._known:
             return None
-        self._known.move_to_end((identity, asked[0]))
-        revision, lasting, scope["route"] = self._known[identity, asked[0]]
+        self._known.move_to_end(asked[0])
+        revision, lasting, scope["route"] = self._known[asked[0]]
         return revision, lasting(asked[1])
 
     async def _of(self, scope: Scope, revision: Revision, make: Make) -> Response:
@@ -248,11 +247,18 @@ SINCE = re.compile(rb"since=([0-9a-f]+-[0-9]{1,18})")
 """Query of a request for changes after a revision, which differs from poll to poll."""
 
 
-def _asked(scope: Scope) -> tuple[Hashable, str | None] | None:
+def _identity(scope: Scope) -> Identity | None:
+    """Return the identity of the caller of a request that `Gate` has authenticated."""
+    caller: Caller = scope["state"][CALLER]
+    return caller.identity
+
+
+def _asked(scope: Scope, identity: Identity | None) -> tuple[Hashable, str | None] | None:
     """Return what an answer depends on, and the value of ``since`` if it is the only parameter.
 
-    The former are URL without that value, server address, and the headers that select an answer or
-    its host. None for a request that is not repeated: with a body, or another method than GET.
+    The former are identity of the caller, URL without that value, server address, and the headers
+    that select an answer or its host. None for a request that is not repeated: with a body, or
+    another method than GET.
     """
     if scope["method"] != "GET":
         return None
@@ -261,7 +267,8 @@ def _asked(scope: Scope) -> tuple[Hashable, str | None] | None:
         return None
     query = scope["query_string"]
     found = SINCE.fullmatch(query)
-    asked = scope["path"], b"since" if found else query, headers, scope.get("server")
+    url = scope["path"], b"since" if found else query
+    asked = identity, url, headers, scope.get("server")
     return asked, found[1].decode() if found else None
 
 

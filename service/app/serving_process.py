@@ -56,7 +56,12 @@ WRONG_VERSION = 78
 """Exit code if the measuring process is of another version (EX_CONFIG of sysexits.h)."""
 
 
+RENDER_AFTER_S = 5.0
+"""Time after the start for which open pages, which all ask now, have the processor alone, s."""
+
+
 async def _rendered(app: GuardedApi) -> None:
+    await asyncio.sleep(RENDER_AFTER_S)
     await asyncio.to_thread(app.openapi)
     await asyncio.to_thread(compress_all)
     exempt_start()

@@ -325,6 +325,8 @@ class LiveFilms:
         self.settings = plant.films
         self.unwatched = {unit: why for unit, why in found.items() if isinstance(why, str)}
         """Reason why the films of a unit are not monitored, by unit."""
+        self.n_taken = 0
+        """Number of updates by snapshots of units."""
         self._newest: dict[Key, FilmNews] = {}
         self._baselines: dict[Key, BearingBaseline] = {}
 
@@ -380,6 +382,7 @@ class LiveFilms:
 
         `fetched` are the baselines in force, as returned by `fetch`; None keeps those in memory.
         """
+        self.n_taken += 1
         self._newest |= {(unit, bearing): news for bearing, news in state.films.items()}
         if fetched is None:
             fetched = self._held(unit, state)

@@ -1,6 +1,7 @@
 """API models of alarms and alarm events."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from functools import lru_cache
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -216,10 +217,15 @@ def alarm_list_model(alarms: LiveAlarms, films: LiveFilms, origin: Origin) -> Al
     )
 
 
-def alarm_list_revision(alarms: LiveAlarms, films: LiveFilms) -> Hashable:
-    """Return a value that changes with every change of the alarm list."""
-    found = (_film_news(films, alarm.identity) for alarm in alarms.shown)
-    return alarms.revision, tuple(news.reading.time_ns for news in found if news is not None)
+def alarm_list_revision(alarms: LiveAlarms, films: LiveFilms) -> Callable[[], Hashable]:
+    """Return a function whose value changes with every change of the alarm list."""
+
+    @lru_cache(maxsize=1)
+    def films_of(revision: int, _: int) -> Hashable:
+        found = (_film_news(films, alarm.identity) for alarm in alarms.shown)
+        return revision, tuple(news.reading.time_ns for news in found if news is not None)
+
+    return lambda: films_of(alarms.revision, films.n_taken)
 
 
 def alarm_model(engine: LiveAlarms, films: LiveFilms, alarm: Alarm) -> AlarmModel:

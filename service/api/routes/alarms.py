@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
@@ -137,6 +136,7 @@ def alarm_router(context: Context) -> APIRouter:
     """Return the router that reads alarms; it must follow other routers for ``/alarms/...``."""
     router = subject_router("/alarms", "alarms")
     engine, films = context.alarms, context.films
+    revision = alarm_list_revision(engine, films)
 
     @router.get("", response_model=AlarmListModel)
     async def alarms(
@@ -187,9 +187,7 @@ def alarm_router(context: Context) -> APIRouter:
                 }
             )
 
-        return await context.answers.of(
-            request, partial(alarm_list_revision, engine, films), make, lambda _: make
-        )
+        return await context.answers.of(request, revision, make, lambda _: make)
 
     @router.get(
         "/events",

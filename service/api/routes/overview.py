@@ -105,6 +105,7 @@ class Overview:
         self._context = context
         self._n = 0
         self._head: Hashable = None
+        self._store_error: str | None = None
         self._seen: Hashable = None
         self._units: dict[str, tuple[Hashable, int]] = {}
         self._tiles: dict[str, tuple[int, UnitTileModel]] = {}
@@ -120,7 +121,8 @@ class Overview:
                 if unit not in self._units or self._units[unit][0] != now:
                     self._n += 1
                     self._units[unit] = now, self._n
-        head = live.store_error, alarms.revision, plant.captures.error
+            self._store_error = live.store_error
+        head = self._store_error, alarms.revision, plant.captures.error
         self._n += head != self._head
         self._head = head
         return self._n

@@ -13,8 +13,7 @@ import { ALARMS_ADDRESS } from "./route.js";
 import { serviceTimeMs } from "./server_time.js";
 import { askSession, isLocked, onSession, session } from "./session.js";
 
-const OVERVIEW_PERIOD_S = 2;
-const REDRAW_PERIOD_MS = 1000;
+const [OVERVIEW_PERIOD_S, RETRY_PERIOD_S, REDRAW_PERIOD_S] = [2, 1, 1];
 
 const main = document.getElementById("main");
 const head = bar(PAGES, ALARMS_ADDRESS);
@@ -24,14 +23,13 @@ let page = null;
 async function askOverview(signal) {
   try {
     if (session() === null || isLocked()) await askSession(signal);
-    if (isLocked()) live = SILENCE;
-    else live = await heard(signal);
+    live = isLocked() ? SILENCE : await heard(signal);
   } catch (failure) {
     if (signal.aborted) return;
     live = failedNow(live, failureWords(failure), moment());
   }
   if (page === null) openPage();
-  draw();
+  else draw();
 }
 
 async function heard(signal) {
@@ -66,10 +64,8 @@ function draw() {
   page?.draw(view);
 }
 
-function failureWords(failure) {
-  const what = failure instanceof NotReachable ? "" : "Service answers with an error. ";
-  return `${what}${failure.message} Trying again every ${OVERVIEW_PERIOD_S} s.`;
-}
+const failureWords = (failure) =>
+  `${failure instanceof NotReachable ? "" : "Service answers with an error. "}${failure.message} Trying again every ${RETRY_PERIOD_S} s.`;
 
 function openPage() {
   const { page: wanted, segments } = pageOf(location.hash);
@@ -97,7 +93,7 @@ onUpgrade(() => (document.getElementById("upgrade").hidden = false));
 window.addEventListener("hashchange", changePage);
 onAmplitudes(openPage);
 draw();
-const overviews = poll(askOverview, () => OVERVIEW_PERIOD_S);
+const overviews = poll(askOverview, () => (live.failure === null ? OVERVIEW_PERIOD_S : RETRY_PERIOD_S));
 onSession(changePage);
 onRefused(() => askSession().catch(() => {})); // the overview reports an unreachable service
-setInterval(draw, REDRAW_PERIOD_MS);
+setInterval(draw, REDRAW_PERIOD_S * 1000);
