@@ -362,7 +362,7 @@ def _put(
     wanted = np.array(start_ns) // width_ns * MOST_SLOTS + np.array(slot)
     where = np.searchsorted(places, wanted)
     has_cell = np.flatnonzero(np.take(places, where, mode="clip") == wanted)
-    numbers = [found[i] for i in has_cell.tolist()]
+    numbers = found if has_cell.size == len(found) else [found[i] for i in has_cell.tolist()]
     own_of = {name: column for column, name in enumerate(into.names)}
     theirs = np.array([n for n, name in enumerate(layout.quantities) if name in own_of], np.int64)
     own = np.array([own_of[layout.quantities[column]] for column in theirs], np.int64)
@@ -371,9 +371,8 @@ def _put(
     for pattern, alike in _alike([row[n_head : n_head + n_bits] for row in numbers]):
         usable = np.unpackbits(np.frombuffer(pattern, dtype=np.uint8), count=n_head).astype(bool)
         stored, known = np.flatnonzero(usable), usable[theirs]
-        record = np.frombuffer(
-            b"".join(numbers[row] for row in alike.tolist()), dtype=_record(n_head, stored.size)
-        )
+        records = numbers if alike.size == len(numbers) else [numbers[row] for row in alike]
+        record = np.frombuffer(b"".join(records), dtype=_record(n_head, stored.size))
         at: Any = where[has_cell[alike]]
         if at[-1] - at[0] == at.size - 1:
             at = slice(at[0], at[-1] + 1)
