@@ -18,7 +18,7 @@ import tomllib
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,11 @@ CORE_LIMIT = 0.30
 MEMORY_LIMIT_MIB = 420.0
 WARM_UP_S = 20.0
 MAX_TRIES = 30
+SETTLE_S = 10.0
+"""Time in which the simulators produce the samples of their own start."""
+
+UNITS_PER_DAQ = 25
+"""A simulated unit takes one percent of a core; an overloaded simulator no longer answers."""
 REGISTERS_PER_READ = 125
 MIB = 2**20
 SEGMENT_SAMPLES, HOP_SAMPLES = 8192, 7168
@@ -45,12 +50,9 @@ def main() -> None:
     parser.add_argument("--delays", action="store_true", help="print the delays of results")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        plant = Path(folder) / "plant.toml"
-        plant.write_text(plant_file(options.units, Path(folder) / "data"), encoding="utf-8")
-        with daq(plant) as ports:
-            plant.write_text(
-                plant_file(options.units, Path(folder) / "data", ports), encoding="utf-8"
-            )
+        plant, data = Path(folder) / "plant.toml", Path(folder) / "data"
+        with daqs(options.units, Path(folder)) as ports:
+            plant.write_text(plant_file(options.units, data, ports), encoding="utf-8")
             log = Path(folder) / "delays" if options.delays else None
             service = measure_service(plant, options.seconds, log)
             code = report(options.units, service)
@@ -62,12 +64,14 @@ def main() -> None:
     sys.exit(code)
 
 
-def plant_file(n_units: int, data_folder: Path, ports: dict[str, int] | None = None) -> str:
-    """The demo plant's second unit, many times over."""
+def plant_file(
+    n_units: int, data_folder: Path, ports: dict[str, int] | None = None, first: int = 1
+) -> str:
+    """The demo plant's second unit, many times over, numbered from `first` on."""
     text = DEMO.read_text(encoding="utf-8")
     unit = text[text.rindex("[[unit]]") :]
     parts = [f'[plant]\nname = "Benchmark"\n\n[service]\ndata_folder = "{data_folder}"\n\n']
-    for number in range(1, n_units + 1):
+    for number in range(first, first + n_units):
         id_ = f"U{number}"
         port = 0 if ports is None else ports[id_]
         mine = unit.replace('id = "U2"', f'id = "{id_}"').replace("port = 0", f"port = {port}")
@@ -93,6 +97,19 @@ def padwatch(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
 def daq(plant: Path) -> Iterator[dict[str, int]]:
     with padwatch("daq", str(plant)) as (_, line):
         yield {unit: int(found["port"]) for unit, found in json.loads(line).items()}
+
+
+@contextmanager
+def daqs(n_units: int, folder: Path) -> Iterator[dict[str, int]]:
+    """Run the DAQs of a plant in as many processes as they need; yield their ports by unit."""
+    ports: dict[str, int] = {}
+    with ExitStack() as running:
+        for first in range(1, n_units + 1, UNITS_PER_DAQ):
+            plant, n_own = folder / f"daq{first}.toml", min(UNITS_PER_DAQ, n_units + 1 - first)
+            plant.write_text(plant_file(n_own, folder / "data", first=first), encoding="utf-8")
+            ports |= running.enter_context(daq(plant))
+        time.sleep(SETTLE_S)
+        yield ports
 
 
 def processes(pid: int) -> list[psutil.Process]:
