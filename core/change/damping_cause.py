@@ -206,7 +206,8 @@ def _cause(
         return None, ""
     if has_company:
         return Cause.OIL, "k of all bearings changed alike, and c/k did not"
-    if found.cause is Cause.FILM or (holds and own.mean_k < 0.0):
+    # oil of one bearing does not thicken without being changed, which needs a new baseline
+    if own.mean_k < 0.0 and (holds or found.cause is Cause.FILM):
         return Cause.OIL, "k of this bearing changed, and c/k did not"
     if holds:
         return Cause.BRACKET, "k rose in x and y alike, and c/k did not"

@@ -58,6 +58,14 @@ def test_oil_clearance_and_bracket_are_told_by_what_c_over_k_does(own, others, c
         assert "%" in found.reason
 
 
+def test_a_film_that_stiffens_alone_is_a_bracket_if_the_line_holds():
+    as_film = Attribution(Cause.FILM, "shaft motion agrees with films of the measured stiffness")
+    stiffer = evidence(0.16, 0.15, 0.001)
+    assert told(stiffer, found=as_film).cause is Cause.BRACKET
+    assert told(stiffer, line=NO_LINE, found=as_film) == as_film
+    assert told(evidence(-0.2, -0.2, 0.001), line=NO_LINE, found=as_film).cause is Cause.OIL
+
+
 @pytest.mark.parametrize("which", [LineVerdict.PROBE, LineVerdict.ACCELEROMETER])
 def test_a_broken_line_names_the_transducer_whatever_c_over_k_does(which):
     broken = LineFinding(which, 0.8, 0.03, "UJB", -0.05)
