@@ -149,27 +149,19 @@ class _Compiler:
         name, _, signal = path.partition(".")
         message = self._messages.get(name)
         if message is None:
-            raise _misfit(
-                key,
-                path,
-                f"unknown message {name}; the DBC file has {_shown(self._messages)};"
-                " the form is Message.Signal",
-            )
-        if message.nested:
-            raise _misfit(
-                key,
-                path,
+            known = _shown(self._messages)
+            what = f"unknown message {name}; the DBC file has {known}; the form is Message.Signal"
+        elif message.nested:
+            what = (
                 f"message {name} has nested multiplexing, which is not supported; let the device"
-                " send the signal in another message",
+                " send the signal in another message"
             )
-        if signal not in message.signals:
-            raise _misfit(
-                key,
-                path,
-                f"message {name} has no signal {signal or '(none given)'}; its signals are"
-                f" {_shown(message.signals)}",
-            )
-        return message.signals[signal]
+        elif signal not in message.signals:
+            known, missing = _shown(message.signals), signal or "(none given)"
+            what = f"message {name} has no signal {missing}; its signals are {known}"
+        else:
+            return message.signals[signal]
+        raise _misfit(key, path, what)
 
     def _own_signal(self, path: str, key: str) -> DbcSignal:
         """Return a signal; raise ConfigError if another channel already uses it."""

@@ -150,7 +150,9 @@ class BlockBuilder:
         if self._plan.needs_header and self.side.at(EPOCH, first_index) is None:
             self._rejected[Refusal.NO_HEADER] += samples.shape[1]
             return None
-        start_ns = self._start_ns(first_index)
+        is_stamped = SECONDS in self._plan.quantities
+        start_of = self.side.stamp_ns if is_stamped else self._stamps.start_ns
+        start_ns = start_of(first_index)
         if start_ns is None:
             self._rejected[Refusal.NO_TIME] += samples.shape[1]
             return None
@@ -173,11 +175,6 @@ class BlockBuilder:
         bits = int(self.side.at(OK_BITS, index) or 0) if OK_BITS in self._plan.quantities else -1
         return [bool(bits >> c & 1) for c in range(len(self._plan.calibration.channels))]
 
-    def _start_ns(self, index: int) -> int | None:
-        if SECONDS in self._plan.quantities:
-            return self.side.stamp_ns(index)
-        return self._stamps.start_ns(index)
-
     def _samples(self, run: Sequence[Instant]) -> RawArray:
         frames = list(zip(*(instant.frames for instant in run), strict=True))
         samples = self._plan.decoder.samples(frames)
@@ -191,12 +188,10 @@ class BlockBuilder:
 
 def _runs(instants: Sequence[Instant]) -> Iterator[Sequence[Instant]]:
     """Yield runs of consecutive instants without refused samples in between."""
-    start = 0
-    for n in range(1, len(instants) + 1):
-        if n == len(instants) or not _continues(instants[n - 1], instants[n]):
-            yield instants[start:n]
-            start = n
-
-
-def _continues(before: Instant, after: Instant) -> bool:
-    return after.index == before.stop_index and after.epoch == before.epoch and not after.rejected
+    begins = [
+        n
+        for n, (before, after) in enumerate(itertools.pairwise(instants), start=1)
+        if (after.epoch, after.index) != (before.epoch, before.stop_index) or after.rejected
+    ]
+    for start, stop in itertools.pairwise([0, *begins, len(instants)] if instants else []):
+        yield instants[start:stop]

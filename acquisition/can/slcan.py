@@ -31,17 +31,9 @@ from acquisition.errors import ConfigError, FrameError
 _MAX_LINE = 1 + 8 + 1 + 2 * 64
 _CHUNK_BYTES = 65536
 _STATE_LINE = 8
-_FORMS = {
-    # first letter: extended id, remote, FD
-    b"t": (False, False, False),
-    b"T": (True, False, False),
-    b"r": (False, True, False),
-    b"R": (True, True, False),
-    b"d": (False, False, True),
-    b"D": (True, False, True),
-    b"b": (False, False, True),
-    b"B": (True, False, True),
-}
+_FRAMES = b"tTrRdDbB"
+"""First letters of frames: t data, r remote, d and b CAN FD; capital with an extended id."""
+
 _ANSWERS = b"zZVvNF"
 """First letters of an adapter's replies to commands."""
 
@@ -138,10 +130,9 @@ def _parsed(line: bytes, ids: Container[int]) -> Message | None:
     Raises FrameError if the line is neither a frame nor a reply.
     """
     kind = line[:1]
-    form = _FORMS.get(kind)
-    if form is None:
+    if not kind or kind not in _FRAMES:
         return _state(line)
-    extended, remote, fd = form
+    extended, remote, fd = kind.isupper(), kind in b"rR", kind in b"dDbB"
     end = 9 if extended else 4
     try:
         # not int(…, 16), which accepts "0x1", "1_0" and " 1"

@@ -111,10 +111,8 @@ def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[Ala
         case ReturnToService():
             if alarm.outage is None:
                 return alarm, ()
-            after, change = (
-                shown_again(replace(alarm, outage=None)),
-                AlarmChange.RETURNED_TO_SERVICE,
-            )
+            after = shown_again(replace(alarm, outage=None))
+            change = AlarmChange.RETURNED_TO_SERVICE
         case Reset():
             if not alarm.is_latched:
                 raise ActionRefusedError("the alarm is not latched, so there is nothing to reset")

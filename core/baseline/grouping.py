@@ -25,12 +25,8 @@ class Groups:
 
     def rows(self, wanted: npt.NDArray[np.bool_]) -> "Groups":
         """Return the groups selected by a mask (n_groups,)."""
-        return Groups(
-            self.conditions.rows(wanted),
-            self.value[wanted],
-            self.n_readings[wanted],
-            self.day[wanted],
-        )
+        n_readings, day = self.n_readings[wanted], self.day[wanted]
+        return Groups(self.conditions.rows(wanted), self.value[wanted], n_readings, day)
 
 
 def group_readings(
@@ -50,7 +46,7 @@ def group_readings(
     keys, group = np.unique(np.vstack([day, halves.cells(conditions)]), axis=1, return_inverse=True)
     group = group.reshape(-1)
     angle = np.radians(conditions.attitude_deg)
-    sines, cosines = (_group_sums(part(angle), group) for part in (np.sin, np.cos))
+    sines, cosines = (np.bincount(group, part(angle)) for part in (np.sin, np.cos))
     middle = FilmConditions(
         group_medians(conditions.eccentricity_ratio, group),
         group_medians(conditions.oil_temperature_c, group),
@@ -65,10 +61,6 @@ def group_medians(x: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
     count = np.bincount(group)
     start = np.cumsum(count) - count
     return np.asarray((x[start + (count - 1) // 2] + x[start + count // 2]) / 2.0)
-
-
-def _group_sums(x: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
-    return np.bincount(group, x).astype(np.float64)
 
 
 STD_PER_MAD = 1.4826

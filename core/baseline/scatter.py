@@ -109,10 +109,8 @@ def time_scatter(
         spans = deviation.size * settings.reading_h / scale_h
         if spans < MIN_SPANS:
             break
-        forgotten, first = (
-            ewma_weight(scale_h, settings.reading_h),
-            int(scale_h / settings.reading_h),
-        )
+        first = int(scale_h / settings.reading_h)
+        forgotten = ewma_weight(scale_h, settings.reading_h)
         total, mean, stray, stays = (ewma(weight * column, forgotten)[first:] for column in columns)
         share = _share(mean / total, stray / total, stays / total)
         # independent means are two time constants apart; the scatter of few means is uncertain

@@ -55,7 +55,11 @@ def tabulate(
     between |= {cell for cell in contents if _may_borrow(cell, contents, settings)}
     for cell in sorted(between - set(contents)):
         contents[cell] = _unseen(cell, enough, contents, fit.surface, settings.grid)
-    std, nodes = _surface_std(contents, fit), _node_std(contents, fit, settings.grid)
+    middle = [
+        (c.eccentricity_ratio, c.oil_temperature_c, c.attitude_deg) for c in contents.values()
+    ]
+    std = fit.std(fit.surface.shape.design(FilmConditions(*np.array(middle).T)))
+    nodes = _node_std(contents, fit, settings.grid)
     return CellTable(
         tuple(
             CellStatistics(
@@ -121,14 +125,6 @@ def _unseen(
     attitude_deg = contents[nearest].attitude_deg
     height = float(surface.at(FilmConditions.one(e, oil_c, attitude_deg))[0])
     return _Contents(0, 0, height, e, oil_c, attitude_deg)
-
-
-def _surface_std(contents: dict[Cell, _Contents], fit: Fit) -> FloatArray:
-    """Return the uncertainty of the surface at the median condition of each cell (n_cells,)."""
-    columns = [
-        (c.eccentricity_ratio, c.oil_temperature_c, c.attitude_deg) for c in contents.values()
-    ]
-    return fit.std(fit.surface.shape.design(FilmConditions(*np.array(columns).T)))
 
 
 def _node_std(contents: dict[Cell, _Contents], fit: Fit, grid: CellGrid) -> list[tuple[float, ...]]:

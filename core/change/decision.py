@@ -147,7 +147,8 @@ def step(
         verdict = outcome if isinstance(outcome, Verdict) else Verdict.NO_BASELINE
         return replace(decision, verdict=verdict, last_ns=time_ns)
     last_ns = decision.last_counted_ns
-    if last_ns is not None and time_ns - last_ns < _min_step_ns(baseline):
+    half_ns = round(0.5 * baseline.reading_h * 3600.0 * NS_PER_S)
+    if last_ns is not None and time_ns - last_ns < half_ns:
         return replace(decision, verdict=_verdict(decision, baseline, limits), last_ns=time_ns)
     evidence = decision.evidence.step(outcome, baseline)
     findings = evidence.findings(baseline)
@@ -169,11 +170,6 @@ def step(
         last_counted_ns=time_ns,
     )
     return replace(decision, verdict=_verdict(decision, baseline, limits))
-
-
-def _min_step_ns(baseline: QuantityBaseline) -> int:
-    """Return the smallest interval between counted readings in ns."""
-    return round(0.5 * baseline.reading_h * 3600.0 * NS_PER_S)
 
 
 def _deviation_std(compared: Comparison, baseline: QuantityBaseline) -> float:

@@ -9,7 +9,6 @@ the geometric mean over all films and directions.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -75,16 +74,13 @@ class ShaftResponse:
         if not all(std > 0.0 for std in self.std):
             raise ValueError(f"std must be above 0, got {min(self.std):g}")
 
-    @cached_property
-    def _coefficients(self) -> FloatArray:
-        return np.array(self.coefficients)
-
     def expected(self, ln_k: FloatArray) -> FloatArray:
         """Return ln of the expected motion over its geometric mean (n_films, n).
 
         `ln_k` (n_films, n) is ln of the stiffness of the films at n times.
         """
-        return self._coefficients @ _terms(ln_k - np.array(self.centre)[:, np.newaxis])
+        terms = _terms(ln_k - np.array(self.centre)[:, np.newaxis])
+        return np.asarray(np.array(self.coefficients) @ terms)
 
 
 def learn_response(

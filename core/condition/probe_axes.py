@@ -51,9 +51,7 @@ class ProbeAxis:
         """Worst quality of the known gaps; at best uncertain if one of two gaps is unknown."""
         if self.far is None:
             return self.near.quality
-        if self.near.value is None and self.far.value is None:
-            return worst((self.near.quality, self.far.quality))
-        if self.has_both:
+        if (self.near.value is None) == (self.far.value is None):
             return worst((self.near.quality, self.far.quality))
         left = self.far if self.near.value is None else self.near
         return worst((left.quality, uncertain(Reason.REDUCED_PROBES)))
@@ -117,7 +115,10 @@ class ProbeAxes:
     def _lines(self, source: int, weight: float) -> list[BudgetLine]:
         accuracy, name = self._accuracy, NAMES[source]
         if source == GROWTH:
-            return [systematic_line(name, self._growth_half_width_um(), weight)]
+            half_width_um = accuracy.growth_um
+            if self._last is not None:
+                half_width_um = self._last.half_width_um + accuracy.growth_change_um
+            return [systematic_line(name, half_width_um, weight)]
         if source == ASYMMETRY:
             return [systematic_line(name, accuracy.growth_asymmetry_um, weight)]
         gain_um = accuracy.gain * abs(float(self.values_um[source]))
@@ -129,11 +130,6 @@ class ProbeAxes:
             systematic_line(f"reference of {name}", accuracy.reference_um, weight),
             random_line(f"scatter of {name}", abs(weight) * noise_um),
         ]
-
-    def _growth_half_width_um(self) -> float:
-        if self._last is None:
-            return self._accuracy.growth_um
-        return self._last.half_width_um + self._accuracy.growth_change_um
 
     def _displacement(self, axis: int) -> FloatArray:
         near, far = _unit(2 * axis), _unit(2 * axis + 1)

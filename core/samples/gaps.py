@@ -177,18 +177,14 @@ def _counted(reach: Reach, block: SampleBlock) -> Iterator[Gap]:
     """Yield the unrecorded gaps between `reach` and a block of the same sample count."""
     at = reach.stop_index
     for gap in sorted(reach.gaps, key=lambda gap: gap.first_index):
-        if gap.epoch != reach.epoch or _is_older(gap, reach):
+        is_of_earlier_count = gap.stop_ns - reach.stop_ns < -_TOLERANCE.over(0)
+        if gap.epoch != reach.epoch or is_of_earlier_count:
             continue
         if at < gap.first_index < block.first_index:
             yield _piece(block, at, gap.first_index)
         at = max(at, gap.first_index + gap.n_samples)
     if at < block.first_index:
         yield _piece(block, at, block.first_index)
-
-
-def _is_older(gap: Gap, reach: Reach) -> bool:
-    """Whether a gap belongs to an earlier sample count of the same epoch."""
-    return gap.stop_ns - reach.stop_ns < -_TOLERANCE.over(0)
 
 
 def _piece(block: SampleBlock, start: int, stop: int) -> Gap:

@@ -186,14 +186,14 @@ SUFFIXES = {"_n_per_m": "_of_kb", "_n_s_per_m": "_of_kb_s"}
 
 def ratio_name(name: str) -> str | None:
     """Return the name of the ratio of a quantity to k_b; None if it is not proportional to k_b."""
-    found = [(own, ratio) for own, ratio in SUFFIXES.items() if name.endswith(own)]
-    return name.removesuffix(found[0][0]) + found[0][1] if found else None
+    found = (name.removesuffix(own) + to for own, to in SUFFIXES.items() if name.endswith(own))
+    return next(found, None)
 
 
 def absolute_name(name: str) -> str | None:
     """Return the name of the quantity whose ratio to k_b is `name`; None if `name` is no ratio."""
-    found = [(own, ratio) for own, ratio in SUFFIXES.items() if name.endswith(ratio)]
-    return name.removesuffix(found[0][1]) + found[0][0] if found else None
+    found = (name.removesuffix(to) + own for own, to in SUFFIXES.items() if name.endswith(to))
+    return next(found, None)
 
 
 def as_ratios(readings: Mapping[str, Reading]) -> dict[str, Reading]:

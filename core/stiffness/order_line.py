@@ -156,7 +156,7 @@ class OrderLine:
     @property
     def is_of_shaft(self) -> bool:
         """Whether the line exceeds the noise floor in at least one shaft channel."""
-        return self._stands_out(SHAFT_X) or self._stands_out(SHAFT_Y)
+        return self._stands_out[SHAFT_X] or self._stands_out[SHAFT_Y]
 
     @cached_property
     def phases_known(self) -> bool:
@@ -213,7 +213,7 @@ class OrderLine:
         phased = self._phased
         power, cross = phased.power[self.at], complex(phased.matrix[self.at, x, y])
         if self.bins is not None:
-            moves = bool(phased.n_segments[x, y]) and self._stands_out(x) and self._stands_out(y)
+            moves = bool(phased.n_segments[x, y]) and self._stands_out[x] and self._stands_out[y]
         else:
             # runout may look like a circular orbit in either direction
             least_um_pk = max(self.floors_um_pk[x], self.floors_um_pk[y], self._runout_um_pk(x))
@@ -316,9 +316,9 @@ class OrderLine:
                 reason = line_excitation(*at_phases, min_coherence, runout_um_pk)
             return Reason.OK if reason is Reason.FEW_SEGMENTS else reason
         # noise must not be mistaken for the vortex line
-        if (few or self.line == VORTEX) and not self._stands_out(shaft):
+        if (few or self.line == VORTEX) and not self._stands_out[shaft]:
             return quiet
-        if few and not self._stands_out(bearing):
+        if few and not self._stands_out[bearing]:
             return quiet
         # few segments are coherent by chance
         least = 0.0 if few else max(min_coherence, chance_coherence(n_segments))
@@ -338,12 +338,9 @@ class OrderLine:
         along, beside = float(power[shaft, across]), float(power[across, shaft])
         return (beside / along) ** 0.5 if along > 0.0 else 1.0
 
-    def _stands_out(self, place: int) -> bool:
-        """Return whether a channel's line exceeds the noise floor around it; False for polls."""
-        return self._outstanding[place]
-
     @cached_property
-    def _outstanding(self) -> list[bool]:
+    def _stands_out(self) -> list[bool]:
+        """Whether the line of each channel exceeds the noise floor around it; False for polls."""
         if self.bins is None:
             return [False] * len(AMPLITUDES)
         floors = floor_power(self.bins, self.frequency_hz, self.orders.frequency_hz)
