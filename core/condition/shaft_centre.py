@@ -56,7 +56,9 @@ def locate_shaft(
     stated = {"shaft_centre_x_um": (of_x, quality_x), "shaft_centre_y_um": (of_y, quality_y)}
     if growth is not None:
         stated["gap_growth_um"] = (growth, axes.growth_quality)
-    of_ratio = _eccentricity(axes, outward, radius_um, clearance_um, accuracy)
+    ratio_lines = axes.lines(outward @ axes.weights / clearance_um)
+    of_clearance = systematic_line(CLEARANCE, accuracy.clearance, radius_um / clearance_um)
+    of_ratio = Budget(radius_um / clearance_um, (*ratio_lines, of_clearance))
     of_angle = _angle(axes, outward, radius_um, math.degrees(angle_rad))
     stated |= {"eccentricity_ratio": (of_ratio, quality), "attitude_angle_deg": (of_angle, quality)}
     readings = {"gap_growth_um": NOT_MEASURED} | {
@@ -69,18 +71,6 @@ def locate_shaft(
         readings["eccentricity_ratio"] = replace(ratio, interval_95=(max(low, 0.0), high))
     known = (name for name in stated if readings[name].value is not None)
     return readings, {name: stated[name][0] for name in known}
-
-
-def _eccentricity(
-    axes: ProbeAxes,
-    outward: FloatArray,
-    radius_um: float,
-    clearance_um: float,
-    accuracy: GapAccuracy,
-) -> Budget:
-    ratio = radius_um / clearance_um
-    lines = axes.lines(outward @ axes.weights / clearance_um)
-    return Budget(ratio, (*lines, systematic_line(CLEARANCE, accuracy.clearance, ratio)))
 
 
 def _angle(axes: ProbeAxes, outward: FloatArray, radius_um: float, angle_deg: float) -> Budget:
