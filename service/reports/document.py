@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from core.alarms.kinds import FILM_STIFFNESS
+from core.baseline.history import QUANTITIES
 from service.reports.contents import bearing_part
 from service.reports.parts import (
     AXES,
@@ -257,7 +258,8 @@ def _unit(snapshot: Snapshot, plant: PlantFile) -> UnitPart | None:
 def _direction(snapshot: Snapshot) -> Direction | None:
     kind, own = snapshot.event.identity.kind, snapshot.bearings.get(snapshot.bearing or "")
     if kind == FILM_STIFFNESS and own is not None and own.film is not None:
-        return AXES[own.film.worst]
+        found = own.film.findings[own.film.worst]
+        return AXES[QUANTITIES[found.quantity].row]
     if kind.endswith("_x"):
         return "x"
     return "y" if kind.endswith("_y") else None

@@ -10,7 +10,15 @@ import pytest
 
 from acquisition.recordings.manifest import MANIFEST
 from core.alarms.alarm import AlarmEvent
-from core.quality import Reading
+from core.baseline.history import ReadingOutcome
+from core.change.decision import INITIAL_DECISION, Verdict
+from core.change.film_judge import FilmNews, unjudged
+from core.change.film_reading import FilmReading, FilmValue
+from core.condition.cells import BearingCondition
+from core.condition.operating_state import OperatingState
+from core.limits import AlarmLevel
+from core.machine.unit import Estimator
+from core.quality import Reading, Reason
 from service.recordings.around_alarms import Outcome
 from service.recordings.folders import ALARM
 from service.recordings.segment import write_alarms
@@ -52,6 +60,28 @@ class Expecting(SnapshotTaker):
 
     def take(self, event: AlarmEvent, now_ns: int, samples_expected: bool) -> Any:
         return replace(super().take(event, now_ns, samples_expected), samples_expected=True)
+
+
+class Moved(SnapshotTaker):
+    """A service with a film whose damping over stiffness in y has changed most."""
+
+    def take(self, event: AlarmEvent, now_ns: int, samples_expected: bool) -> Any:
+        found = super().take(event, now_ns, samples_expected)
+        said = [replace(each, limit=0.1) for each in unjudged(Verdict.NORMAL)]
+        said[-1] = replace(said[-1], level=AlarmLevel.ALERT, change=0.2)
+        value = FilmValue(20.0, 0.01, 40.0, 5.0, ReadingOutcome.MEASURED, Reason.OK)
+        steady = BearingCondition(OperatingState.FULL_LOAD, is_settled=True, cell=(7, 18))
+        place = ("U1", "UJB", Estimator.DYNAMIC, now_ns, steady, 90.9, 30.0, 0.4, 0.01, 45.0, 46.0)
+        film = FilmReading(*place, (value, value))
+        news = FilmNews(film, tuple(said), (INITIAL_DECISION,) * len(said))
+        ujb = replace(found.bearings["UJB"], film=news)
+        return replace(found, bearings={**found.bearings, "UJB": ujb})
+
+
+async def test_evidence_of_a_film_whose_damping_changed_names_its_direction(rig, news):
+    rig.keeper._taker = Moved({u.id: u for u in rig.plant.unit}, rig.live, rig.films)
+    await rig.write(news(kind="film_stiffness"))
+    assert document(rig.bundles[0]).direction == "y"
 
 
 async def test_an_alarm_leaves_a_bundle_that_says_what_was_known(rig, news):
