@@ -9,6 +9,7 @@ from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Hashable, Iterable, Mapping
 from contextvars import copy_context
 from dataclasses import dataclass, field
+from functools import lru_cache
 from hashlib import blake2b
 from inspect import iscoroutinefunction
 from typing import Any, TypeVar, cast
@@ -82,10 +83,11 @@ def is_known(tag: str, if_none_match: str | None) -> bool:
     return "*" in named or tag.removeprefix("W/") in named
 
 
-def encoding_of(headers: Headers) -> str:
+@lru_cache
+def encoding_of(accept_encoding: str) -> str:
     """Return the preferred content encoding that a client accepts; empty for none."""
     accepted = {}
-    for each in headers.get("accept-encoding", "").lower().split(","):
+    for each in accept_encoding.lower().split(","):
         name, _, quality = each.replace(" ", "").partition(";q=")
         accepted[name] = quality.strip("0.") != "" if quality else True
     return next((name for name in ENCODINGS if accepted.get(name, False)), "")
@@ -187,7 +189,7 @@ class Answers:
         headers = Headers(scope=scope)
         url = scope["path"].encode() + b"?" + scope["query_string"]
         tag = tag_of(self.started.encode(), url, repr(revision()).encode())
-        key = (tag, encoding_of(headers))
+        key = (tag, encoding_of(headers.get("accept-encoding", "")))
         if is_known(tag, headers.get("if-none-match")):
             return key, Response(status_code=304, headers={"ETag": tag})
         if (kept := self._kept.get(key)) is not None:
@@ -409,7 +411,7 @@ def _tagged(head: Message, message: Message, asked: Headers) -> Message:
         head["status"], body = 304, b""
         del headers["Content-Length"], headers["Content-Type"]
         return {"type": "http.response.body", "body": b""}
-    body, added = encoded(body, encoding_of(asked))
+    body, added = encoded(body, encoding_of(asked.get("accept-encoding", "")))
     headers.update(added | {"Content-Length": str(len(body))})
     return {"type": "http.response.body", "body": body}
 

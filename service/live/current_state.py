@@ -123,7 +123,8 @@ class LiveUnits:
             return self._revisions[unit]
         self._checked[unit] = latest, now_s
         status = self.status(unit)
-        current = [self.current(unit, bearing).is_current for bearing in latest.results]
+        ages_s = (self._age_s(unit, latest.link.result_ages_s.get(b)) for b in latest.results)
+        current = [self._why_not_current(unit, age_s) is None for age_s in ages_s]
         link = (status.state, status.reason, status.since_ns)
         seen = (latest.n_changes, latest.received_ns, current, link)
         if seen != self._seen.get(unit):
@@ -200,8 +201,8 @@ class LiveUnits:
 
     def is_alive(self, unit: str) -> bool:
         """Return whether the age of the last report on the unit is at most `SILENT_AFTER_S` s."""
-        silence_s = self.silence_s(unit)
-        return silence_s is not None and silence_s <= SILENT_AFTER_S
+        sent_s = self._latest[unit].sent_s  # asked for all units at each poll of a page
+        return sent_s is not None and self._clock.monotonic_s() - sent_s <= SILENT_AFTER_S
 
     @property
     def store_error(self) -> str | None:
