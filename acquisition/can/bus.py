@@ -44,11 +44,8 @@ def foreign_errors_renamed(where: str) -> Iterator[None]:
 def open_bus(settings: CanLinkSettings, ids: Iterable[int]) -> can.BusABC:
     """Open a CAN bus for listening, and return its python-can object.
 
-    Parameters
-    ----------
-    ids
-        Frame ids to receive. Standard and extended ids of these numbers are received, so that a
-        wrong kind of id is detected.
+    Only frames with the given ids are received, both standard and extended ones, so that a wrong
+    kind of id is detected.
 
     Raises
     ------

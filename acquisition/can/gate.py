@@ -67,15 +67,8 @@ _CONTROLLER_BYTE = 1
 def require_bus(message: Message, where: str) -> None:
     """Check that an error frame reports neither a bus-off nor an error-passive controller.
 
-    Parameters
-    ----------
-    where
-        Name of the bus in error messages.
-
-    Raises
-    ------
-    LinkError
-        If the controller is bus-off or error-passive; the received frames are then incomplete.
+    `where` is the name of the bus in error messages. Raises LinkError if the controller is bus-off
+    or error-passive; the received frames are then incomplete.
     """
     if message.arbitration_id & BUS_OFF:
         raise LinkError(

@@ -73,15 +73,8 @@ def spellings(unit: str) -> str:
 def waveform_factor(measurand: Measurand, unit: str, unit_per_v: float) -> float:
     """Return the factor that converts the unit of a file to the engineering unit of a channel.
 
-    Parameters
-    ----------
-    unit_per_v
-        Engineering units per volt, from the calibration of the channel.
-
-    Raises
-    ------
-    ConfigError
-        If the unit does not belong to the measurand.
+    `unit` is the unit in the file, and `unit_per_v` the engineering units of the channel per volt.
+    Raises ConfigError if the unit does not belong to the measurand of the channel.
     """
     known = _WAVEFORMS[measurand] | {volt: v * unit_per_v for volt, v in _VOLTS.items()}
     if canonical(unit) not in known:

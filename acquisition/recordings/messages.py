@@ -129,15 +129,8 @@ def blocks_in(
 ) -> Iterator[SampleBlock]:
     """Yield the blocks in a message; blocks without a gap between them are joined.
 
-    Parameters
-    ----------
-    sample_types
-        Permitted types of the samples.
-
-    Raises
-    ------
-    ConfigError
-        If the message does not contain blocks of a permitted type with the calibrated channels.
+    Raises ConfigError if the message does not contain blocks with the channels of `calibration`, or
+    their samples are of none of the types `sample_types`.
     """
     heads, rejected, sample_type = heads_in(message, len(calibration.slow))
     n_channels, n_samples = len(calibration.channels), heads["n_samples"]

@@ -211,17 +211,10 @@ def _numbers(read: Read, start: int, stop: int, place: ColumnName) -> npt.NDArra
 
 
 def require_one(found: Sequence[Any], place: ColumnName, known: Sequence[str]) -> Any:
-    """Return the only column in a list of columns that match a name.
+    """Return the only column in `found`, the columns of a file that match the name `place`.
 
-    Parameters
-    ----------
-    known
-        Names of columns in the file, for the error message.
-
-    Raises
-    ------
-    ConfigError
-        If no column or more than one column matches.
+    Raises ConfigError if no column or more than one column matches; the message lists `known`, the
+    names of the columns in the file.
     """
     if len(found) != 1:
         words = f"occurs {len(found)} times; name its group" if found else "does not exist"

@@ -25,15 +25,10 @@ _MICROSECOND = timedelta(microseconds=1)
 def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None) -> TimeArray:
     """Convert the numbers (n,) of a time column to UTC in nanoseconds.
 
-    Parameters
-    ----------
-    start_ns
-        Origin of "elapsed" times, UTC in nanoseconds since 1970; None if it is not known.
+    The form of the time axis states the unit of the numbers. `start_ns` is the origin of "elapsed"
+    times, UTC in nanoseconds since 1970; None if it is not known.
 
-    Raises
-    ------
-    ConfigError
-        If a value is not a valid time, or the start of "elapsed" times is missing.
+    Raises ConfigError if a value is not a valid time, or the start of "elapsed" times is missing.
     """
     origin, _, unit = axis.form.partition("_")
     if unit not in _US_PER:
