@@ -112,9 +112,9 @@ class RingReader:
 _N_REREADS = 3
 """Maximum number of repeated reads of a torn slot; a slot is written in milliseconds."""
 
-_MAX_READ_S = 1.5
-"""Maximum duration of the samples in one poll, s; halved after each failure in succession, so that
-a bad line is not lost again and again at the last slot."""
+_MAX_READ_S, _MIN_READ_S = 1.5, 0.05
+"""Maximum duration of the samples in one poll, s; halved after each failure in succession down to
+the second value, so that a bad line is not lost again and again at the last slot."""
 
 
 class RingFollower:
@@ -172,7 +172,8 @@ class RingFollower:
         Each block is a run of consecutive slots, with one cell per slot; the list may be empty.
         After an error of `RingReader`, the next call reads the same slots again.
         """
-        max_read_s, self._max_read_s = self._max_read_s, self._max_read_s / 2.0
+        max_read_s = self._max_read_s
+        self._max_read_s = max(_MIN_READ_S, max_read_s / 2.0)  # unless this poll succeeds
         blocks = await self._blocks(now_s, self._due(now_s, max_read_s), max_read_s)
         self._max_read_s = min(_MAX_READ_S, 2.0 * max_read_s)
         return blocks
