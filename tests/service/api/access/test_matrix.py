@@ -249,6 +249,7 @@ async def test_a_key_for_some_units_opens_those_and_what_belongs_to_none(access,
 
 
 async def test_a_cached_answer_is_confirmed_only_to_those_who_may_have_it(access, show):
+    access.app = access.app.repeating(access.app, [])
     keys = [await show("key", "good", "viewer", unit) for unit in ("U1", "U2")]
     path = "/api/v1/units/U1/bearings/UJB/latest"
     async with access.client(**keys[0]) as client:
@@ -262,9 +263,17 @@ async def test_a_cached_answer_is_confirmed_only_to_those_who_may_have_it(access
         access.service.access.keys.revoke(keys[0]["Authorization"].split("_")[1], 0)
         access.service.clock.step(1_000_000_001)
         assert (await client.get(path, headers=tag)).status_code == 401
-    for headers, status in ((keys[1], 403), ({}, 401)):
+    access.desk.local_role = Role.VIEWER
+    here, session = {"peer": "127.0.0.1"}, await show("session", "good", "viewer")
+    for headers in (here, session) * 2:
         async with access.client(**headers) as client:
-            assert (await client.get(path, headers=tag)).status_code == status
+            assert (await client.get(path)).headers["etag"] == tag["If-None-Match"]
+    await access.desk.log_out(session["Cookie"].partition("=")[2])
+    proxied = here | {"X-Forwarded-For": "192.0.2.7"}
+    refused = ((keys[1], 403), (here | keys[1], 403), ({}, 401), (session, 401), (proxied, 401))
+    for headers, status in ((here, 304), (here | keys[0], 401), *refused):
+        async with access.client(**headers) as client:
+            assert (await client.get(path, headers=tag)).status_code == status, headers
 
 
 async def test_a_key_for_some_units_may_ask_for_the_history_of_those(access, show):
