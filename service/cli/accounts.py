@@ -39,7 +39,7 @@ def access_of(plant: PlantFile, creates: bool = False) -> Iterator[AccessStore]:
         yield store
 
 
-def time_text(time_ns: int) -> str:
+def _time_text(time_ns: int) -> str:
     """Return a time, ns since 1970 UTC, as RFC 3339 text, truncated to the second."""
     return datetime.fromtimestamp(time_ns // NS_PER_S, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
@@ -104,17 +104,17 @@ def _row(key: ApiKey, now_ns: int) -> dict[str, object]:
         "role": key.role.value,
         "units": list(key.units),
         "state": key.state(now_ns).value,
-        "created": time_text(key.created_ns),
-        "expires": time_text(key.expires_ns),
-        "used": None if key.used_ns is None else time_text(key.used_ns),
-        "revoked": None if key.revoked_ns is None else time_text(key.revoked_ns),
+        "created": _time_text(key.created_ns),
+        "expires": _time_text(key.expires_ns),
+        "used": None if key.used_ns is None else _time_text(key.used_ns),
+        "revoked": None if key.revoked_ns is None else _time_text(key.revoked_ns),
     }
 
 
 def _line(key: ApiKey, now_ns: int) -> str:
     units = ", ".join(key.units) or "all units"
-    used = "never used" if key.used_ns is None else f"last used {time_text(key.used_ns)}"
-    state = f"{key.state(now_ns)}, until {time_text(key.expires_ns)}"
+    used = "never used" if key.used_ns is None else f"last used {_time_text(key.used_ns)}"
+    state = f"{key.state(now_ns)}, until {_time_text(key.expires_ns)}"
     return f"{key.id} {key.name}: {key.role} of {units}, {state}, {used}"
 
 
@@ -146,8 +146,8 @@ def list_users(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
         {
             "name": account.name,
             "role": account.role.value,
-            "created": time_text(account.created_ns),
-            "password_set": time_text(account.password_ns),
+            "created": _time_text(account.created_ns),
+            "password_set": _time_text(account.password_ns),
         }
         for account in accounts
     ]

@@ -115,7 +115,7 @@ class Commands(Mapping[str, Any]):
         return len(COMMANDS)
 
 
-class LazyGroup(CommandGroup):
+class _LazyGroup(CommandGroup):
     """Group of all commands; its help text is printed without importing their modules."""
 
     def __init__(self, **settings: Any) -> None:
@@ -135,7 +135,7 @@ class LazyGroup(CommandGroup):
 
 
 app = typer.Typer(
-    cls=LazyGroup,
+    cls=_LazyGroup,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -143,7 +143,7 @@ app = typer.Typer(
 )
 
 
-def print_version(is_wanted: bool) -> None:
+def _print_version(is_wanted: bool) -> None:
     """Print the version of the program and exit, if the option ``--version`` was given."""
     if is_wanted:
         from importlib.metadata import version
@@ -156,7 +156,9 @@ def print_version(is_wanted: bool) -> None:
 def padwatch(
     version: Annotated[  # noqa: ARG001
         bool,
-        typer.Option("--version", help="Print the version.", callback=print_version, is_eager=True),
+        typer.Option(
+            "--version", help="Print the version.", callback=_print_version, is_eager=True
+        ),
     ] = False,
 ) -> None:
     """Oil-film stiffness of hydrogenerator guide bearings, measured while the machine runs."""

@@ -91,7 +91,7 @@ def acquire(
     from service.app.cluster_processes import run_acquire
 
     plant = load_plant_file(plant_file)
-    settings, known = stream_settings(plant), {each.id for each in plant.unit}
+    settings, known = _stream_settings(plant), {each.id for each in plant.unit}
     for id_ in unit or ():
         if id_ not in known:
             fail(f"unknown unit {id_!r}; known units: {', '.join(sorted(known))}", 2)
@@ -121,7 +121,7 @@ def analyse(
     from service.cluster.session import StreamAnewError
 
     plant = load_plant_file(plant_file)
-    settings = stream_settings(plant)
+    settings = _stream_settings(plant)
     try:
         part = Partition.of(partition)
         units = part.part_of(plant).unit
@@ -150,7 +150,7 @@ def _announcer(command: str) -> Callable[[str], None]:
     return lambda url: typer.echo(f"padwatch {command}: {url}readyz")
 
 
-def stream_settings(plant: PlantFile) -> StreamSettings:
+def _stream_settings(plant: PlantFile) -> StreamSettings:
     """Return the settings [stream] of a plant file.
 
     Raises `CommandError` with exit code 2 if the plant file has none.

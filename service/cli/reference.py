@@ -36,7 +36,7 @@ from service.store.access.audit_entries import Acting, Source, acting_as
 from service.store.references import GapReference, ReferenceSource
 
 
-def bearing_references(
+def _bearing_references(
     unit: str, bearing: Bearing, history: Sequence[GapReference]
 ) -> dict[str, Any]:
     """Return the reference of the shaft centre that applies to a bearing, and its earlier ones.
@@ -64,7 +64,7 @@ def bearing_references(
     }
 
 
-def text_lines(found: Mapping[str, Any]) -> Iterator[str]:
+def _text_lines(found: Mapping[str, Any]) -> Iterator[str]:
     """Yield a line on the reference that applies in `found`, and one on each earlier reference."""
     gaps = _gaps(found["gap_reference_um"], found["opposite_reference_um"])
     yield f"{found['unit']} {found['bearing']}: {gaps}, {_source(found['reference'])}"
@@ -138,8 +138,8 @@ def set_reference(
             history = store.gap_references.history(machine.id, found.id)
     except (ReferenceRefusedError, ValueError) as error:
         fail(f"unit {machine.id} bearing {found.id}: {error}", code=2)
-    now = bearing_references(machine.id, found, history)
-    print_result(now, text_lines(now), json_output)
+    now = _bearing_references(machine.id, found, history)
+    print_result(now, _text_lines(now), json_output)
 
 
 @app.command("list")
@@ -148,13 +148,13 @@ def list_references(plant_file: PlantPath, json_output: JsonOutput = False) -> N
     plant = load_plant_file(plant_file)
     with plant_store(plant) if has_store(plant) else nullcontext() as store:
         found = [
-            bearing_references(
+            _bearing_references(
                 unit.id, bearing, store.gap_references.history(unit.id, bearing.id) if store else ()
             )
             for unit in plant.unit
             for bearing in machine_of(unit).bearings
         ]
-    lines = (line for references in found for line in text_lines(references))
+    lines = (line for references in found for line in _text_lines(references))
     print_result(found, lines, json_output)
 
 

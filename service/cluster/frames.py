@@ -121,7 +121,7 @@ def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b""
     return body + _CRC.pack(zlib.crc32(body))
 
 
-def unframed(message: bytes, identity: UnitIdentity) -> Frame:
+def _unframed(message: bytes, identity: UnitIdentity) -> Frame:
     """Check the header and checksum of a stream message of the unit `identity`; return its parts.
 
     Raises `WireError` if the bytes are not a message, are damaged, or are of another version, plant
@@ -188,7 +188,7 @@ class Cell(NamedTuple):
 
 
 @dataclass(frozen=True)
-class BlockHead:
+class _BlockHead:
     """JSON head of a block message: all fields of a block but its samples, and `taken_ns`."""
 
     __pydantic_config__ = STRICT
@@ -207,7 +207,7 @@ class BlockHead:
 
 
 @dataclass(frozen=True)
-class LinkHead:
+class _LinkHead:
     """JSON head of a link message: the link state of a unit."""
 
     __pydantic_config__ = STRICT
@@ -217,7 +217,7 @@ class LinkHead:
     reason: str | None
 
 
-_BLOCK, _LINK = TypeAdapter(BlockHead), TypeAdapter(LinkHead)
+_BLOCK, _LINK = TypeAdapter(_BlockHead), TypeAdapter(_LinkHead)
 
 
 @dataclass(frozen=True)
@@ -242,7 +242,7 @@ def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> 
     """
     side, type_ = block.side, block.counts.dtype.name
     columns = (side.starts.tolist(), side.start_ns.tolist(), side.ok.T.tolist())
-    head = BlockHead(
+    head = _BlockHead(
         calibration=block.calibration,
         epoch=block.epoch,
         first_index=block.first_index,
@@ -264,7 +264,7 @@ def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> 
 
 def encoded_link(news: LinkNews, identity: UnitIdentity) -> bytes:
     """Encode a link state as a stream message; its reason is cut to 1000 characters."""
-    head = LinkHead(news.unit, news.state, None if news.reason is None else news.reason[:1000])
+    head = _LinkHead(news.unit, news.state, None if news.reason is None else news.reason[:1000])
     return framed(Kind.LINK, identity, _LINK.dump_json(head))
 
 
@@ -273,7 +273,7 @@ def decoded(message: bytes, identity: UnitIdentity) -> Taken | LinkNews:
 
     Raises `WireError` if the message cannot be used. Invalid bytes raise no other exception.
     """
-    frame = unframed(message, identity)
+    frame = _unframed(message, identity)
     if frame.kind is Kind.LINK:
         link = _read(_LINK, frame.head)
         _require_own(link.unit, identity)
@@ -312,7 +312,7 @@ def _shared(calibration: UnitCalibration) -> UnitCalibration:
     return calibration
 
 
-def _side_values(head: BlockHead) -> SideValues:
+def _side_values(head: _BlockHead) -> SideValues:
     n_channels, n_slow = len(head.calibration.channels), len(head.calibration.slow)
     starts = [cell.start for cell in head.cells]
     edges = [*starts, max(head.n_samples, 1)]  # an empty block has one cell without samples

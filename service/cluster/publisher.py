@@ -45,7 +45,7 @@ class Outgoing:
     is_news: bool = False
 
 
-class Outbound:
+class _Outbound:
     """Queues of messages to publish, one for each unit, with a common capacity in bytes.
 
     `put` waits if a message would exceed ``capacity``. Meanwhile the ring of the device buffers
@@ -141,7 +141,7 @@ class Publisher:
     ) -> None:
         self._plant, self._settings, self._clock = plant, settings, clock
         self._identities = identities
-        self.waiting = Outbound(identities, round(settings.buffer_mb * BYTES_PER_MB), clock)
+        self.waiting = _Outbound(identities, round(settings.buffer_mb * BYTES_PER_MB), clock)
         self._links: dict[str, LinkNews] = {}
         self._state = TroubleLog(
             "blocks are not being published", "blocks are being published", NOT_REACHED

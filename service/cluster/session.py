@@ -75,7 +75,7 @@ NOT_REACHED = "the NATS servers have not been reached yet"
 ROOT = "padwatch"
 
 
-def plant_mark(plant: PlantFile) -> bytes:
+def _plant_mark(plant: PlantFile) -> bytes:
     """Return the fingerprint of a plant's name, which identifies its messages and stream."""
     return fingerprint(ROOT, plant.plant.name)
 
@@ -85,7 +85,7 @@ def stream_name(plant: PlantFile) -> str:
     if plant.stream is not None and plant.stream.name is not None:
         return plant.stream.name
     legible = re.sub(r"[^A-Za-z0-9]+", "-", plant.plant.name).strip("-")[:32]
-    return "-".join(part for part in (ROOT, legible, plant_mark(plant).hex()[:8]) if part)
+    return "-".join(part for part in (ROOT, legible, _plant_mark(plant).hex()[:8]) if part)
 
 
 def subjects(plant: PlantFile) -> str:
@@ -116,7 +116,7 @@ def identity_of(plant: PlantFile, unit: UnitSettings) -> UnitIdentity:
     """Return the identity of a unit, which all its messages contain."""
     channels = [(channel.id, str(channel.measurand)) for channel in unit.channel]
     make = fingerprint(unit.id, unit.sampling_hz, unit.source.kind, channels)
-    return UnitIdentity(unit.id, plant_mark(plant), make)
+    return UnitIdentity(unit.id, _plant_mark(plant), make)
 
 
 OLDEST_SERVER = (2, 10)
@@ -295,7 +295,7 @@ def wanted(plant: PlantFile, settings: StreamSettings) -> StreamConfig:
         duplicate_window=min(settings.duplicate_window_s, settings.max_age_h * S_PER_H),
         num_replicas=settings.replicas,
         allow_direct=True,
-        metadata={PLANT: plant_mark(plant).hex(), FORMAT: "1"},
+        metadata={PLANT: _plant_mark(plant).hex(), FORMAT: "1"},
     )
 
 
@@ -344,7 +344,7 @@ async def _info(stream: JetStreamContext, plant: PlantFile) -> StreamInfo | None
     except NO_ANSWER:
         raise StreamMisfitError(NOT_ENABLED) from None
     mark = (found.config.metadata or {}).get(PLANT)
-    if mark != plant_mark(plant).hex():
+    if mark != _plant_mark(plant).hex():
         fault = "belongs to another plant" if mark else "was not created by padwatch"
         raise StreamMisfitError(f"the stream '{name}' {fault}; set another [stream] name")
     return found

@@ -13,7 +13,7 @@ IMPORT = re.compile(r'^import (\{.*\}) from "(\.{1,2}/[^"]+)";$', re.MULTILINE)
 EXPORT = re.compile(r"^export (?=(?:async function|function|class|const) (\w+))", re.MULTILINE)
 
 
-def import_order(module: str, texts: Mapping[str, str]) -> list[str]:
+def _import_order(module: str, texts: Mapping[str, str]) -> list[str]:
     """Return the paths of a module and of all its direct and indirect imports, imports first."""
     found: dict[str, None] = {}
 
@@ -37,7 +37,7 @@ def script_bundle(module: str, texts: Mapping[str, str]) -> str:
     texts : mapping of str to str
         Texts of that module and of all modules that it imports, by path.
     """
-    return "".join(_function(path, texts[path]) for path in import_order(module, texts))
+    return "".join(_function(path, texts[path]) for path in _import_order(module, texts))
 
 
 def _function(path: str, text: str) -> str:

@@ -40,7 +40,7 @@ class Notice:
     ends: bool
 
 
-def notice_of(alarm: Alarm, event: AlarmEvent) -> Notice | None:
+def _notice_of(alarm: Alarm, event: AlarmEvent) -> Notice | None:
     """Return the notice of an event; None if the alarm is hidden before and after the event."""
     if event.change in ENDING:  # also for a hidden alarm: receivers must be notified of its end
         return Notice(AlarmChange.RETURNED, is_active=False, ends=True)
@@ -69,7 +69,7 @@ class Router:
 
     def __call__(self, alarm: Alarm, event: AlarmEvent) -> Iterable[OutboxMessage]:
         """Return one outbox message for each receiver that subscribes to the event."""
-        notice = notice_of(alarm, event)
+        notice = _notice_of(alarm, event)
         if notice is None:
             return []
         found = [

@@ -42,7 +42,7 @@ SocketOption = (
 )
 
 
-class BoundedStream(httpcore2.AsyncNetworkStream):
+class _BoundedStream(httpcore2.AsyncNetworkStream):
     """Network stream with a limit on the total number of bytes that are read."""
 
     def __init__(self, stream: httpcore2.AsyncNetworkStream, n_left: int = MAX_BYTES) -> None:
@@ -76,14 +76,14 @@ class BoundedStream(httpcore2.AsyncNetworkStream):
     ) -> httpcore2.AsyncNetworkStream:
         """Encrypt the connection with TLS; return the new stream, with the remaining byte limit."""
         encrypted = await self._stream.start_tls(ssl_context, server_hostname, timeout)
-        return BoundedStream(encrypted, self._n_left)
+        return _BoundedStream(encrypted, self._n_left)
 
     def get_extra_info(self, info: str) -> Any:
         """Return the item `info` of the metadata of the underlying connection."""
         return self._stream.get_extra_info(info)
 
 
-class BoundedNetwork(httpcore2.AsyncNetworkBackend):
+class _BoundedNetwork(httpcore2.AsyncNetworkBackend):
     """Network backend that connects to one host, resolved with `NameLookUp`, in bounded streams."""
 
     def __init__(self, look_up: NameLookUp) -> None:
@@ -113,7 +113,7 @@ class BoundedNetwork(httpcore2.AsyncNetworkBackend):
             except (httpcore2.ConnectError, httpcore2.ConnectTimeout) as error:
                 failure = error
             else:
-                return BoundedStream(stream)
+                return _BoundedStream(stream)
         raise failure
 
 
@@ -157,7 +157,7 @@ class Webhook:
         async with (
             httpcore2.AsyncConnectionPool(
                 ssl_context=await self._trusted.context(),
-                network_backend=BoundedNetwork(self._look_up),
+                network_backend=_BoundedNetwork(self._look_up),
             ) as pool,
             pool.stream(
                 "POST",

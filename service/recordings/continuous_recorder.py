@@ -45,7 +45,7 @@ Position = tuple[int, int]
 
 
 @dataclass
-class Omission:
+class _Omission:
     """Counts of the samples dropped in one epoch since the last recorded block.
 
     Parameters
@@ -82,7 +82,7 @@ class Omission:
         self.n_samples = Counter()
 
 
-def unseen_part(block: SampleBlock, end: Position | None) -> SampleBlock | None:
+def _unseen_part(block: SampleBlock, end: Position | None) -> SampleBlock | None:
     """Return the part of a block after the position `end`; None if no samples are left.
 
     The whole block is returned if `end` is None, of another epoch, or not within the block.
@@ -125,7 +125,7 @@ class UnitRecorder:
         self._end = end
         self._has_begun = False
         self._segment: Segment | None = None
-        self._omission = Omission()
+        self._omission = _Omission()
         self.ended: list[Path] = []
         self.n_written = self.n_refused = 0
 
@@ -135,7 +135,7 @@ class UnitRecorder:
         `now_s` is the monotonic time. Raises `RecordingError` if the block, or an earlier block,
         cannot be recorded.
         """
-        unseen = unseen_part(block, self._end)
+        unseen = _unseen_part(block, self._end)
         if unseen is None:
             return
         if self._segment is not None and not self._segment.covers(unseen):
@@ -285,7 +285,7 @@ class ContinuousRecorder(WriterThread):
         self._pressure = pressure
         self._recorders: dict[str, UnitRecorder] = {}
         self._seen: dict[str, Position] = {}
-        self._omissions: dict[str, Omission] = {unit: Omission() for unit in units}
+        self._omissions: dict[str, _Omission] = {unit: _Omission() for unit in units}
         self._waiting: deque[tuple[float, SampleBlock]] = deque()
         self._n_waiting = 0
         self._dropped: tuple[float, DropReason] | None = None
@@ -316,7 +316,7 @@ class ContinuousRecorder(WriterThread):
         """Queue a block for writing, or drop the block under overload and count its samples."""
         if block.unit not in self._units or self._is_closed:
             return
-        unseen = unseen_part(block, self._seen.get(block.unit))
+        unseen = _unseen_part(block, self._seen.get(block.unit))
         if unseen is None:
             return
         self._seen[block.unit] = (block.epoch, block.stop_index)

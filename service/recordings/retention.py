@@ -96,7 +96,7 @@ class RetentionRules:
     continuous_days: float = 30.0
 
 
-def make_room(
+def _make_room(
     files: Iterable[WaveformFile], rules: RetentionRules, now_ns: int, remove: Remove
 ) -> None:
     """Remove the oldest recordings until the limits are met, continuous recordings first.
@@ -343,7 +343,7 @@ class RecordingRetention:
                 return True
             return False
 
-        make_room(self._index.on_disk, rules, self._clock.now_ns(), remove)
+        _make_room(self._index.on_disk, rules, self._clock.now_ns(), remove)
 
     def _note_removed(self, file: WaveformFile, reason: str) -> None:
         self.found.n_removed[file.kind.value] += 1

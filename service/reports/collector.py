@@ -65,7 +65,7 @@ class SnapshotTaker:
         whether the samples around the alarm are to be recorded.
         """
         id_, unit = event.identity.unit, self._units.get(event.identity.unit)
-        bearing = None if unit is None else bearing_of(unit, event.identity.subject)
+        bearing = None if unit is None else _bearing_of(unit, event.identity.subject)
         ids = [] if unit is None else [each.id for each in unit.bearing]
         ids.sort(key=lambda each: each != bearing)  # stable: the others keep their order
         live, films = self._live, self._films
@@ -85,7 +85,7 @@ class SnapshotTaker:
         )
 
 
-def bearing_of(unit: UnitSettings, subject: str) -> str | None:
+def _bearing_of(unit: UnitSettings, subject: str) -> str | None:
     """Return the id of the bearing of an alarm subject: a bearing id or a channel of a bearing.
 
     A bearing that requires the channel takes precedence over a bearing for which it is optional.
@@ -220,7 +220,7 @@ class EvidenceCollector:
         return True
 
     def _write(self, snapshot: Snapshot, with_history: bool) -> None:
-        keep_configuration(self._folders.configurations, self.configuration)
+        _keep_configuration(self._folders.configurations, self.configuration)
         self._room.note(self._writer.write(snapshot, with_history=with_history))
         self.n_written += 1
 
@@ -238,7 +238,7 @@ class EvidenceCollector:
 
     def _begin(self) -> None:
         """Write the configuration, remove unfinished bundles, add missing links; in the thread."""
-        keep_configuration(self._folders.configurations, self.configuration)
+        _keep_configuration(self._folders.configurations, self.configuration)
         note_beginning(self._folders.evidence, self._clock.now_ns())
         for folder in clear_leftovers(self._folders.evidence):
             log.warning("unfinished evidence was removed", folder=folder.name)
@@ -265,7 +265,7 @@ class EvidenceCollector:
         return True
 
 
-def keep_configuration(folder: Path, configuration: Configuration) -> None:
+def _keep_configuration(folder: Path, configuration: Configuration) -> None:
     """Write a configuration to a file named by its version, unless the file has this content.
 
     Raises

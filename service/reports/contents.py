@@ -50,20 +50,20 @@ def bearing_part(found: Assessment, film: FilmNews | None, rules: FilmRules | No
     return BearingPart.of(
         found,
         condition=found.condition and _condition(found.condition, rules),
-        readings={name: reading_part(name, each) for name, each in found.readings.items()},
+        readings={name: _reading_part(name, each) for name, each in found.readings.items()},
         estimators=list(_estimators(found, watched)),
         budgets={name: _lines(budget) for name, budget in found.budgets.items()},
         film=film and _film(film),
     )
 
 
-def reading_part(name: str, reading: Reading) -> ReadingPart:
+def _reading_part(name: str, reading: Reading) -> ReadingPart:
     """Return the part of the evidence document about a reading of the quantity ``name``."""
     interval = _finite_pair(reading.interval_95)
     return ReadingPart.of(reading, reading.quality, quantity_of(name), interval_95=interval)
 
 
-def cell_bounds(cell: Cell | None, grid: CellGrid | None) -> list[tuple[float, float]] | None:
+def _cell_bounds(cell: Cell | None, grid: CellGrid | None) -> list[tuple[float, float]] | None:
     """Return the limits (low, high) of a cell along each axis of its grid; None without either.
 
     The axes are eccentricity ratio, oil temperature in °C and, if used, attitude in degrees.
@@ -83,7 +83,7 @@ def _estimators(found: Assessment, watched: Estimator | None) -> Iterator[Estima
             yield EstimatorPart.of(
                 estimator=estimator,
                 direction=direction,
-                stiffness=reading_part(name, found.readings[name]),
+                stiffness=_reading_part(name, found.readings[name]),
                 coherence=coherence.value,
                 is_preferred=found.estimators.get(direction * 2) is estimator,
                 is_watched=estimator is watched,
@@ -91,7 +91,7 @@ def _estimators(found: Assessment, watched: Estimator | None) -> Iterator[Estima
 
 
 def _condition(found: BearingCondition, rules: FilmRules | None) -> ConditionPart:
-    return ConditionPart.of(found, bounds=cell_bounds(found.cell, rules.grid if rules else None))
+    return ConditionPart.of(found, bounds=_cell_bounds(found.cell, rules.grid if rules else None))
 
 
 def _lines(budget: Budget) -> list[BudgetLine]:
@@ -155,7 +155,7 @@ def members_of(
         If the store cannot be read.
     """
     origin = baseline.origin
-    eccentricity, oil_c, *_ = cell_bounds(cell, rules.grid) or [(0.0, 0.0)] * 2
+    eccentricity, oil_c, *_ = _cell_bounds(cell, rules.grid) or [(0.0, 0.0)] * 2
     query = FilmQuery(
         origin.unit,
         origin.bearing,
@@ -222,7 +222,7 @@ def comparison(
         if baseline and learned
         else None,
         cell=None if own is None else _cell_part(own),
-        bounds=cell_bounds(cell, rules.grid),
+        bounds=_cell_bounds(cell, rules.grid),
         time_scales=list(_time_scales(news.decisions[row], learned, rules)) if learned else [],
         members=None if members is None else _members_part(members, direction),
         expected=None if learned is None else _line(learned, news),

@@ -28,7 +28,7 @@ class Figure:
         return f'<figure style="flex:{self.plot.width:g}">{self.plot.svg()}{caption}</figure>'
 
 
-def spectra_figure(case: Case) -> Figure | None:
+def _spectra_figure(case: Case) -> Figure | None:
     """Return the figure of the spectra of shaft and bearing in the direction of the alarm.
 
     None without a bearing, with fewer than three lines, or if all amplitudes are zero.
@@ -75,7 +75,7 @@ def _decades(amplitudes: Sequence[float]) -> Scale | None:
     return Scale(10.0**low, 10.0 ** max(high, low + 1), True)
 
 
-def orbit_figure(case: Case) -> Figure | None:
+def _orbit_figure(case: Case) -> Figure | None:
     """Return the figure of the newest shaft orbits; None with fewer than two samples."""
     rows = _rows(case.orbits, case.evidence.bearing)
     if len(rows) < 2:
@@ -99,7 +99,7 @@ def _rows(table: Columns, bearing: str | None) -> list[int]:
 GN_PER_M = 1e9
 
 
-def stiffness_scale(values: Values) -> tuple[str, float]:
+def _stiffness_scale(values: Values) -> tuple[str, float]:
     """Return the unit in which stiffnesses are drawn, and its size in N/m.
 
     The unit is GN/m; or k_b, of size 1, if stiffnesses are ratios to the bracket stiffness.
@@ -111,7 +111,7 @@ def stiffness_scale(values: Values) -> tuple[str, float]:
 DAY_S = 86_400.0
 
 
-def finite_of(values: Values) -> list[float | None]:
+def _finite_of(values: Values) -> list[float | None]:
     """Return a list of numbers with NaN and infinity replaced by None."""
     return [v if v is not None and math.isfinite(v) else None for v in values]
 
@@ -120,7 +120,7 @@ LOOKS = {"none": "unknown", "borrowed": "borrowed", "own": "known"}
 """CSS classes of cells by support."""
 
 
-def condition_figure(case: Case) -> Figure | None:
+def _condition_figure(case: Case) -> Figure | None:
     """Return the figure of stiffness against eccentricity; None without a comparison or numbers."""
     found = case.comparison
     if found is None:
@@ -131,7 +131,7 @@ def condition_figure(case: Case) -> Figure | None:
     x, y = around(e, 0.25), around(k, 0.15)
     if x is None or y is None:
         return None
-    unit, size = stiffness_scale(k)
+    unit, size = _stiffness_scale(k)
     plot = Plot(
         *(350.0, 148.0),
         *(Scale(*x), Scale(*y, divisor=size)),
@@ -157,7 +157,7 @@ def condition_figure(case: Case) -> Figure | None:
     )
 
 
-def map_figure(case: Case) -> Figure | None:
+def _map_figure(case: Case) -> Figure | None:
     """Return the map of the cells of the baseline, shaded by stiffness; None without a baseline."""
     found = case.comparison
     if found is None or not found.map or found.bounds is None:
@@ -171,7 +171,7 @@ def map_figure(case: Case) -> Figure | None:
     )
     known = [e.location for e in found.map if e.support != "none"] or [1.0]
     low, high = min(known), max(known)
-    unit, size = stiffness_scale(known)
+    unit, size = _stiffness_scale(known)
     for each, bounds in zip(found.map, cells, strict=True):
         plot.cell(bounds[0], bounds[1], LOOKS[each.support], _darkness(each, low, high))
     plot.cell(own[0], own[1], "own", 0.0)
@@ -204,8 +204,8 @@ def _recent(case: Case) -> tuple[list[float | None], list[float | None]]:
     rows = [i for i, (t, s) in enumerate(zip(times, settled, strict=True)) if s and t >= since_ns]
     if not rows:
         return [], []
-    e = finite_of(table["eccentricity_ratio"])
-    k = finite_of(table[f"stiffness_{case.direction}"])
+    e = _finite_of(table["eccentricity_ratio"])
+    k = _finite_of(table[f"stiffness_{case.direction}"])
     return [e[i] for i in rows], [k[i] for i in rows]
 
 
@@ -216,7 +216,7 @@ SHORTEST_S, MARGIN = 3600.0, 0.04
 """Minimum time before the alarm, in s, and time after it as a fraction of the time before."""
 
 
-def trend_figure(case: Case) -> Figure | None:
+def _trend_figure(case: Case) -> Figure | None:
     """Return the figure of stiffness against time, with its limits; None without stiffnesses."""
     found, axis = _trend(case), case.direction
     if found is None:
@@ -225,7 +225,7 @@ def trend_figure(case: Case) -> Figure | None:
     room = around([own, *found.stiffness, *found.lows, *found.highs])
     if room is None:
         return None
-    unit, size = stiffness_scale([own, *found.stiffness])
+    unit, size = _stiffness_scale([own, *found.stiffness])
     plot = Plot(
         *(720.0, 126.0),
         TimeScale(found.first_s, found.last_s),
@@ -289,7 +289,7 @@ def _trend(case: Case) -> _Trend | None:
     table = {name: [*old, *case.after.get(name, ())] for name, old in case.before.items()}
     if not table.get("time_ns"):
         return None
-    stiffness = finite_of(table[f"stiffness_{case.direction}"])
+    stiffness = _finite_of(table[f"stiffness_{case.direction}"])
     deviation = table[f"deviation_{case.direction}"]
     return _Trend(
         alarm_s=case.evidence.alarm.time_ns / NS_PER_S,
@@ -315,9 +315,9 @@ def _where(values: Values, wanted: list[bool]) -> list[float | None]:
 def figures(case: Case) -> Iterator[str]:
     """Yield the HTML of each row of figures; figures without data are omitted."""
     for row in (
-        (trend_figure,),
-        (condition_figure, map_figure),
-        (spectra_figure, orbit_figure),
+        (_trend_figure,),
+        (_condition_figure, _map_figure),
+        (_spectra_figure, _orbit_figure),
     ):
         drawn = [figure.html for make in row if (figure := make(case)) is not None]
         if drawn:

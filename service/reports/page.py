@@ -120,11 +120,11 @@ def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
     if alarm.reason and alarm.reason != "ok" and not story(case):
         yield "Reason", plain(alarm.reason)
     if case.bearing is not None:
-        yield "Condition", condition_words(case.bearing)
+        yield "Condition", _condition_words(case.bearing)
     yield "Samples", SAMPLES[case.samples.value]
     newest = case.events[-1].state_after.value if case.events else "its events are not in the store"
     yield "State now", f"{plain(newest)}; as of {now}"
-    yield "Seen by", seen_words(case)
+    yield "Seen by", _seen_words(case)
 
 
 def value_words(case: Case) -> str:
@@ -143,7 +143,7 @@ def value_words(case: Case) -> str:
     return f"{alarm.value:.4g}{unit}{limit}"
 
 
-def quantity_words(found: FindingPart) -> str:
+def _quantity_words(found: FindingPart) -> str:
     """Return the direction of a finding as text, with "c/k" if it is about that ratio."""
     return f"{found.direction}, damping over stiffness c/k" if found.is_damping else found.direction
 
@@ -168,7 +168,7 @@ def percent(number: float) -> str:
     return f"{number:+.1f} %".replace("-", "−")
 
 
-def condition_words(bearing: BearingPart) -> str:
+def _condition_words(bearing: BearingPart) -> str:
     """Return operating state and condition of the bearing as text; unknown values are omitted."""
     words = []
     if bearing.condition is not None:
@@ -183,7 +183,7 @@ def condition_words(bearing: BearingPart) -> str:
     return ", ".join(words)
 
 
-def seen_words(case: Case) -> str:
+def _seen_words(case: Case) -> str:
     """Return person and time of the newest acknowledgement, or "not acknowledged", as text."""
     seen = [each for each in case.events if each.change is AlarmChange.ACKNOWLEDGED]
     if not seen:
@@ -210,7 +210,7 @@ def story(case: Case) -> str:
         return ""
     scale_h = found.time_scale_h
     hours = "" if scale_h is None else f", averaged over {scale_h:g} running hours"
-    changes = "; ".join(f"in {quantity_words(each)} {change_words(each)}" for each in moved)
+    changes = "; ".join(f"in {_quantity_words(each)} {change_words(each)}" for each in moved)
     sentence = f"Stiffness of the film against the baseline under this condition: {changes}{hours}."
     cause = found.attribution
     if cause is None:
@@ -236,7 +236,7 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
-def estimators_table(bearing: BearingPart) -> str:
+def _estimators_table(bearing: BearingPart) -> str:
     """Return the HTML table of all stiffness estimates; one without a value shows its reason."""
     heads = ["Estimator"]
     for axis in AXES:
@@ -252,7 +252,7 @@ def estimators_table(bearing: BearingPart) -> str:
     return f"<h2>{escape(words)}</h2>" + table(heads, rows)
 
 
-def films_table(evidence: Evidence) -> str:
+def _films_table(evidence: Evidence) -> str:
     """Return the HTML table of all films at the time of the alarm; empty if none was judged."""
     found = [each for each in evidence.bearings if each.film is not None]
     if not found:
@@ -262,7 +262,7 @@ def films_table(evidence: Evidence) -> str:
     return f"<h2>{title}</h2>" + table(heads, (_films(each) for each in found))
 
 
-def events_table(case: Case) -> str:
+def _events_table(case: Case) -> str:
     """Return the HTML table of the newest `MAX_EVENTS` events of the occurrence."""
     shown = list(case.events)[-MAX_EVENTS:]
     n_more = len(case.events) - len(shown)
@@ -352,9 +352,9 @@ def report_page(case: Case, now_ns: int) -> str:
         f"<dl>{pairs}</dl>",
         f'<p class="story">{escape(story(case))}</p>',
         *figures(case),
-        estimators_table(bearing) if bearing is not None else "",
-        films_table(evidence),
-        events_table(case),
+        _estimators_table(bearing) if bearing is not None else "",
+        _films_table(evidence),
+        _events_table(case),
         footer(case),
     ]
     return (

@@ -27,7 +27,7 @@ Loop = Callable[[Pulse], Awaitable[None]]
 """Coroutine function of a loop: runs until cancelled and sends heartbeats to its argument."""
 
 
-class LoopPulse(Pulse):
+class _LoopPulse(Pulse):
     """Recorder of the heartbeats of one loop, with the due time of the next heartbeat."""
 
     def __init__(self, clock: Clock) -> None:
@@ -65,11 +65,11 @@ class Heartbeats:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._pulses: dict[str, LoopPulse] = {}
+        self._pulses: dict[str, _LoopPulse] = {}
 
     async def tend(self, name: str, run: Loop) -> None:
         """Run a loop; record its heartbeats under `name`, and its end if it returns or raises."""
-        pulse = self._pulses[name] = LoopPulse(self._clock)
+        pulse = self._pulses[name] = _LoopPulse(self._clock)
         try:
             await run(pulse)
         finally:

@@ -72,7 +72,7 @@ RANGES = {
 """Range keys of a region and their allowed bounds, in the order of the fields of `Region`."""
 
 
-def refuse_overlap(tables: Sequence[RegionSettings], states: StateNames) -> None:
+def _refuse_overlap(tables: Sequence[RegionSettings], states: StateNames) -> None:
     """Raise `MisfitError` if two tables overlap; a table without states applies in ``states``."""
     regions = [table.region(states) for table in tables]
     for n, m in combinations(range(len(tables)), 2):
@@ -142,7 +142,7 @@ class LimitSettings(WatchSettings):
     def _check(self) -> Self:
         refuse_twice(("states", n, name) for n, name in enumerate(self.states))
         self._check_limits()
-        refuse_overlap(self.table, self.states)
+        _refuse_overlap(self.table, self.states)
         for n, table in enumerate(self.table):
             try:
                 self.within(table)
@@ -396,7 +396,7 @@ class ZoneSettings(WatchSettings):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        refuse_overlap(self.table, AT_SPEED)
+        _refuse_overlap(self.table, AT_SPEED)
         return self
 
 

@@ -147,7 +147,7 @@ class WebhookSettings(ReceiverSettings):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        fault = url_fault(self.url)
+        fault = _url_fault(self.url)
         if fault is not None:
             raise MisfitError(fault, "url")
         if self.authorization is not None and not self.url.lower().startswith("https:"):
@@ -224,14 +224,14 @@ class DeliverySettings(Settings):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        fault = None if self.dashboard_url is None else url_fault(self.dashboard_url)
+        fault = None if self.dashboard_url is None else _url_fault(self.dashboard_url)
         if fault is not None:
             raise MisfitError(fault, "dashboard_url")
         refuse_twice(("receiver", n, "id", each.id) for n, each in enumerate(self.receiver))
         return self
 
 
-def url_fault(url: str) -> str | None:
+def _url_fault(url: str) -> str | None:
     """Return why a URL is not a valid HTTP(S) URL without credentials; None if it is valid."""
     try:
         parts = urlsplit(url)

@@ -23,7 +23,7 @@ HEADER = re.compile(r"^\s*(\[\[?)\s*([A-Za-z0-9_.\"-]+?)\s*\]\]?\s*(?:#.*)?$")
 KEY = re.compile(r"^\s*([A-Za-z0-9_.-]+)\s*=")
 
 
-def line_of(location: Location, text: str) -> int:
+def _line_of(location: Location, text: str) -> int:
     """Return the line number of a key, or of the innermost table around the key; else 1."""
     lines = dict(_lines(text))
     starts = (location[:n] for n in range(len(location), 0, -1))
@@ -71,7 +71,7 @@ def description(schema: Schema, location: Location) -> str:
     return " ".join(str(_node(schema, location).get("description", "")).split())
 
 
-def known_keys(schema: Schema, location: Location) -> list[str]:
+def _known_keys(schema: Schema, location: Location) -> list[str]:
     """Return the valid keys of a table, sorted; empty if the table is unknown."""
     options = _options(schema, _node(schema, location))
     return sorted({key for option in options for key in option.get("properties", {})})
@@ -126,7 +126,7 @@ def sentence(
     shown = key if holds_tables else f"{key} = {_shown(value)}"
     meaning = description(schema, location)
     if error["type"] == "extra_forbidden":
-        known = known_keys(schema, location[:-1])
+        known = _known_keys(schema, location[:-1])
         similar = get_close_matches(str(location[-1]), known, n=1)
         hint = f" (did you mean {similar[0]}?)" if similar else ""
         return f"{shown}: unknown key{hint}; known keys: {', '.join(known)}"
@@ -220,7 +220,7 @@ def load_toml(path: Path, model: type[Model]) -> Model:
             if e["type"] != "too_short" or len(e["input"]) < e["ctx"]["min_length"]
         ]
         lines = (
-            f"{path}:{line_of(at, text)}: {sentence(schema, e, at, data)}" for at, e in mistakes
+            f"{path}:{_line_of(at, text)}: {sentence(schema, e, at, data)}" for at, e in mistakes
         )
         raise TomlFileError("\n".join(lines)) from error
 

@@ -38,7 +38,7 @@ class Content:
     n_rows: Mapping[str, int]
 
 
-def content_of(connection: sqlite3.Connection) -> Content:
+def _content_of(connection: sqlite3.Connection) -> Content:
     """Return the schema number and row counts of a database, within the current transaction."""
     names = connection.execute(
         "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT GLOB 'sqlite_*'"
@@ -71,7 +71,7 @@ def checked(path: Path, origin: Origin | None = Origin.LIVE) -> Content:
         with closing(sqlite3.connect(uri, uri=True)) as connection:
             _require_ours(connection, path, origin)
             _require_whole(connection, path)
-            return content_of(connection)
+            return _content_of(connection)
     except (sqlite3.Error, UnicodeDecodeError) as error:
         raise BackupError(f"{path} cannot be read: {error}; use another backup") from error
 
@@ -104,7 +104,7 @@ def _number(connection: sqlite3.Connection, pragma: str) -> int:
 
 
 @contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
+def _alone_in(folder: Path) -> Iterator[None]:
     """Return a context manager that locks a folder against other backups within its block.
 
     Raises `BackupError` if another backup is being written to the folder.
@@ -162,7 +162,7 @@ def back_up(
         raise BackupError(f"{database}: the database does not exist; check the path")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with alone_in(folder):
+        with _alone_in(folder):
             return _back_up(database, folder, now_ns, n_kept, origin)
     except (OSError, sqlite3.Error) as error:
         raise BackupError(f"{folder}: the backup of {database} failed: {error}") from error
@@ -198,7 +198,7 @@ def _copy(database: Path, aside: Path) -> Content:
         closing(sqlite3.connect(aside, isolation_level=None)) as target,
     ):
         source.execute("BEGIN")  # rows are counted and copied in the same state
-        content = content_of(source)
+        content = _content_of(source)
         source.backup(target)
         target.execute("PRAGMA journal_mode = DELETE")  # one file, without a WAL file
     return content

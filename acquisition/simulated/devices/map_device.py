@@ -112,7 +112,7 @@ class MapDevice(ModbusDevice):
         self.newest = raw
         self.ledger.offer(self._unit, raw.epoch, raw.n_samples)
         self._spoilt, spoilt = self._spoilt - Counter((_SENTINEL, _FLAG)), self._spoilt
-        numbers = self._numbers(raw, in_units(raw, self._calibration))
+        numbers = self._numbers(raw, _in_units(raw, self._calibration))
         for id_, (number, good) in numbers.items():
             value = self._values.get(id_)
             if value is not None:
@@ -142,7 +142,7 @@ class MapDevice(ModbusDevice):
             self.image.put_flag(flag, good)
 
 
-def in_units(raw: SampleBlock, calibration: UnitCalibration) -> FloatArray:
+def _in_units(raw: SampleBlock, calibration: UnitCalibration) -> FloatArray:
     """Return the samples of a block in engineering units, (n_channels, n_samples), as float64.
 
     Samples that are float32 are in engineering units already.
@@ -202,7 +202,7 @@ class VectorDevice(MapDevice):
         ):
             self._window.clear()
         self._window.append(raw)
-        samples = np.concatenate([in_units(r, self._calibration) for r in self._window], axis=1)
+        samples = np.concatenate([_in_units(r, self._calibration) for r in self._window], axis=1)
         found = self._parts(
             samples, self._window[0].first_index, float(raw.side.slow[self._speed, 0])
         )

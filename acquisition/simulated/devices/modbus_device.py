@@ -236,7 +236,7 @@ class HangUpError(Exception):
     """Error raised if the device closes the connection instead of sending a reply."""
 
 
-def hanging_up(request: bytes, answerer: Answerer) -> bytes:  # noqa: ARG001
+def _hanging_up(request: bytes, answerer: Answerer) -> bytes:  # noqa: ARG001
     """Raise `HangUpError`, so that the server closes the connection without a reply."""
     raise HangUpError
 
@@ -246,13 +246,13 @@ def refusing(code: int) -> ReplyFault:
     return lambda request, _: refusal(request[0], code)
 
 
-def shifted_map(request: bytes, answerer: Answerer) -> bytes:
+def _shifted_map(request: bytes, answerer: Answerer) -> bytes:
     """Return a reply with the data of the next address, as after a firmware change."""
     address = int.from_bytes(request[1:3], "big") + 1
     return answerer(request[:1] + (address & 0xFFFF).to_bytes(2, "big") + request[3:])
 
 
-def swapped_words(request: bytes, answerer: Answerer) -> bytes:
+def _swapped_words(request: bytes, answerer: Answerer) -> bytes:
     """Return the correct reply with the two words of each pair of registers exchanged."""
     reply = answerer(request)
     n_pairs = (len(reply) - 2) // 4
@@ -264,10 +264,10 @@ def swapped_words(request: bytes, answerer: Answerer) -> bytes:
 
 REPLY_FAULTS: Mapping[str, ReplyFault] = {
     "busy": refusing(_BUSY),
-    "cut": hanging_up,
+    "cut": _hanging_up,
     "exception": refusing(_DEVICE_FAILURE),
     **{f"exception_{code}": refusing(code) for code in _EXCEPTION_CODES},
-    "shift_map": shifted_map,
+    "shift_map": _shifted_map,
     "silent": lambda _request, _answerer: None,
-    "word_order": swapped_words,
+    "word_order": _swapped_words,
 }

@@ -118,7 +118,7 @@ def order1_um_pk(
         film = _matrices(films[bracket.bearing], omega)
         b = b[:, np.newaxis, np.newaxis]
         share = _inverse(film + b * np.eye(2)) * b
-        motion = shaft_motion(bracket.height_m)
+        motion = _shaft_motion(bracket.height_m)
         dynamic += motion.T @ (film @ share) @ motion
         shares[bracket.bearing] = share, motion
     force = np.zeros((grade_mm_s.size, N_SHAFT_COORDINATES, 1), dtype=np.complex128)
@@ -134,7 +134,7 @@ def rotor_of(ids: tuple[str, ...]) -> RotorParameters:
     return replace(rotor, brackets=tuple(b for b in rotor.brackets if b.bearing in ids))
 
 
-def shaft_motion(height_m: float) -> FloatArray:
+def _shaft_motion(height_m: float) -> FloatArray:
     """Return the matrix (2, 4) from X, Y, φ_x, φ_y to shaft motion x, y at a height.
 
     `height_m` is the height above the mass centre (Brito et al., Table 3).

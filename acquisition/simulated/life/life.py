@@ -32,14 +32,14 @@ from core.arrays import ComplexArray, FloatArray
 from core.baseline.history import ReadingOutcome, StiffnessHistory
 
 
-def ln_stiffness(film: FilmColumns) -> FloatArray:
+def _ln_stiffness(film: FilmColumns) -> FloatArray:
     """Return the natural logarithm of the direct stiffness in x and y, in N/m, (2, n)."""
     return np.log(np.stack([film.k_xx_n_per_m, film.k_yy_n_per_m]))
 
 
-def ln_damping_over_stiffness(film: FilmColumns) -> FloatArray:
+def _ln_damping_over_stiffness(film: FilmColumns) -> FloatArray:
     """Return the natural logarithm of direct damping over stiffness in x and y, in s, (2, n)."""
-    return np.log(film.c_n_s_per_m[[0, 2]]) - ln_stiffness(film)
+    return np.log(film.c_n_s_per_m[[0, 2]]) - _ln_stiffness(film)
 
 
 def readings(
@@ -253,9 +253,9 @@ def _order1(
 def _truth(life: _BearingLife, order1: ComplexArray) -> BearingLifeTruth:
     return BearingLifeTruth(
         film=life.course.film,
-        ln_k=ln_stiffness(life.course.film),
-        ln_k_healthy=ln_stiffness(life.healthy.film),
-        ln_ck=ln_damping_over_stiffness(life.course.film),
+        ln_k=_ln_stiffness(life.course.film),
+        ln_k_healthy=_ln_stiffness(life.healthy.film),
+        ln_ck=_ln_damping_over_stiffness(life.course.film),
         clearance_um=life.course.clearance_um,
         centre_um=life.course.centre_um,
         oil_temperature_c=life.thermal.oil_temperature_c,

@@ -174,7 +174,7 @@ class TransducerChain:
             if channel.response is not None
         }
         self._reference_um = standing_gap_um(machine)
-        self._white, self._white_rms = white, noise_rms(machine, scenario.noise)
+        self._white, self._white_rms = white, _noise_rms(machine, scenario.noise)
         self._noisy, self._own = _own_noise(machine, scenario.noise, own)
 
     def read(
@@ -211,7 +211,7 @@ class TransducerChain:
         readings += noise * self._white_rms[:, np.newaxis]
 
 
-def noise_rms(machine: Unit, noise: TransducerNoise) -> FloatArray:
+def _noise_rms(machine: Unit, noise: TransducerNoise) -> FloatArray:
     """Return the rms of the white noise of each channel in its engineering unit, (n_channels,)."""
     by_measurand = {
         Measurand.GAP_UM: noise.gap_um_rms,

@@ -102,7 +102,7 @@ class UnitTruth:
     bearings: Mapping[str, BearingTruth]
 
 
-def unit_truth(machine: Unit, scenario: Scenario, now: Conditions, speed_rpm: float) -> UnitTruth:
+def _unit_truth(machine: Unit, scenario: Scenario, now: Conditions, speed_rpm: float) -> UnitTruth:
     """Return the true state of a simulated unit under given conditions and at a given speed."""
     brackets = {b.bearing: b.stiffness_n_per_m for b in scenario.true_rotor.brackets}
     bearings = {}
@@ -196,7 +196,7 @@ class SimulatedUnit:
 
     def truth(self) -> UnitTruth:
         """Return the true state at the next sample."""
-        return unit_truth(
+        return _unit_truth(
             self._machine, self._chunk.scenario, self._conditions(), self._speed_rpm()
         )
 

@@ -32,7 +32,7 @@ Lines = tuple[bytes, TimeArray]
 """Text of consecutive lines, and the (n,) line numbers of the non-empty ones."""
 
 
-def checked_lines(stream: BinaryIO) -> Iterator[Lines]:
+def _checked_lines(stream: BinaryIO) -> Iterator[Lines]:
     """Check the lines of a CSV file and yield them in blocks of some megabytes.
 
     Raises
@@ -89,7 +89,7 @@ def csv_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
         If the file is not a valid file of readings; the message names the lines.
     """
     headings: list[str] = []
-    for text, numbers in checked_lines(stream):
+    for text, numbers in _checked_lines(stream):
         if not headings and numbers.size:
             headings, text = _heading(text, numbers[0])
             numbers = numbers[1:]

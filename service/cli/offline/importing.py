@@ -93,7 +93,7 @@ def _messages(frames: Frames) -> Iterator[can.Message]:
         )
 
 
-def import_job(mapping: ImportMapping, unit: UnitSettings) -> ImportJob:
+def _import_job(mapping: ImportMapping, unit: UnitSettings) -> ImportJob:
     """Return the description of an import, the input of the process that reads the file.
 
     Raises
@@ -150,7 +150,7 @@ def import_recording(
     ConfigError
         If file, mapping and unit are inconsistent, or the file is damaged; no files remain.
     """
-    job = import_job(mapping, unit)
+    job = _import_job(mapping, unit)
     if job.channels:
         read = imported_blocks(path, job)
     elif isinstance(unit.source, CanSourceSettings):

@@ -123,7 +123,7 @@ class AccountStore(AuditedTables):
             found = writer.execute(SELECT_ACCOUNTS, {"name": name}).fetchone()
             if found and tuple(found[:3]) == (name, role.value, password_hash):
                 return  # already written by a call whose outcome was unknown: hashes are unique
-            if not insert_account(writer, name, role, password_hash, now_ns, must_change):
+            if not _insert_account(writer, name, role, password_hash, now_ns, must_change):
                 raise AccessRefusedError(f"account {name} already exists; choose another name")
             self._audit.add(writer, [_account_action("added", name, now_ns, after=role)])
 
@@ -244,7 +244,7 @@ class SessionStore(AuditedTables):
             writer.execute("DELETE FROM session")
 
 
-def insert_account(
+def _insert_account(
     writer: Connection,
     name: str,
     role: Role,
@@ -356,7 +356,7 @@ class SetUpStore(AuditedTables):
             if not writer.execute(IS_TAKEABLE, (digest, now_ns)).fetchone()[0]:
                 return False
             writer.execute("DELETE FROM set_up_token")
-            insert_account(writer, name, Role.ADMIN, password_hash, now_ns)
+            _insert_account(writer, name, Role.ADMIN, password_hash, now_ns)
             self._audit.add(writer, [_account_action("set_up", name, now_ns, after=Role.ADMIN)])
         return True
 

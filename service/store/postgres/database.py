@@ -126,7 +126,7 @@ class Writer:
                 if not self._session.closed:
                     self._roll_back()
                     raise
-        self._session = writing_session(self._address)  # the previous session was lost
+        self._session = _writing_session(self._address)  # the previous session was lost
         return self._begun()
 
     def _begun(self) -> str:
@@ -172,7 +172,7 @@ class Writer:
     def _outcome(self, number: str) -> str | None:
         try:
             if self._session.closed:
-                self._session = writing_session(self._address)
+                self._session = _writing_session(self._address)
             row = self._session.execute(OUTCOME, (number,)).fetchone()
         except (psycopg.OperationalError, StoreError):
             return None
@@ -187,7 +187,7 @@ class Writer:
             self._session.close()  # also rolls back
 
 
-def writing_session(address: PostgresAddress) -> Session:
+def _writing_session(address: PostgresAddress) -> Session:
     """Return a new session for write transactions on a suitable server.
 
     Raises
@@ -295,7 +295,7 @@ class PostgresDatabase:
     def __init__(self, address: PostgresAddress, origin: Origin) -> None:
         self.address = address
         with renamed(address.name):
-            session = writing_session(address)
+            session = _writing_session(address)
             try:
                 migrate(session, address.name, origin)
             except BaseException:

@@ -115,7 +115,7 @@ HYPERTABLE = (
 """Statement that partitions the results by week (TimescaleDB)."""
 
 
-def statements_to(number: int) -> list[str]:
+def _statements_to(number: int) -> list[str]:
     """Return the statements that migrate a database from schema `number` - 1 to `number`."""
     migration = INSTEAD.get(number, schema.MIGRATIONS[number - 1])
     return [*for_postgres(migration), *AFTERWARDS.get(number, ())]
@@ -155,7 +155,7 @@ def migrate(session: Session, where: str, origin: Origin) -> None:
                 " run the padwatch that wrote it, or restore a backup"
             )
         for number in range(before + 1, newest + 1):
-            for statement in statements_to(number):
+            for statement in _statements_to(number):
                 session.execute(statement.encode())
         if before < newest:
             session.execute("UPDATE padwatch SET schema_number = %s", (newest,))

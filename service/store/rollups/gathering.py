@@ -20,7 +20,7 @@ from service.store.rollups.writing import (
 from service.store.trends import Span
 
 
-def merge_late(writer: Connection, series: int, hour_ns: int, deleted: DeletedUntil) -> None:
+def _merge_late(writer: Connection, series: int, hour_ns: int, deleted: DeletedUntil) -> None:
     """Merge late readings into the roll-ups of an hour whose single readings were deleted.
 
     The late readings are deleted in the same transaction, so that a late reading is either stored
@@ -52,7 +52,7 @@ SET_MARK = """
 """
 
 
-def gather_next(writer: Connection, series: int, now_ns: int) -> None:
+def _gather_next(writer: Connection, series: int, now_ns: int) -> None:
     """Aggregate readings of a bearing into roll-ups: the next complete minutes before `now_ns`."""
     mark_ns = select_mark(writer, series)
     until_ns = _until(writer, series, mark_ns, now_ns)
@@ -61,7 +61,7 @@ def gather_next(writer: Connection, series: int, now_ns: int) -> None:
         writer.execute(SET_MARK, (series, until_ns))
 
 
-def gather_again(writer: Connection, series: int) -> None:
+def _gather_again(writer: Connection, series: int) -> None:
     """Repeat the aggregation of hours of a bearing for which readings were stored late."""
     mark_ns = select_mark(writer, series)
     hours = writer.execute(
@@ -71,7 +71,7 @@ def gather_again(writer: Connection, series: int) -> None:
     deleted = select_deleted(writer, series)
     for (hour_ns,) in hours:
         if hour_ns < deleted.readings_ns:
-            merge_late(writer, series, hour_ns, deleted)
+            _merge_late(writer, series, hour_ns, deleted)
         else:
             _gather_hour(writer, series, (hour_ns, min(hour_ns + HOUR_NS, mark_ns)))
         writer.execute(
@@ -137,5 +137,5 @@ class RollupStore(Tables):
         Raises `StoreError` if the transaction failed; nothing was aggregated.
         """
         with self._writing() as writer:
-            gather_again(writer, series)
-            gather_next(writer, series, now_ns)
+            _gather_again(writer, series)
+            _gather_next(writer, series, now_ns)
