@@ -145,8 +145,8 @@ STEPS = 1000
 def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
     """Read both databases from end to end; exit code 1 if anything is damaged or missing.
 
-    The service may keep running. Checks the structure of each file, the seal of every row, missing
-    rows, and whether the database is the one that was used last. Changes nothing.
+    The service may keep running. Checks the structure of each file, the checksum of every row,
+    missing rows, and whether the database is the one that was used last. Changes nothing.
     """
     plant = load_plant_file(plant_file)
     if plant.store.postgresql is not None:

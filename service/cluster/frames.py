@@ -179,7 +179,10 @@ STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="constants")
 
 
 class Cell(NamedTuple):
-    """Values from sample ``start`` on: time, ns; bit mask ``ok`` of good channels; slow values."""
+    """Values that apply from the sample with index ``start`` on.
+
+    They are the time in ns since 1970 UTC, a bit mask ``ok`` of good channels, and slow values.
+    """
 
     start: Index
     start_ns: Ns

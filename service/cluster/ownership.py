@@ -94,7 +94,10 @@ class Leadership:
         self.is_leading = False
 
     async def run(self, pulse: Pulse) -> None:
-        """Wait for the lock and run the tasks while it is held, repeatedly, until cancelled."""
+        """Run the plant-wide tasks while the database lock is held, else wait for the lock.
+
+        This is repeated until the task is cancelled; `pulse` receives heartbeats.
+        """
         while True:
             pulse.beat(TRY_EVERY_S)
             with ExitStack() as held:

@@ -28,7 +28,11 @@ async def replica_metrics(
     clock: Clock,
     store_kind: str,
 ) -> bytes:
-    """Return the metrics of a replica and of the units reported to it, as Prometheus text."""
+    """Return the metrics of a replica and of the units reported to it, as Prometheus text.
+
+    `receivers` returns the delivery state of all receivers of notifications; delivery metrics are
+    omitted if it raises `StoreError`. `store_kind` is the kind of the database.
+    """
     views: Sequence[ReceiverView] | None
     try:
         views = await receivers()

@@ -123,7 +123,7 @@ class DatabaseOperators(Operators):
         self._clock = clock
 
     async def send(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
-        """Store a command and wait for its answer; withdraw it if no answer arrives in time.
+        """Store a command and return its answer; withdraw it if no answer arrives in `WAIT_S`.
 
         ``actor`` is the operator's user name. Raises `StoreError` if the database cannot be used.
         """

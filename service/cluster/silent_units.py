@@ -47,7 +47,10 @@ class SilentUnits:
         self._board: ReportedAlarms | None = None
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Check the reports periodically until cancelled, then remove the alarms."""
+        """Check the reports of all units periodically; `pulse` receives heartbeats.
+
+        When the task is cancelled, the alarms about silent units are removed.
+        """
         try:
             await periodic(self.look, EVERY_S, self._clock, pulse)
         finally:

@@ -211,9 +211,10 @@ def signature(secret: str, time_s: str, body: bytes) -> str:
 
 
 def retry_after_s(text: str | None, clock: Clock) -> float | None:
-    """Return the delay in s by a Retry-After header, which is a number of seconds or a date.
+    """Return the delay, in s, that the text of a Retry-After header requests.
 
-    Return None if the header is missing or invalid (RFC 9110, 10.2.3).
+    The text is a number of seconds or a date, which is compared with `clock`. Return None if the
+    header is missing or invalid (RFC 9110, 10.2.3).
     """
     if text is None:
         return None

@@ -43,7 +43,7 @@ def new_folder(root: Path, unit: str, time_ns: int, kind: str) -> Path:
 
 
 def unit_of(name: str) -> str | None:
-    """Return the unit id in the name of a recording; None if the name is not of a recording."""
+    """Return the unit id in the name of a recording; None if it is not the name of a recording."""
     found = _NAME.match(name)
     return found[1] if found else None
 

@@ -147,7 +147,9 @@ def _members_part(found: StiffnessHistory, direction: Direction) -> MembersPart:
 def members_of(
     store: FilmStore, cell: Cell, baseline: BearingBaseline, rules: FilmRules
 ) -> StiffnessHistory:
-    """Return the settled readings of a cell in the learning period, except those with an alarm.
+    """Return a cell's settled readings without an alarm, from the learning period of a baseline.
+
+    A cell is a bin of operating conditions.
 
     Raises
     ------
@@ -182,7 +184,10 @@ N_EXPECTED = 60
 
 
 def cell_of(news: FilmNews, rules: FilmRules) -> Cell | None:
-    """Return the cell of a film reading; None if its operating condition is unknown."""
+    """Return the cell of operating conditions to which a film reading belongs.
+
+    None if the operating condition of the reading is unknown.
+    """
     here = news.reading.conditions
     if not rules.grid.is_known(here)[0]:
         return None

@@ -15,7 +15,7 @@ class Asker:
         self._cancels: list[Callable[[], None]] = []
 
     def leave(self) -> None:
-        """Mark the client as disconnected; cancel its running database statements in a thread."""
+        """Mark the client as disconnected; cancel its running statements from a new thread."""
         with self._lock:
             self.has_gone = True
             cancels = tuple(self._cancels)

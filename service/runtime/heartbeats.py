@@ -78,7 +78,7 @@ class Heartbeats:
     def start(
         self, loops: Mapping[str, Loop], tasks: asyncio.TaskGroup
     ) -> list[asyncio.Task[None]]:
-        """Start each loop as a named task and record its heartbeats."""
+        """Start each loop as a named task that records its heartbeats; return the tasks."""
         return [tasks.create_task(self.tend(name, loop), name=name) for name, loop in loops.items()]
 
     def release(self, *names: str) -> None:

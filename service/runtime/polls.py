@@ -85,7 +85,10 @@ class PollClock:
             self._pulse.beat(after_s)
 
     def forget(self) -> None:
-        """Discard the last sleep of the calling task, as time between connections is no poll."""
+        """Discard the calling task's last sleep, so that no poll duration is measured from it.
+
+        To be called when a link is closed, since the time between two connections is no poll.
+        """
         task = asyncio.current_task()
         if task is not None:
             self._woken_s.pop(task, None)

@@ -14,7 +14,10 @@ def rfc3339(time_ns: int) -> str:
 
 
 def compact(time_ns: int) -> str:
-    """Return a time, ns since 1970 UTC, as text to the millisecond for names that sort by time."""
+    """Return a time, ns since 1970 UTC, as text such as ``20260131T120000.000Z``.
+
+    The text is truncated to the millisecond; names that begin with it sort by time.
+    """
     seconds, ns = divmod(time_ns, NS_PER_S)
     return f"{datetime.fromtimestamp(seconds, UTC):%Y%m%dT%H%M%S}.{ns // 1_000_000:03d}Z"
 

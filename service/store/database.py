@@ -32,7 +32,7 @@ class Rows(Protocol):
         ...
 
     def fetchone(self) -> Any:
-        """Return the next row; None after the last."""
+        """Return the next row; None if no row is left."""
         ...
 
     def fetchall(self) -> list[Any]:
@@ -95,7 +95,7 @@ class Database(Protocol):
     def reading(self, unreadable: Unreadable = "strict") -> AbstractContextManager[Connection]:
         """Open a read-only transaction on one consistent state, and yield its connection.
 
-        `unreadable` is the handling of text that is not UTF-8.
+        `unreadable` is the error handler of `bytes.decode` for stored text that is not UTF-8.
         """
         ...
 

@@ -53,11 +53,17 @@ class FrameFaults:
             }
 
     def inject(self, fault: str, count: int) -> None:
-        """Queue a fault, a key of `known`, for the next `count` waveform frames without a fault."""
+        """Queue a fault for the next `count` waveform frames without a fault.
+
+        `fault` is a name in the attribute `known`.
+        """
         self._waiting.extend([self.known[fault]] * count)
 
     def applied(self, frames: Iterable[WireFrame]) -> list[Item]:
-        """Apply the queued faults to `frames`, and return the items to be sent instead."""
+        """Apply the queued faults to `frames`; return the items to be sent instead, in order.
+
+        An item is a frame, or a line of the slcan text protocol as bytes.
+        """
         items: list[Item] = []
         for frame in frames:
             if not frame.wave or not (self._waiting or self._held):

@@ -13,7 +13,7 @@ SlotFault: TypeAlias = Callable[[Slot], Slot | None]
 
 
 def dropped(slot: Slot) -> None:
-    """Return None: the slot is not written, and the sequence number continues."""
+    """Return None for any slot: the slot is not written, and the sequence number continues."""
 
 
 def torn(slot: Slot) -> Slot:

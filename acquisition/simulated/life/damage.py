@@ -98,7 +98,10 @@ class Alteration:
 
 
 def alteration(damage: tuple[Damage, ...], bearing: str, time_ns: TimeArray) -> Alteration:
-    """Return all damage of one bearing at times (n,): losses of a kind add up, gains multiply."""
+    """Return the joint effect of all damage of one bearing at the times `time_ns`, (n,).
+
+    Losses of the same kind of damage add up; gains multiply.
+    """
     lost = {
         kind: sum(
             (d.size * d.extent(time_ns) for d in damage if d.bearing == bearing and d.kind is kind),

@@ -63,7 +63,7 @@ def time_grid_ns(start_ns: int, years: float, step_s: float = STEP_S) -> TimeArr
     """
     n = int(years * YEAR_S / step_s)
     if not n * step_s >= DAY_S:
-        raise ValueError(f"years must be at least one day, got {years}")
+        raise ValueError(f"years must be at least 1/365 (one day), got {years:g}")
     return start_ns + np.arange(n, dtype=np.int64) * np.int64(step_s * NS_PER_S)
 
 
@@ -87,7 +87,10 @@ class HeldLoad:
 def wander(
     random: np.random.Generator, n: int, step_s: float, time_s: float, rms: float
 ) -> FloatArray:
-    """Draw a stationary Gauss-Markov process (n,): mean 0, given rms, time constant `time_s`."""
+    """Draw a stationary Gauss-Markov process with mean 0 and the given rms, (n,).
+
+    `step_s` is the interval between the values and `time_s` the time constant.
+    """
     import scipy.signal  # slow import, not needed at start-up
 
     memory = math.exp(-step_s / time_s)

@@ -90,7 +90,10 @@ class Chain:
 
 
 def u_random(force_n: FloatArray) -> FloatArray:
-    """Return the relative random uncertainty of stiffness at a broadband force F, ∝ 1/F, (n,)."""
+    """Return the relative random uncertainty of stiffness, (n,).
+
+    It is inversely proportional to the broadband hydraulic force `force_n` (rms), (n,).
+    """
     return U_RANDOM_AT_REFERENCE * REFERENCE_FORCE_N / force_n
 
 
@@ -171,7 +174,7 @@ class BearingLifeTruth(BearingMoments):
     Parameters
     ----------
     ln_k, ln_k_healthy : (2, n)
-        Logarithm of the film stiffness, with and without damage.
+        Logarithm of the film stiffness in N/m, with and without damage.
     ln_ck : (2, n)
         Logarithm of damping over stiffness in s.
     order1_um_pk : (4, n)

@@ -230,7 +230,7 @@ def _send(batches: Iterator[tuple[Any, int]], out: BinaryIO) -> None:
         writer = writer or pa.ipc.new_stream(out, batch.schema)
         writer.write_batch(batch, custom_metadata={"n_bytes": str(n_bytes)})
     if writer is None:
-        raise ReadingsError("the file has no rows")
+        raise ReadingsError("the file has no rows below its heading")
     writer.close()
 
 

@@ -159,7 +159,8 @@ def import_recording(
         read = ((block, done) for frames, done in logged for block in decoder.take(frames))
     else:
         raise ConfigError(
-            f'unit {unit.id} has no source of kind "can"; a CAN log is decoded by its DBC file'
+            f'unit {unit.id} has no source of kind "can"; add one, since a CAN log is decoded'
+            " with its DBC file"
         )
     recorded = recorded_unit(unit)
     joiner = BlockJoiner(job.block_samples)

@@ -215,7 +215,10 @@ _TRIES_IN_FLIGHT = 20
 
 
 async def read_once(device: ModbusLinkSettings, function: int, address: int, count: int) -> bytes:
-    """Read `count` registers as 16-bit big-endian words; for functions 1 and 2 bits, 8 per byte."""
+    """Read `count` registers as 16-bit big-endian words; for functions 1 and 2 bits, 8 per byte.
+
+    Raises `LinkError` or `ConfigError` if the device does not answer or refuses the request.
+    """
     client = ModbusClient(link_settings(LinkSettings, device))
     async with client.connected():
         return await client.read(address, count, function)
@@ -224,7 +227,10 @@ async def read_once(device: ModbusLinkSettings, function: int, address: int, cou
 async def read_map_once(
     device: ModbusLinkSettings, registers: RegisterMap
 ) -> tuple[MapDecoder, bytes]:
-    """Check a device against a register map; return the map's decoder and the registers read."""
+    """Check a device against a register map; return the map's decoder and the registers read.
+
+    Raises `LinkError` or `ConfigError` if the device does not answer, or does not match the map.
+    """
     decoder = MapDecoder(registers)
     reader = MapReader(link_settings(LinkSettings, device), decoder)
     async with reader.connected():
@@ -234,7 +240,10 @@ async def read_map_once(
 async def read_ring_once(
     device: ModbusLinkSettings, base_address: int, function: int
 ) -> tuple[RingHeader, Slot]:
-    """Read the header and the newest slot of a block ring."""
+    """Read the header and the newest slot of a block ring; `base_address` is that of the header.
+
+    Raises `LinkError` or `ConfigError` if the device does not answer, or has no block ring there.
+    """
     client = ModbusClient(link_settings(LinkSettings, device))
     reader = RingReader(client, base_address, function)
     async with client.connected():
@@ -244,7 +253,10 @@ async def read_ring_once(
 
 
 async def identify_once(device: ModbusLinkSettings) -> Identification:
-    """Read the vendor, product code and revision of a device (function 43/14)."""
+    """Read the vendor, product code and revision of a device (function 43/14).
+
+    Raises `LinkError` or `ConfigError` if the device does not answer or refuses the request.
+    """
     client = ModbusClient(link_settings(LinkSettings, device))
     async with client.connected():
         return await client.identify()

@@ -132,7 +132,8 @@ FIRST = "0" * 64
 def digest(values: Sequence[object]) -> str:
     """Return the SHA-256, in hexadecimal, of all fields of an audit entry except its hash.
 
-    Raises `TypeError` if a field is not text, a number or None.
+    `values` are the fields in the order of `AuditEntry`. Raises `TypeError` if a field is not text,
+    a number or None.
     """
     text = json.dumps([FORMAT, *values], separators=(",", ":"))  # ASCII, so that the text is unique
     return hashlib.sha256(text.encode("ascii")).hexdigest()

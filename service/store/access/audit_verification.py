@@ -202,7 +202,7 @@ def _wrong_head(
 
 
 def place_of(entry: AuditEntry, last: int) -> str:
-    """Return a sentence that an entry with a wrong hash was altered, or has a wrong number.
+    """Return a sentence that an entry with a wrong hash was altered, or that its number is wrong.
 
     The number is wrong if the hash matches with another number from 1 to `last`.
     """

@@ -322,7 +322,10 @@ class PostgresDatabase:
             yield reader
 
     def ever_had(self, connection: Connection, table: str) -> bool:  # noqa: ARG002
-        """Return True without a query, so that a missing head file is always an error."""
+        """Return True for every table, without a query.
+
+        A missing head file of the audit trail is therefore always an error with PostgreSQL.
+        """
         return True
 
     def hold(self, name: str) -> PostgresHold:

@@ -84,7 +84,7 @@ class SqliteReading:
     def reading(self, unreadable: Unreadable = "strict") -> Iterator[sqlite3.Connection]:
         """Open a read-only transaction on one consistent state, and yield its connection.
 
-        `unreadable` is the handling of text that is not UTF-8.
+        `unreadable` is the error handler of `bytes.decode` for stored text that is not UTF-8.
         """
         with self._store_errors(), self._readers.reading() as reader:
             if unreadable == "strict":

@@ -144,7 +144,7 @@ def test_little_load_means_little_excitation_and_more_uncertainty(two_years):
 
 
 def test_a_life_of_no_day_and_damage_to_no_bearing_are_refused():
-    with pytest.raises(ValueError, match="years must be at least one day, got 0"):
+    with pytest.raises(ValueError, match=r"years must be at least 1/365 \(one day\), got 0"):
         live(1, 0, 0)
     with pytest.raises(ValueError, match="unknown bearing 'GGB'; known: LJB, TJB, UJB"):
         live(1, 0, 0.1, [Damage(DamageKind.STIFFNESS_LOSS, "GGB", 0, 0.1)])
