@@ -87,7 +87,7 @@ class Window:
             self._seen.popleft()
 
     def first(self, otherwise: int) -> int:
-        """Return the sequence number of the oldest message, or ``otherwise`` without messages."""
+        """Return the sequence number of the oldest message; ``otherwise`` if there are none."""
         return self._seen[0].sequence if self._seen else otherwise
 
     @staticmethod

@@ -57,7 +57,10 @@ def change_words(message: Message) -> str:
 
 
 def value_words(message: Message) -> str | None:
-    """Return value, 95 % uncertainty and limit in an alarm message as text; None if no value."""
+    """Return value, 95 % uncertainty and limit in an alarm message as text.
+
+    None if the alarm has no value.
+    """
     value, limit, std = message["value"], message["limit"], message["uncertainty"]
     if value is None:
         return None

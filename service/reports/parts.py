@@ -123,7 +123,7 @@ class ConditionPart(EvidencePart):
 
 
 class CausePart(FilmCauseModel):
-    """Cause of a stiffness change, with the motion of shaft and bearing that it agrees with."""
+    """Cause of a stiffness change, with the changes of motion of shaft and bearing behind it."""
 
     shaft_change: Finite
     """Change of the shaft motion against the expected motion, ln of the ratio; null if unknown."""

@@ -122,4 +122,4 @@ def _require_readable(path: Path) -> None:
         with path.open("rb") as file:
             file.read(1)
     except OSError as error:
-        raise CertificateError(f"service.tls: {path}: {error.strerror}") from error
+        raise CertificateError(f"service.tls: {path} cannot be read: {error.strerror}") from error

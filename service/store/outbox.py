@@ -39,7 +39,7 @@ class OutboxMessage:
     is_active
         Whether the receiver regards the alarm as active after the message.
     closes
-        Whether the message reports an end; it is sent only to receivers notified of the start.
+        Whether it reports the end of the alarm; only receivers notified of the start get it.
     """
 
     receiver: str

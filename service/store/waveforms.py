@@ -27,7 +27,7 @@ class WaveformState(StrEnum):
 
 @dataclass(frozen=True)
 class WaveformFile:
-    """Index entry of a waveform recording.
+    """Index entry of a waveform recording; times are in ns since 1970 UTC.
 
     Parameters
     ----------

@@ -109,5 +109,5 @@ class ReadingWatch:
 
     @property
     def n_unread(self) -> int:
-        """Number of places of the ring from the oldest unread slot to the newest; 0 if all read."""
+        """Number of places of the ring from the oldest unread slot to the newest; 0 if none."""
         return (self._newest - self._unread[0]) % U32 + 1 if self._unread else 0

@@ -160,7 +160,9 @@ def output_map(machine: Unit, parameters: RotorParameters, matrices: RotorMatric
             rows.append(np.zeros(maps[SHAFT, Measurand.GAP_UM].shape[1]))  # no vibration
             continue
         if channel.id not in places:
-            raise ConfigError(f"channel {channel.id!r} belongs to no bearing of {machine.id!r}")
+            raise ConfigError(
+                f"channel {channel.id!r} belongs to no bearing of unit {machine.id!r}"
+            )
         part, row = places[channel.id]
         if (part, channel.measurand) not in maps:
             raise ConfigError(

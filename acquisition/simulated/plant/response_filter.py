@@ -96,7 +96,9 @@ def _section(
             poles = _pole_pair(natural_hz, damping) if natural_hz < rate_hz / 4.0 else []
             return _fitted(response, poles, order=0, rate_hz=rate_hz)
         case ResponseTable():
-            raise ConfigError("simulated transducer requires a model of its response, got a table")
+            raise ConfigError(
+                "a simulated transducer requires a model of its response, got a table"
+            )
 
 
 def _pole_pair(natural_hz: float, damping: float) -> list[complex]:

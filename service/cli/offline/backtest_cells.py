@@ -170,7 +170,7 @@ def _time_ns(table: Any, problems: RowProblems) -> Any:
     if TIME_NS in table.column_names:
         column = _flat(table.column(TIME_NS))
         if not (_is_text(column.type) or pa.types.is_integer(column.type)):
-            raise ReadingsError(f"column {TIME_NS} of type {column.type}: must be integers")
+            raise ReadingsError(f"column {TIME_NS} of type {column.type}: values must be integers")
         return _cast(column, pa.int64(), f"{TIME_NS} is not an integer:", problems)
     column = _flat(table.column(TIME))
     is_stamp = pa.types.is_timestamp(column.type) and column.type.tz is not None
@@ -183,14 +183,14 @@ def _number(column: Any, key: str, problems: RowProblems) -> Any:
     column, kind = _flat(column), column.type
     is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)
     if not (is_number or _is_text(kind)):
-        raise ReadingsError(f"column {key} of type {kind}: must be numbers")
+        raise ReadingsError(f"column {key} of type {kind}: values must be numbers")
     return _cast(column, pa.float64(), f"{key} is not a number:", problems, may_be_empty=True)
 
 
 def _text(column: Any, key: str, problems: RowProblems) -> Any:
     kind = column.type
     if not _is_text(kind.value_type if pa.types.is_dictionary(kind) else kind):
-        raise ReadingsError(f"column {key} of type {kind}: must be texts")
+        raise ReadingsError(f"column {key} of type {kind}: values must be texts")
     found = _flat(column.cast(pa.string()))
     if key == REASON:
         return found.fill_null(NO_REASON)

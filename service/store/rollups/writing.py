@@ -132,7 +132,8 @@ class DeletedUntil:
     Parameters
     ----------
     until_ns
-        Time in ns since 1970 UTC, by roll-up width in s (0 for single readings); earlier data no longer exist.
+        Time in ns since 1970 UTC, by roll-up width in s (0 for single readings); earlier data no
+        longer exist.
     """
 
     until_ns: dict[int, int]

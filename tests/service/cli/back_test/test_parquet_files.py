@@ -97,7 +97,7 @@ def test_names_may_be_in_a_dictionary_and_numbers_of_any_kind(written):
         ("time", with_value("time", None), "row 8: time is not ISO 8601"),
         ("time", pa.array([10**15] * N_ROWS, pa.timestamp("ms", tz="UTC")), "row 1: time is not"),
         ("unit", with_value("unit", None), "row 8: unit is missing"),
-        ("unit", list(range(N_ROWS)), "column unit of type int64: must be texts"),
+        ("unit", list(range(N_ROWS)), "column unit of type int64: values must be texts"),
         ("u_random", ["0.01"] * 7 + ["x"] * 13, "row 8: u_random is not a number: 'x'"),
         ("u_random", [[0.01]] * N_ROWS, "column u_random of type list"),
         ("colour", ["red"] * N_ROWS, "unknown columns: 'colour'"),
