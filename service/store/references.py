@@ -67,7 +67,7 @@ class GapReference:
         if self.opposite_reference_um is not None:
             _check_pair("opposite gap", self.opposite_reference_um)
         if not self.author.strip():
-            raise ValueError("author is empty; name who sets the reference")
+            raise ValueError("author is empty; give the name of the person who sets the reference")
         _check_text("author", self.author, MAX_AUTHOR)
         _check_text("note", self.note, MAX_NOTE)
 
@@ -76,13 +76,13 @@ def _check_pair(what: str, pair: MicrometrePair) -> None:
     for axis, gap_um in zip("xy", pair, strict=True):
         if not 0.0 < gap_um <= MAX_GAP_UM:  # also refuses NaN
             raise ValueError(
-                f"{what} {axis} is {gap_um:g} µm, must be above 0 and at most {MAX_GAP_UM:g} µm"
+                f"{what} {axis} is {gap_um:g} µm; it must be above 0 and at most {MAX_GAP_UM:g} µm"
             )
 
 
 def _check_text(what: str, text: str, n_most: int) -> None:
     if len(text) > n_most:
-        raise ValueError(f"{what} has {len(text)} characters, must be at most {n_most}")
+        raise ValueError(f"{what} has {len(text)} characters; it must have at most {n_most}")
     if not text.isprintable():
         raise ValueError(f"{what} has a line break or another unprintable character; remove it")
 

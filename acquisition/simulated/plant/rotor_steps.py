@@ -92,7 +92,7 @@ def _step(
 
 @dataclass(frozen=True)
 class LiftedRotor:
-    """Rotor that combines `n_steps` steps of a :class:`DiscreteRotor` into one.
+    """Rotor that advances by blocks of `n_steps` steps of a :class:`DiscreteRotor`.
 
     Parameters
     ----------

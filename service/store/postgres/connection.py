@@ -78,7 +78,9 @@ class PostgresAddress:
                 f"[store] password_file {path} cannot be read: {error.strerror}"
             ) from error
         if mode & 0o077:
-            raise StoreError(f"[store] password_file {path} is readable by others: chmod 600 it")
+            raise StoreError(
+                f"[store] password_file {path} is readable by others; run chmod 600 on it"
+            )
         return found.decode("utf-8", "surrogateescape").rstrip("\r\n")
 
 

@@ -68,7 +68,7 @@ def test_what_was_set_is_listed_with_time_author_and_what_was_before(plant_path)
 @pytest.mark.parametrize(
     ("flags", "changes", "said"),
     [
-        ((), {"x_um": "nan"}, "gap x is nan µm, must be above 0 and at most 10000 µm"),
+        ((), {"x_um": "nan"}, "gap x is nan µm; it must be above 0 and at most 10000 µm"),
         ((), {"opposite_x_um": 2000}, "bearing UJB has no opposite probe in x"),
         ((), {"bearing": "XJB"}, "unit U1: unknown bearing XJB; known bearings: UJB, LJB, TJB"),
         ((), {"unit": "U9"}, "unknown unit U9; known units: U1, U2"),

@@ -89,17 +89,23 @@ def test_what_another_process_has_set_is_seen(store, path):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"gap_reference_um": (math.nan, 2000.0)}, "gap x is nan µm, must be above 0 and at most"),
-        ({"gap_reference_um": (2000.0, 0.0)}, "gap y is 0 µm, must be above 0 and at most 10000"),
+        (
+            {"gap_reference_um": (math.nan, 2000.0)},
+            "gap x is nan µm; it must be above 0 and at most",
+        ),
+        (
+            {"gap_reference_um": (2000.0, 0.0)},
+            "gap y is 0 µm; it must be above 0 and at most 10000",
+        ),
         ({"gap_reference_um": (-1.0, 2000.0)}, "gap x is -1 µm"),
         ({"gap_reference_um": (10_000.1, 2000.0)}, "gap x is 10000.1 µm"),
         ({"gap_reference_um": (math.inf, 2000.0)}, "gap x is inf µm"),
         ({"opposite_reference_um": (2000.0, math.nan)}, "opposite gap y is nan µm"),
         ({"author": ""}, "author is empty"),
         ({"author": "  "}, "author is empty"),
-        ({"author": "a" * 81}, "author has 81 characters, must be at most 80"),
+        ({"author": "a" * 81}, "author has 81 characters; it must have at most 80"),
         ({"author": "A\nB"}, "author has a line break or another unprintable character"),
-        ({"note": "n" * 501}, "note has 501 characters, must be at most 500"),
+        ({"note": "n" * 501}, "note has 501 characters; it must have at most 500"),
         ({"note": "\x1b[2J"}, "note has a line break or another unprintable character"),
     ],
 )

@@ -46,7 +46,7 @@ def test_a_database_or_a_role_that_is_not_there_is_said(postgres_server):
     [
         (b"wrong", 0o600, "password authentication failed"),
         (b"", 0o600, "password_file"),
-        (b"x", 0o640, "is readable by others: chmod 600 it"),
+        (b"x", 0o640, "is readable by others; run chmod 600 on it"),
     ],
 )
 def test_a_wrong_password_is_refused_and_not_shown(
