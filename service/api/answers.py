@@ -85,7 +85,7 @@ def is_known(tag: str, if_none_match: str | None) -> bool:
 
 @lru_cache
 def encoding_of(accept_encoding: str) -> str:
-    """Return the preferred content encoding that a client accepts; empty for none."""
+    """Return the preferred content encoding that a client accepts; "" for no encoding."""
     accepted = {}
     for each in accept_encoding.lower().split(","):
         name, _, quality = each.replace(" ", "").partition(";q=")
@@ -164,7 +164,7 @@ class Answers:
     def at_once(self, scope: Scope, identity: Identity | None) -> Response | None:
         """Return the answer to a request of a caller that was answered before.
 
-        None if the answer is not in the cache, here or of the client.
+        Return None if neither this cache nor the cache of the client contains the answer.
         """
         found = self._find(scope, identity)
         try:
@@ -281,8 +281,8 @@ SELECTING = (b"accept", b"host", b"content-length", b"transfer-encoding")
 class Unrouted:
     """ASGI middleware that answers requests without routing if they were answered before.
 
-    It applies to requests that the same caller with the same rights has made before: permission
-    and parameters were checked then. Fifty polling pages cost half of what routing them costs.
+    It applies to requests that the same caller with the same rights has made before: permission and
+    parameters were checked then. With fifty polling pages, this halves the computing time.
     """
 
     def __init__(self, app: ASGIApp, answers: Answers) -> None:
@@ -297,8 +297,8 @@ class Unrouted:
 class Repetition:
     """ASGI middleware around all others that repeats answers which are in the cache.
 
-    It applies to requests as of `Unrouted`, also to the same host as before. Nothing is computed,
-    so that there are no deadline and no refusal.
+    It applies to requests that the same caller with the same rights has sent to the same host
+    before. It computes nothing, so these requests have no deadline and are never refused.
 
     Parameters
     ----------
@@ -361,7 +361,7 @@ CACHE_CONTROL = "private, no-cache"
 
 
 class AnswerHeaders:
-    """ASGI middleware that adds the time to API answers, and tags and compresses JSON answers.
+    """ASGI middleware that adds the host time to API answers; it tags and compresses JSON.
 
     An answer without an entity tag is tagged by its content.
     """

@@ -95,7 +95,7 @@ NOT_MODIFIED = {
 
 
 def describe_answers(document: dict[str, Any]) -> None:
-    """Add schemas of problems, headers and entity tags to an OpenAPI document, which is changed."""
+    """Add schemas of problems, headers and entity tags to an OpenAPI document, in place."""
     document.setdefault("components", {}).setdefault("schemas", {}).update(problem_schemas())
     for path, methods in document["paths"].items():
         for method, operation in methods.items():

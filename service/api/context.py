@@ -101,7 +101,10 @@ class Context:
         return tuple(found)
 
     def past_revision(self, unit: str, times: tuple[int, int]) -> Hashable:
-        """Return a value that changes with a time range and with the stored results in it."""
+        """Return a value that changes with a time range and with the stored results in it.
+
+        `times` are the start and the end of the range, ns since 1970 UTC.
+        """
         return times, self.live.past_revision(unit, times[1])
 
     def unit(self, unit: str) -> UnitSettings:

@@ -74,6 +74,9 @@ def attachment(
 def file_content(
     media_type: str, description: str, schema: Any = None, **more: Any
 ) -> dict[int | str, dict[str, Any]]:
-    """Return the OpenAPI entry of an answer that is a file, binary unless it has a `schema`."""
+    """Return the OpenAPI entry of an answer that is a file, binary unless it has a `schema`.
+
+    `more` are further members of the description of the content, such as an example.
+    """
     content = {"schema": schema or {"type": "string", "format": "binary"}, **more}
     return {200: {"description": description, "content": {media_type: content}}}

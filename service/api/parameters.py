@@ -61,7 +61,10 @@ _END = time_query("End, RFC 3339 with offset.", "2026-11-21T09:00:00Z")
 
 
 def duration(longest_s: float, description: str, **options: Any) -> Any:
-    """Return the declaration of a query parameter for a duration of at most `longest_s` seconds."""
+    """Return the declaration of a query parameter for a duration of at most `longest_s` seconds.
+
+    `options` are further keyword arguments of `fastapi.Query`.
+    """
     return Query(gt=0.0, le=longest_s, allow_inf_nan=False, description=description, **options)
 
 

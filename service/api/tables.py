@@ -98,7 +98,10 @@ UNITS = {
 
 
 def column_of(model: type[BaseModel], name: str, values: Sequence[Any], prefix: str = "") -> Column:
-    """Return the column of a field of a model: kind and unit are those of the field."""
+    """Return the column of a field of a model: kind and unit are those of the field.
+
+    `name` is the name of the field; the name of the column begins with `prefix`.
+    """
     unit = next((unit for end, unit in UNITS.items() if name.endswith(end)), None)
     return Column(prefix + name, kind_of(model.model_fields[name].annotation), values, unit)
 
@@ -125,7 +128,7 @@ Format = Annotated[FormatName, Depends(wanted_format)]
 
 
 def table_content(words: str) -> dict[int | str, dict[str, Any]]:
-    """Return the OpenAPI entry of an answer that is also available as CSV and Parquet."""
+    """Return the OpenAPI entry of an answer, described by `words`, in JSON, CSV and Parquet."""
     binary = {"schema": {"type": "string", "format": "binary"}}
     text = {"schema": {"type": "string"}, "example": CSV_EXAMPLE}
     content = {TYPE_OF["csv"]: text, TYPE_OF["parquet"]: binary}

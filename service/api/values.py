@@ -261,7 +261,7 @@ def cell_model(cell: Cell, grid: CellGrid) -> CellModel:
 
 
 def bounds(number: int, width: float) -> tuple[float, float]:
-    """Return the bounds of a bin, ``number * width`` and the next, rounded to 9 decimals."""
+    """Return the bounds of bin `number`, which begins at ``number * width``, to 9 decimals."""
     return round(number * width, 9), round((number + 1) * width, 9)
 
 

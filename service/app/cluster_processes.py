@@ -114,12 +114,16 @@ async def run_analyse(
 
     Parameters
     ----------
-    plant
-        Plant with the units of all partitions.
+    plant, partition
+        Plant with the units of all partitions, and the partition of this process.
+    settings
+        Settings of the stream of sample blocks.
     monitors
         Monitors of the units of the partition, by unit id.
     listener, announce
         Listening socket of the health page, and the function that is called with its URL.
+    clock, manager
+        Host clock, and the service manager that is notified of start and stop.
 
     Raises
     ------

@@ -146,6 +146,8 @@ async def analysis_on(
 
     Parameters
     ----------
+    process, monitors
+        Context of this process, and the monitor of each of its units by unit id.
     bus
         Queue of the blocks that wait for the analysis.
     alarm_context

@@ -77,7 +77,7 @@ REPLAYS = "replays"
 
 
 def replayed_plant(plant: PlantFile, units: Iterable[str], folder: Path) -> PlantFile:
-    """Return a copy of the plant for a replay of `units`: data in `folder`, SQLite, on loopback."""
+    """Return a copy of the plant for a replay of `units`: SQLite in `folder`, on loopback."""
     closed = {"host": "127.0.0.1", "socket": None, "tls": None}
     service = plant.service.model_copy(update={"data_folder": str(folder), **closed})
     chosen = tuple(unit for unit in plant.unit if unit.id in set(units))

@@ -79,6 +79,8 @@ async def run_service(
 
     Parameters
     ----------
+    service_run, clock
+        Configuration of the run, and the host clock.
     listener
         Listening socket, which the serving process inherits.
     announce

@@ -33,7 +33,8 @@ def server_of(
 ) -> HttpServer:
     """Return an HTTP server for `app` with the limits, host names and TLS of the plant file.
 
-    `repeating` is `GuardedApi.repeating`; without it, no answers are repeated.
+    `repeating` is a function that wraps an application, given with the headers of its answers, in
+    middleware that answers repeated requests from the cache; None without this middleware.
     """
     service, tls = plant.service, tls_of(plant)
 

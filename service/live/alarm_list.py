@@ -66,7 +66,8 @@ ShownAlarm = tuple[Alarm, bool, bool]
 class LiveAlarms:
     """List of all alarms, from reports and from the database.
 
-    While no reports on a unit arrive (not `is_alive`), the conditions of its alarms are unknown.
+    `is_alive` returns whether reports on a unit arrive; while none arrive, the conditions of the
+    alarms of the unit are unknown. `chatter_rule` defines chattering alarms.
     """
 
     def __init__(

@@ -25,8 +25,9 @@ log = structlog.get_logger()
 class LiveClient:
     """Present state of all units, alarms and films, from the reports of measuring processes.
 
-    Baselines in force are read from the store `films`. `ask` asks the measuring process; None if it
-    cannot be asked.
+    Baselines in force are read from the store `films`. `ask` is a coroutine function that sends a
+    question to the measuring process and returns the answer; its arguments are the kind of question
+    and a JSON document. None if this process has no connection to the measuring process.
     """
 
     def __init__(

@@ -83,12 +83,16 @@ def baseline_step(
 
     Parameters
     ----------
+    action, place
+        Action, and the oil film whose baselines it concerns.
     versions
         Present state of the bearing's baselines.
     entries
         All baselines of the bearing.
     actor, reason
         Author of the action and the reason given, stored with the step.
+    now_ns
+        Host time of the action, ns since 1970 UTC.
     """
     version: int | None = versions.in_force
     from_ns: int | None = None

@@ -88,8 +88,11 @@ class LiveUnits:
 
     Ages count from the send time of a report, by the monotonic clock of this process: the arrival
     minus the estimated delay. The clocks of the hosts need not agree, and the delay of a report by
-    the database does not reduce the ages of its values. `ask` asks the measuring process; None if
-    it cannot be asked.
+    the database does not reduce the ages of its values.
+
+    `ask` is a coroutine function that sends a question to the measuring process, such as for the
+    newest samples, and returns the answer; its arguments are the kind of question and a JSON
+    document. None if this process has no connection to the measuring process.
     """
 
     def __init__(

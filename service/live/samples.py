@@ -47,7 +47,8 @@ class SampleWindow:
     Parameters
     ----------
     samples
-        Samples of each channel, (n_samples,) in its unit, by id; NaN for missing or bad samples.
+        Samples (n_samples,) of each channel in the unit of the channel, by channel id; NaN for
+        missing or bad samples.
     slow
         Mean of each slow channel, by id.
     quality
@@ -85,7 +86,8 @@ def sample_window(
     blocks
         At least one block, oldest first, all of one epoch; they may extend beyond the window.
     rows
-        Row in the blocks of each channel to return, by id.
+        Index of the row of each requested channel in the sample arrays of the blocks, by channel
+        id.
     stamp
         Block whose time stamp determines the start time; by default, the oldest block.
     """

@@ -117,7 +117,7 @@ class AlarmEngine:
         self._publish(self._service.restore(others, now_ns))
 
     def add_alarms(self, board: ReportedAlarms, stored: Iterable[Alarm]) -> None:
-        """Add a board of alarms taken over from another process; `stored` has their state."""
+        """Add a board of alarms taken over from another process; `stored` are stored alarms."""
         self._reported.append(board)
         self._publish(board.restore(stored, self._clock.now_ns()))
 
@@ -322,6 +322,8 @@ async def alarm_engine(
 
     Parameters
     ----------
+    plant, origin, store, clock
+        Plant file, origin of the data (live or replay), store of the alarms, and host clock.
     put, listener
         Functions that queue findings for the store, and receive each block with its changes.
     rows

@@ -160,7 +160,8 @@ class Authenticator:
     async def log_out(self, token: str, *, is_replaced: bool = False) -> None:
         """End the session of a token at once; an unknown token is ignored.
 
-        With `is_replaced`, a new login of the same browser ends the session, which is not recorded.
+        With `is_replaced`, a new login of the same browser ends the session; the audit trail then
+        records no logout.
         """
         now_ns = None if is_replaced else self.clock.now_ns()
         await self.change(lambda: self.service.log_out(token, now_ns))

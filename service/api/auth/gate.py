@@ -165,7 +165,7 @@ async def require_declared(request: Request) -> None:
 
 
 def identity_of(request: Request) -> Identity:
-    """Return the identity of the caller; raise a problem of status 401 without an identity."""
+    """Return the identity of the caller; raise `ProblemError` (401) without an identity."""
     identity = caller_of(request).identity
     if identity is None:
         raise not_logged_in()

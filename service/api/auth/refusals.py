@@ -30,7 +30,7 @@ SECONDS_EACH = 30.0
 class Refusals:
     """Writer of audit entries for refused requests; above a rate limit, requests are only counted.
 
-    `n_more` is the number of refused requests since the newest entry, which have no entry.
+    `n_more` is the number of refused requests since the newest entry that were only counted.
     """
 
     def __init__(self, audit: AuditStore, clock: Clock) -> None:

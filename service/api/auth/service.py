@@ -81,6 +81,8 @@ class AccessService:
 
         Parameters
         ----------
+        name, password
+            Login name and password of the account.
         peer
             Network address of the client, for the backoff after failed logins.
         now_ns
@@ -115,6 +117,8 @@ class AccessService:
 
         Parameters
         ----------
+        name
+            Login name of the account.
         password, new
             Current and new password.
         peer, now_ns, ticks_ns

@@ -54,6 +54,8 @@ def http_server(
 
     Parameters
     ----------
+    app, limits
+        Application to serve, and limits of connections and of the answer time.
     hosts
         Accepted host names and addresses, in addition to loopback.
     headers
@@ -61,7 +63,8 @@ def http_server(
     tls
         TLS context; None for plain HTTP.
     around
-        Function that puts the application with its headers, both complete, into more middleware.
+        Function that wraps the application in further middleware; it is called with the application
+        and with the complete list of headers.
     """
     checked, added = CheckedRequests(app, hosts, limits.answer_s), [*SECURITY_HEADERS, *headers]
     complete = around(AddedHeaders(checked, added), added)

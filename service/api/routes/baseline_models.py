@@ -81,7 +81,11 @@ def learning_model(
     settings: FilmAlarmSettings,
     now_ns: int,
 ) -> LearningModel:
-    """Return the progress of learning a baseline; ``entries`` are all baselines of the bearing."""
+    """Return the API model of the progress of learning a baseline.
+
+    `versions` is the state of the baseline versions of the bearing, `entries` are all its
+    baselines. `now_ns` is the host time, ns since 1970 UTC.
+    """
     since_ns = versions.renewed_ns
     if since_ns is None:
         since_ns = store.first_ns(place.unit, place.bearing, place.estimator)

@@ -145,7 +145,10 @@ class BudgetModel(ApiModel):
 
 
 def reference_model(reference: GapReference | None) -> ReferenceModel:
-    """Return the API model of the origin of a gap reference; None is that of the plant file."""
+    """Return the API model of the origin of a gap reference.
+
+    None means that the gap reference of the plant file is in force.
+    """
     if reference is None:
         return PLANT_FILE
     return ReferenceModel.of(reference, note=reference.note or None)
@@ -154,7 +157,7 @@ def reference_model(reference: GapReference | None) -> ReferenceModel:
 def result_model(
     current: CurrentBearing, bearing: str, readings: Mapping[str, ReadingModel]
 ) -> ResultModel:
-    """Return the API model of the newest result of a bearing, with the given readings of it."""
+    """Return the API model of a bearing's newest result, with the given readings by quantity."""
     newest = current.assessment
     shown = newest if current.is_current else None
     return ResultModel.of(

@@ -146,7 +146,7 @@ def source_model(live: LiveUnits, unit: str) -> SourceModel:
 
 
 class GapModel(ApiModel):
-    """Gap in the samples of a unit, also a gap because the service was stopped."""
+    """Gap in the samples of a unit, also if the cause was a stop of the service."""
 
     epoch: int
 

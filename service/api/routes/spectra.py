@@ -160,7 +160,10 @@ def _full(spectrum: CrossSpectrum, x: int, y: int, sense: int) -> FullSpectrumMo
 
 
 def spectrum_model(assessment: Assessment, rotation_sense: int) -> SpectrumModel:
-    """Return the API model of the spectra of a result; `rotation_sense` +1 is from x to y."""
+    """Return the API model of the spectra of a result.
+
+    `rotation_sense` is +1 if the shaft turns from x to y, and -1 if it turns from y to x.
+    """
     spectrum, readings = assessment.spectrum, assessment.readings
     return SpectrumModel.of(
         time=assessment.time_ns,

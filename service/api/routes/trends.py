@@ -39,8 +39,11 @@ def trend_table(
 
     Parameters
     ----------
+    trend
+        Trend of all readings in the time range.
     groups
-        Groups whose rows are returned one group after the other; None for those of the trend.
+        Groups whose rows are returned, one group after the other; None to return the rows of the
+        trend itself.
     past_end_ns
         End of the simulated readings, ns since 1970 UTC; None without simulated readings.
     """
@@ -160,6 +163,8 @@ def trend_answer(
 
     Parameters
     ----------
+    query, trend
+        Query of the client, and the trend of all readings that it selects.
     groups
         Groups of readings with their trends; None if not requested.
     past_end_ns
