@@ -92,7 +92,7 @@ def revoke(
     """Revoke a key permanently; it is rejected from the next request on."""
     with access_of(load_plant_file(plant_file)) as access:
         if access.keys.get(id_) is None:
-            fail(f"key {id_} does not exist; see padwatch keys list", 2)
+            fail(f"key {id_} does not exist; run `padwatch keys list` for the ids", 2)
         is_new = access.keys.revoke(id_, SystemClock().now_ns())
     typer.echo(f"{id_}: revoked" if is_new else f"{id_}: was already revoked")
 

@@ -85,7 +85,7 @@ def read_secret(settings: SecretSettings) -> str:
     except OSError as error:
         raise SecretError(f"{place} cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise SecretError(f"{place} is not valid UTF-8") from error
+        raise SecretError(f"{place} is not valid UTF-8; save it as UTF-8") from error
     text = text.strip()
     if not text or not text.isprintable():
         raise SecretError(f"{place} must hold a single line of printable text")
