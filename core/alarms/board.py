@@ -121,8 +121,8 @@ class AlarmBoard:
 
         Parameters
         ----------
-        stored
-            Alarms as stored with their newest events.
+        stored, host_ns
+            Alarms as stored with their newest events, and host time of the restart, ns.
         memory
             State at the last block; None if samples were lost since then. A stored alarm may be
             newer because of an action or a link event. Alarms without a rule are ignored.

@@ -121,7 +121,8 @@ def ewma_weight(time_scale_h: float, reading_h: float) -> float:
 def ewma(x: FloatArray, alpha: float) -> FloatArray:
     """Return the moving averages y[i] = (1 - α) y[i-1] + α x[i] of x (n,), with α = `alpha`.
 
-    The first is α x[0]. Divided by those of ones, they are exponentially weighted means.
+    The first is α x[0]. Divided by the moving averages of ones, they are exponentially weighted
+    means.
     """
     from scipy.signal import lfilter  # slow import, not needed at start-up
 

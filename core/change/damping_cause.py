@@ -164,12 +164,12 @@ def cause_by_damping(
 
     Parameters
     ----------
-    found
-        Cause found from the shaft motion.
+    film, found
+        Bearing id and direction of the changed film, and cause found from the shaft motion.
     evidence
         Mean deviations by bearing and direction. Bearings without c/k in x and y do not count.
     lines
-        Findings on the transducers by the line of the shaft, by direction.
+        Findings on the transducers from the line of the shaft, by direction.
     """
     for direction, line in lines.items():
         if line.bearing == film[0]:

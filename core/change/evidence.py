@@ -32,7 +32,7 @@ class ScaleSums:
     """Exponentially weighted sums (moving averages from 0) over one time scale.
 
     `fill` is the sum of ones, which approaches 1 as the time scale elapses; `weight` is the sum of
-    the weights. The others are sums of weighted deviations and of their uncertainties.
+    the weights. The other fields are sums of weighted deviations and of their uncertainties.
     """
 
     fill: float = 0.0
@@ -42,7 +42,7 @@ class ScaleSums:
     offset: float = 0.0
 
     def step(self, compared: Comparison, middle: float, alpha: float) -> "ScaleSums":
-        """Return the sums with one more reading, to which they give the weight `alpha`.
+        """Return the sums after one more reading, whose weight is `alpha`.
 
         `middle`, the running median deviation, is added instead of the reading's own deviation.
         """

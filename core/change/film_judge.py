@@ -66,7 +66,7 @@ class FilmFinding:
         return self.level or 0, abs(math.expm1(self.change or 0.0)) / self.limit
 
     def in_alert(self) -> "FilmFinding":
-        """Return this finding with at least an alert, as for a gain that the shaft line shows."""
+        """Return this finding with at least the level alert."""
         if self.level is not None:
             return self
         verdict = Verdict.ALERT if self.verdict is Verdict.NORMAL else self.verdict

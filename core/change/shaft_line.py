@@ -92,10 +92,10 @@ class LineFinding:
     Parameters
     ----------
     distance_um, std_um
-        None if unknown.
+        Distance from the line, and its standard uncertainty; None if unknown.
     bearing, ln_gain
-        Bearing of the transducer that changed its gain, and ln of the gain over that learned; None
-        unless the verdict is `PROBE` or `ACCELEROMETER`.
+        Bearing of the transducer that changed its gain, and ln of its gain over the learned gain;
+        None unless the verdict is `PROBE` or `ACCELEROMETER`.
     """
 
     verdict: LineVerdict = LineVerdict.UNKNOWN
@@ -137,7 +137,7 @@ class ShaftLine:
     probe, accelerometer
         Coefficients of the 1× phasors of the shaft relative to each bearing, and of the bearing.
     offset_um
-        Runout, real and imaginary part: with it, the sum is zero.
+        Real and imaginary part of the sum of the terms, which is due to runout.
     std_um
         Cross-validated scatter of the means of `MEANS_OF` readings.
     """
@@ -152,9 +152,10 @@ class ShaftLine:
     def judge(
         self, shaft: ComplexArray, motion: ComplexArray, ln_k: FloatArray, rise: FloatArray
     ) -> LineFinding:
-        """Return the finding on the transducers over the longest of the `WINDOWS`.
+        """Return the finding on the transducers from the mean motion over the longest of `WINDOWS`.
 
-        If the line is broken over any of them, it is that over the one that shows it best.
+        If the motion is off the line in any window, the window with the highest significance
+        counts.
 
         Parameters
         ----------

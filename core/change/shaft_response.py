@@ -91,7 +91,7 @@ def learn_response(
     Parameters
     ----------
     is_settled : (n,)
-        Mask of the times at which the operating condition was settled; the others are not used.
+        Mask of the times to use, at which the operating condition was settled.
 
     Returns
     -------

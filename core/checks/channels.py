@@ -62,7 +62,7 @@ def channel_verdicts(
     samples : (n_channels, n_samples)
         Samples as int16 counts or float32 engineering units; at least one sample in each cell.
     starts : (n_cells,)
-        Index of the first sample of each cell, increasing from 0.
+        Index of the first sample of each cell (run of samples with one OK state), rising from 0.
     is_ok : (n_channels, n_cells)
         Whether the device reports the channel as OK.
 
@@ -96,7 +96,7 @@ def channel_verdicts(
 
 
 def worst_qualities(verdicts: VerdictArray) -> tuple[Quality, ...]:
-    """Return the worst quality in each row of verdicts (n_channels, n_cells of its samples)."""
+    """Return the worst quality of each channel from verdicts (n_channels, n_cells)."""
     if not verdicts.any():
         return (GOOD,) * len(verdicts)
     first = _LEVELS[verdicts].argmax(axis=1)

@@ -87,8 +87,8 @@ def signal_quality(
         Mean of the segment, in the channel's unit.
     unit_per_count
         Unit per count, of either sign; 0 if unknown, then only a constant signal is a failure.
-    turning
-        Whether the shaft turns; at standstill every signal is good.
+    turning, limits
+        Whether the shaft turns (at standstill every signal is good), and limits of the check.
     """
     count = abs(unit_per_count)
     if not turning or rms > limits.min_counts_rms * count:
@@ -161,8 +161,8 @@ def checked_speed(
 
     Parameters
     ----------
-    measured
-        Reading to check; returned unchanged if it has no value.
+    measured, rated_rpm, limits
+        Reading to check, returned unchanged if it has no value; rated speed; limits of the checks.
     line_rpm
         Speed of the 1× line; None without a distinct line. If it differs from the reading by more
         than the tolerance, the result is uncertain.
@@ -196,8 +196,8 @@ def stationarity(
         Mean speed of each segment, oldest first; NaN if unknown.
     power_mw : (n_segments,)
         Mean power of each segment, oldest first; NaN if unknown. An empty array is not judged.
-    rated_power_mw
-        Reference of power changes; by default the mean power.
+    limits, rated_power_mw
+        Largest changes, and the reference of power changes, by default the mean power.
     """
     mean_rpm, spread_rpm = _mean_and_spread(speed_rpm)
     if spread_rpm > limits.max_speed_change * mean_rpm:

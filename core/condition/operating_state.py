@@ -139,8 +139,8 @@ def step_operation(
 
     Parameters
     ----------
-    speed_rpm, power_mw
-        Readings of speed and power; NaN if missing.
+    time_ns, speed_rpm, power_mw
+        Time of the reading, ns since 1970 UTC; speed and power, NaN if missing.
     state
         State from a file of readings, used instead of speed and power; None to compute the state.
 

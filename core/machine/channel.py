@@ -68,7 +68,7 @@ class Channel:
     response
         Frequency response of transducer and amplifier, relative to the sensitivity; None if flat.
     delay_s
-        Time by which the channel is sampled later than the others, s.
+        Time by which the channel is sampled later than channels with delay 0, s.
     line_floor
         Amplitude that the transducer's own noise gives a spectral line, zero-to-peak in the
         channel's unit.

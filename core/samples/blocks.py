@@ -103,7 +103,7 @@ class SideValues:
 
     @classmethod
     def of(cls, start_ns: int, ok: Sequence[bool], slow: Sequence[float]) -> "SideValues":
-        """Return the side values of a single cell from its time, OK states and slow values."""
+        """Return the time stamp, OK states and slow values that are valid for a whole block."""
         return cls(
             starts=np.zeros(1, dtype=np.int64),
             start_ns=np.array([start_ns], dtype=np.int64),
@@ -113,11 +113,11 @@ class SideValues:
 
     @property
     def n_cells(self) -> int:
-        """Number of cells of the block."""
+        """Number of cells (runs of samples with one time stamp) of the block."""
         return len(self.starts)
 
     def within(self, start: int, stop: int, rate_hz: float) -> "SideValues":
-        """Return the side values of the samples `start` to `stop - 1`, relative to `start`."""
+        """Return time stamps, states and slow values of the samples `start` to `stop - 1`."""
         first = int(np.searchsorted(self.starts, start, side="right")) - 1
         cells = slice(first, max(first + 1, int(np.searchsorted(self.starts, stop))))
         starts, start_ns = self.starts[cells] - start, self.start_ns[cells].copy()
@@ -247,7 +247,7 @@ class SampleBlock:
         return worst_qualities(self.verdicts)
 
     def cell_qualities(self) -> Iterator[tuple[tuple[Quality, ...], int]]:
-        """Yield the channel qualities of each cell and the end time of the cell, UTC ns."""
+        """Yield channel qualities and end time, UTC ns, of each cell (run with one time stamp)."""
         lengths = np.diff(self.side.starts, append=self.n_samples)
         stops_ns = self.side.start_ns + np.rint(lengths / self.rate_hz * NS_PER_S).astype(np.int64)
         for verdicts, stop_ns in zip(self.verdicts.T.tolist(), stops_ns.tolist(), strict=True):
@@ -274,7 +274,7 @@ class SampleBlock:
         return {c.id: c.reading(value) for c, value in newest} | dict(self.elsewhere)
 
     def cells(self) -> Iterator["SampleBlock"]:
-        """Yield each cell as a block of its own."""
+        """Yield each run of samples with one time stamp (cell) as a separate block."""
         for start, stop in itertools.pairwise([*self.side.starts.tolist(), self.n_samples]):
             yield self.from_sample(start, stop)
 
@@ -300,8 +300,8 @@ class SampleBlock:
 def joined(blocks: Sequence[SampleBlock]) -> SampleBlock:
     """Return consecutive blocks, at least one, as one block.
 
-    Its clock is that of the last block, `rejected` that of the first, and `stamp_fault` the first
-    fault of any block.
+    The clock is taken from the last block, `rejected` from the first block, and `stamp_fault` is
+    the first fault of any block.
     """
     first, last = blocks[0], blocks[-1]
     if first is last:

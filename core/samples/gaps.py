@@ -89,7 +89,7 @@ class SampleAccount:
     def with_missing(self, n_missing: int, rejections: Iterable[Rejection]) -> "SampleAccount":
         """Return the account with the samples missing before a block added.
 
-        At most `n_missing` rejected samples are counted; the others were already offered before.
+        At most `n_missing` rejected samples are counted; any beyond that were offered before.
         """
         if not n_missing:
             return self

@@ -96,8 +96,10 @@ def average(
 
     Parameters
     ----------
+    frequency_hz : (n_lines,)
+        Frequencies of the lines.
     phasors_um_pk : (n_segments, n_channels, n_lines)
-        Phasors of each segment at `frequency_hz` (n_lines,); finite, also where not usable.
+        Phasors of each segment at these frequencies; finite, also where not usable.
     usable : (n_segments, n_channels)
         Whether the channel is usable in the whole segment.
     """

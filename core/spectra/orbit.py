@@ -46,8 +46,8 @@ def order_phasors(trace_um: FloatArray, rate_hz: float, frequency_hz: float) -> 
     ----------
     trace_um : (n_samples,)
         Displacement without mean; NaN for missing samples.
-    frequency_hz
-        Frequency above zero and below ``rate_hz / 2``.
+    rate_hz, frequency_hz
+        Sampling rate, and frequency above zero and below ``rate_hz / 2``.
 
     Returns
     -------

@@ -47,7 +47,7 @@ class Overall:
         NaN unless displacement is measured in both directions.
     velocity_mm_s_rms : (n_channels,)
         Velocity in the band of `SegmentSettings`, with the transducer's response compensated; zero
-        for a key-phase.
+        for a key-phase channel.
     """
 
     peak_to_peak_um: FloatArray

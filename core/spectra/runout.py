@@ -57,11 +57,13 @@ def without_runout(
     Parameters
     ----------
     order1_um_pk
-        (n_channels,) phasors at exactly `speed`, with the phases at the segment's first sample.
-    rows
-        Rows of the shaft channels.
-    key_phase
-        Rotation during the segment; None without a usable key-phase, then nothing is subtracted.
+        (n_channels,) phasors at exactly the frequency of `speed`, with the phases at the segment's
+        first sample.
+    unit, rows
+        Unit, and the indices of the rows of the shaft channels.
+    speed, key_phase
+        Running speed, and rotation during the segment; without a usable key-phase (None), nothing
+        is subtracted.
 
     Returns
     -------

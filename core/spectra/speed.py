@@ -121,14 +121,14 @@ def running_speed(
 
     Parameters
     ----------
-    slow
-        Mean reading of each slow channel over the segment, by id.
+    unit, slow
+        Unit, and the mean reading of each slow channel over the segment, by id.
     frequency_hz : (n_lines,)
         Frequencies of the bins; empty for a rack.
     shaft_power : (n_lines,)
         Spectral power summed over the shaft channels, which is searched for the 1× line.
-    key_phase
-        Rotation from the key-phase; None without exactly one pulse per turn.
+    settings, key_phase
+        Limits for speeds and lines; rotation from the key-phase, None without one pulse per turn.
     """
     slow_rpm = slow.get(unit.speed_channel) if unit.speed_channel else None
     for source, measured in (

@@ -73,7 +73,7 @@ def amplitude_lines(
 def coherence_budget(coherence: float, n_segments: float) -> Budget | None:
     """Return the uncertainty budget of a squared coherence.
 
-    The variance is that of Bendat and Piersol, Random Data, 4th ed., table 9.6. The estimate is
+    The variance is that of Bendat and Piersol (Random Data, 2010), table 9.6. The estimate is
     skewed, especially near 0 and 1 and with few segments. ``artanh γ`` is nearly normal with
     variance and bias ``1 / (2 (n - 1))`` (Enochson and Goodman 1965); its interval is transformed
     to γ². `n_segments` is the number of independent segments.
@@ -98,13 +98,8 @@ def roundness_budget(
 
     The random part is a first-order jackknife: the influence of each segment on the roundness. The
     interval is limited to -1 to 1. Return None if the shaft does not move or has no scatter.
-
-    Parameters
-    ----------
-    phasors_um_pk : (n, 2)
-        Phasors of u_x and u_y in the segments or polls in which both are usable.
-    runout_um_pk
-        Largest runout contained in u_x and u_y.
+    `phasors_um_pk` (n, 2) are those of u_x and u_y in the segments or polls in which both are
+    usable; `runout_um_pk` is the largest runout contained in each.
     """
     x, y = phasors_um_pk.T
     of_each = np.abs(x) ** 2 + np.abs(y) ** 2
@@ -135,12 +130,8 @@ def frequency_budget(
 ) -> Budget | None:
     """Return the uncertainty budget of the mean frequency of a line; None if unknown.
 
-    Parameters
-    ----------
-    each_hz : (n,)
-        Frequency in each segment or poll.
-    speed
-        Newest speed if the frequency is derived from it; None if the line itself was measured.
+    `each_hz` (n,) are the frequencies in the segments or polls, `frequency_hz` is their mean.
+    `speed` is the newest speed if they are derived from it; None if the line itself was measured.
     """
     own = None
     if speed is not None and speed.budget is not None:

@@ -181,12 +181,9 @@ def probe_noise_power(
     noise of the probes and, through the film, of the bearing transducers; the latter biases the
     estimate upwards.
 
-    Parameters
-    ----------
-    between : (n_lines,)
-        Mask of the lines between the harmonics of the running speed.
-    n_segments : (n, 1)
-        Number of independent segments of each average; at least 3.
+    `between` (n_lines,) is the mask of the lines between the harmonics of the running speed, and
+    `n_segments` (n, 1) the number of independent segments of each average, at least 3. `settings`
+    give the quiet band and the known noise.
 
     Returns
     -------

@@ -141,8 +141,8 @@ def _damping_half_width(
 def fit_quality(found: DynamicStiffness, max_delay_s: float, damping: float) -> Quality:
     """Return the quality of the fit: uncertain if it shows a channel delay or is poor.
 
-    A delay of up to `max_delay_s` is accepted, and more by the effect of a wrong bracket damping of
-    up to `damping`, N·s/m.
+    A delay is accepted up to `max_delay_s` plus the apparent delay due to an error of the bracket
+    damping of `damping`, N·s/m.
     """
     sure = coverage_factor((), 1.0 - FALSE_ALARM)
     limits_s = max_delay_s + abs(found.delay_per_damping) * damping

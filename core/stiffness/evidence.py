@@ -51,8 +51,8 @@ def line_excitation(
 
     Parameters
     ----------
-    line
-        Index of the line in the spectrum.
+    spectrum, line
+        Cross-spectrum, and the index of the line in it.
     shaft, bearing
         Indices of the two compared channels in the spectrum.
     min_coherence

@@ -183,22 +183,23 @@ class FilmFits(FittedFilms):
     def follow(self, change: int, fitted: Sequence[int]) -> FloatArray:
         """Return the errors of fitted bracket properties per unit error of another, (n, n_fitted).
 
-        `change` is the index of the wrong property on the axis of `FilmInputs.changes`, `fitted`
-        are those of one or two others. Errors are invalid where `estimate` is NaN.
+        `change` is the index of the wrong property in axis 1 of `FilmInputs.changes`, `fitted` are
+        the indices of the fitted properties. Errors are invalid where `estimate` is NaN.
         """
         inverse, _ = _inverse(self._information[:, fitted][..., fitted])
         return -(inverse @ self._information[:, fitted, change, np.newaxis])[..., 0]
 
     def estimate(self, fitted: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-        """Return joint estimates of some bracket properties and `LAGS`, and their influences.
+        """Return joint estimates of some bracket properties and `LAGS`, with weights.
 
         The estimation is one Gauss-Newton step. It uses the shaft's motion through the fitted film
         instead of the bearing's motion, whose noise would bias the estimates.
 
         Returns
         -------
-        Estimates, (n, n_fitted), NaN where the data do not separate the changes; and the weights of
-        the influences in them, as `covariance` takes them.
+        Estimates, (n, n_fitted), NaN where the data do not separate the changes; and the weights
+        (n, 2, n_fitted, 11) of the terms and bracket properties of each row in them, for
+        `covariance`.
         """
         inverse, separate = _inverse(self._information[:, fitted][..., fitted])
         steps = -inverse
@@ -207,9 +208,10 @@ class FilmFits(FittedFilms):
         return np.where(separate[:, np.newaxis], value, np.nan), influences
 
     def delays(self, fits: Sequence[Sequence[int]]) -> FloatArray:
-        """Return `DELAY`, first of joint estimates, of several fits, (n_fits, 3, n).
+        """Return the delay of the bearing channels by several joint fits, (n_fits, 3, n).
 
-        The three are the delay, its standard uncertainty, and its change per `DAMPING`.
+        Axis 1: delay in s, its standard uncertainty, and its change per N·s/m of bracket damping.
+        Each of `fits` lists the indices of the properties that are fitted together, `DELAY` first.
         """
         found = [self.estimate(fitted) for fitted in fits]
         weights = np.concatenate([influences[:, :, :1] for _, influences in found], axis=2)
@@ -218,10 +220,11 @@ class FilmFits(FittedFilms):
         return np.stack([np.array([value[:, 0] for value, _ in found]), std, follows], axis=1)
 
     def parts_left(self, dropped: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return two covariances of the unknowns due to errors of the parts, (n, 2, 4, 4) each.
+        """Return two covariances of the unknowns due to lagging parts of the film, (n, 2, 4, 4).
 
-        The first is due to the doubt whether the film has parts, which differs between averages;
-        the second to the error of the prior, and to a share `dropped` (n, 1) of the parts.
+        The first is due to the doubt whether the film has lagging parts, which differs between
+        averages; the second to the error of their prior, and to the fraction `dropped` (n, 1) of
+        them that is left out.
         """
         mean, covariance, _ = self.of_parts
         of_prior = covariance @ (self.prior[..., np.newaxis] * covariance)
@@ -272,7 +275,8 @@ class FilmFits(FittedFilms):
     def covariance(self, weights: FloatArray) -> FloatArray:
         """Return the covariance of estimates, (n, n_estimates, n_estimates).
 
-        `weights` (n, 2, n_estimates, 7 or 11) are those of the influences in the estimates, by row.
+        `weights` (n, 2, n_estimates, 7 or 11) are the weights in the estimates of the 7 terms of
+        each row and, if included, of the 4 bracket properties.
         """
         own, slope = self._spread(weights)
         through = slope.sum(axis=1)

@@ -285,10 +285,8 @@ def line_weights(
     Fit of constant coefficients and weights are iterated. The first weights are the reciprocals of
     the bearing's power that is incoherent with the shaft, times the coherence.
 
-    Parameters
-    ----------
-    force_power : (n, 2, n_used)
-        Power of the brackets' forces.
+    `force_power` (n, 2, n_used) is the power of the brackets' forces, `terms` are the terms of the
+    films at the lines.
 
     Returns
     -------

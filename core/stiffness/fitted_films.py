@@ -131,11 +131,11 @@ class FilmInputs:
 
     @property
     def size(self) -> FloatArray:
-        """Factors (n, 1): times the inverse normal matrix, they are covariances of estimates."""
+        """Factors (n, 1) that convert inverse normal matrices to covariances of estimates."""
         return CORRELATED_LINES / (2.0 * self.n_segments)
 
     def terms(self, deviation: FloatArray) -> FilmTerms:
-        """Return the terms of films; `deviation` is that of the lag, (n, 1) or (n, 2) by row."""
+        """Return the terms of films with a `deviation` (n, 1 or 2) of the lag from its prior."""
         lines = self.lines
         shape, slope = tilt_lag(lines.omega, self.turn_rad_s, deviation)
         functions = np.empty((*shape.shape[:2], 4, shape.shape[2]), dtype=np.complex128)
@@ -190,7 +190,7 @@ class FittedFilms:
 
     @cached_property
     def solved(self) -> FloatArray:
-        """Unknowns without parts, and minus their derivatives by each part, (n, 2, 4, 1 + 3)."""
+        """Unknowns without parts, and their negative derivatives by each part, (n, 2, 4, 1 + 3)."""
         normal, moments = self.weighted.normal, self.weighted.moments
         right = np.empty((len(normal), 2, N_UNKNOWNS, 1 + N_PARTS))
         right[..., 0] = moments[..., :N_UNKNOWNS]

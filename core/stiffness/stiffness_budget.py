@@ -54,7 +54,7 @@ def effective_stiffness_n_per_m(
         detectors are possible if both amplitudes have the same.
     bracket_stiffness_n_per_m
         Radial stiffness k_b of the bracket. Its inertia is neglected, which biases the result by
-        m_b ω² / k_b (+0.4 % on the paper's machine at rated speed).
+        m_b ω² / k_b (+0.4 % on the machine of Brito et al. at rated speed).
     """
     # Brito et al., equation (5): k_eff = |X_b| / |U| · k_b
     return bearing_um_pk / shaft_um_pk * bracket_stiffness_n_per_m
@@ -84,8 +84,10 @@ def ratio_budget(
 
     Parameters
     ----------
-    line, shaft, bearing
-        Indices of the line and of the compared channels in the spectrum.
+    spectrum, line, shaft, bearing
+        Cross-spectrum, and the indices of the line and of the compared channels in it.
+    bracket, accuracy
+        Bracket, and accuracy of its properties and of the transducers.
     n_segments
         Number of independent segments; by default the number of averaged segments.
     runout_um_pk
@@ -134,6 +136,8 @@ def polls_ratio_budget(
     ----------
     shaft_um_pk, bearing_um_pk : (n_polls,)
         Amplitudes of the same polls; shaft amplitudes are positive.
+    frequency_hz, bracket, accuracy
+        Frequency of the line, bracket, and accuracy of its properties and of the transducers.
     coherence
         Squared coherence of shaft and bearing; if it is unknown, the smallest accepted one.
     n_effective
@@ -229,8 +233,10 @@ def transfer_budgets(
 
     Parameters
     ----------
-    line, shaft, bearing
-        Indices of the line and of the compared channels in the spectrum.
+    spectrum, line, shaft, bearing
+        Cross-spectrum, and the indices of the line and of the compared channels in it.
+    bracket, accuracy
+        Bracket, and accuracy of its properties and of the transducers.
     n_segments
         Number of independent segments; by default the number of averaged segments.
     runout_um_pk
