@@ -80,7 +80,7 @@ class ReadingOutcome(IntEnum):
 class StiffnessHistory:
     """Stiffness readings of one bearing in order of time, as columns; NaN for missing values.
 
-    Columns are (n,); those of the directions are (2, n). Time may have gaps.
+    Columns are (n,), or (2, n) with directions x and y on axis 0. Time may have gaps.
 
     Parameters
     ----------

@@ -220,7 +220,7 @@ class FilmJudge:
         )
 
     def restore(self, decided: Sequence[FilmDecision]) -> None:
-        """Restore the decisions made with the active baselines; ignore those of other versions."""
+        """Restore the decisions that were made with the active baselines; ignore all others."""
         for found in decided:
             if found.version == self._version(found.bearing):
                 self._decisions[found.bearing, found.quantity] = found.decision

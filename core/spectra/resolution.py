@@ -77,8 +77,8 @@ class Resolution:
     def qualities(self, qualities: tuple[Quality, ...]) -> tuple[Quality, ...]:
         """Return the quality of each resolved signal, given that of each transducer, in order.
 
-        It is the worse of the two transducers that the signal is computed from, with the reason
-        `REDUCED_PROBES` if only the other one is bad.
+        It is the worse quality of the two transducers that the signal is computed from, with the
+        reason `REDUCED_PROBES` if only the transducer of the other signal is bad.
         """
         resolved = list(qualities)
         for rows, _ in self._pairs:

@@ -76,7 +76,7 @@ class DynamicStiffness:
     ----------
     coefficients : (2, 4)
         Coefficients (k_i1, k_i2, c_i1, c_i2) of the rows x and y, the directions of the force; N/m
-        and N·s/m. Those at 1× where the film depends on frequency.
+        and N·s/m. They apply at 1× if the film depends on frequency.
     covariance : (2, 4, 4)
         Random covariance of the coefficients of each row.
     model : (2, 4)

@@ -55,7 +55,7 @@ NAMES = (
 def dynamic_readings(bearing: Bearing, found: DynamicStiffness, quality: Quality) -> Found:
     """Return the readings of `dynamic` for a fitted film, with budgets.
 
-    `quality` is the quality of the input, which limits that of the readings.
+    `quality` is the quality of the input; the quality of a reading is never better.
     """
     damping = _damping_half_width(found, bearing.bracket, bearing.accuracy)
     quality = worst((quality, fit_quality(found, bearing.accuracy.delay_s, damping)))

@@ -217,7 +217,7 @@ class FilmTerms:
     def residual(self, power: FloatArray, coefficients: FloatArray) -> FloatArray:
         """Return the power of the residual force of films, (n, 2, n_used).
 
-        `power`, (n, 2, n_used), is that of the brackets' forces; `coefficients` are (n, 2, p).
+        `power` (n, 2, n_used) is the power of the brackets' forces; `coefficients` are (n, 2, p).
         """
         n_functions = coefficients.shape[-1] // 2
         n_products = N_PRODUCTS * n_functions * (n_functions + 1) // 2

@@ -273,7 +273,7 @@ class FittedFilms:
         return self._posterior(N_PARTS)
 
     def constant_odds(self) -> FloatArray:
-        """Return the likelihood of films without lagging parts over that of films with, (n,)."""
+        """Return the likelihood ratio of films without and with lagging parts, (n,)."""
         _, covariance, significance = self.of_lags
         shrinkage = np.linalg.slogdet(covariance * self.prior[..., np.newaxis, :N_LAGS])[1]
         return np.asarray(np.exp(-0.5 * (significance + shrinkage.sum(axis=1))))

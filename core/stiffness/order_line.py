@@ -146,7 +146,8 @@ class OrderLine:
     def axes_quality(self, rotation_sense: int) -> Quality:
         """Return the quality of the channels' axes: not good if the whirl contradicts the rotation.
 
-        Only motion above the noise floor is checked. `rotation_sense` is +1 from x to y, else -1.
+        Only motion above the noise floor is checked. `rotation_sense` is +1 if the shaft turns from
+        x to y, otherwise -1.
         """
         return worst(
             self._pair_quality(x, y, rotation_sense)

@@ -143,8 +143,8 @@ class Answers:
             Function that returns the answer; bytes are JSON. It is called in a thread and may
             block, or is a coroutine function.
         lasting
-            Function from the parameter ``since`` of a repeated request, which may differ, to the
-            `make` of the answer; None if a repeated request must be routed again.
+            Function that returns the `make` of a repeated request from its parameter ``since``,
+            which may differ; None if a repeated request must be routed again.
         """
         scope = request.scope
         if lasting is not None and (asked := _asked(scope, _identity(scope))) is not None:

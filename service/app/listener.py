@@ -41,9 +41,9 @@ def require_protected(plant: PlantFile, store: AccessStore) -> None:
 def listener_of(plant: PlantFile, port: int) -> Iterator[socket.socket]:
     """Open the listening socket of the server, before other parts of the process start.
 
-    `port` is a TCP port in place of that in the plant file; it is ignored with a Unix socket.
-    Raises `PortInUseError` or `CertificateError` if the address is in use, or the certificate
-    cannot be used.
+    `port` replaces the TCP port in the plant file; it has no effect with a Unix socket. Raises
+    `PortInUseError` or `CertificateError` if the address is in use, or the certificate cannot be
+    used.
     """
     tls_of(plant)
     if plant.service.socket is not None:

@@ -54,8 +54,8 @@ from service.store.store import Store
 class ProcessContext:
     """Context of one process: plant, store, live view and heartbeats.
 
-    `origin` is that of the data in the store and in all API responses; `beats` are the heartbeats
-    of all loops of the process.
+    `origin` is the origin, live or replay, of the data in the store and in all API responses;
+    `beats` are the heartbeats of all loops of the process.
     """
 
     plant: PlantFile

@@ -137,7 +137,7 @@ def modbus_device(unit: UnitSettings, source: ModbusSettings, feed: SampleFeed) 
     Raises
     ------
     ConfigError
-        If the unit exceeds the limits of such a device.
+        If the unit exceeds the limits of the device.
     LookupError
         If the unit of a rack has no speed channel.
     """
@@ -200,7 +200,7 @@ def daq_of(
     Raises
     ------
     ConfigError
-        If the unit exceeds the limits of such a device.
+        If the unit exceeds the limits of the device.
     LookupError
         If the source of the unit has no device.
     """

@@ -304,7 +304,7 @@ class ReportDelays:
         """Return the delay of a report relative to the fastest report of the process, s.
 
         `sent_s` is the send time by the monotonic clock of the reporting process, s, None if not
-        reported; `received_s` is the arrival time by that of this process, s.
+        reported; `received_s` is the arrival time by the monotonic clock of this process, s.
         """
         if sent_s is None:
             return 0.0

@@ -214,8 +214,8 @@ class CaptureStatus:
 class EvidenceStatus:
     """State of the collection of evidence about alarms.
 
-    `pending` has alarm id and occurrence number of each bundle that is still to be written,
-    `capturing` those of each recording that is not linked to its bundle yet.
+    Both fields contain pairs of alarm id and occurrence number: `pending` of the bundles that are
+    still to be written, `capturing` of the recordings that are not linked to their bundle yet.
     """
 
     pending: frozenset[tuple[str, int]] = frozenset()

@@ -24,7 +24,7 @@ from service.runtime.polls import TimedSource
 class LinkNews:
     """Link state of a unit, reported after a change and after a failed attempt to connect.
 
-    `reason` is why no samples arrive; None while connected.
+    `reason` is the reason why no samples arrive; None while connected.
     """
 
     unit: str

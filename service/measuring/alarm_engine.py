@@ -162,7 +162,7 @@ class AlarmEngine:
         return news
 
     def link(self, unit: str, is_connected: bool, reason: str | None = None) -> None:
-        """Update the link alarm of a unit; `reason` is why the unit is not connected."""
+        """Update the link alarm of a unit; `reason` states why it is disconnected."""
         self._publish(self._units[unit].link(is_connected, reason, self._host_ns()))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
@@ -217,7 +217,7 @@ class AlarmEngine:
 
     @property
     def common_alarms(self) -> list[Alarm]:
-        """Alarms that no unit updates: of the service itself, and those that others reported."""
+        """Alarms of the service itself, and alarms that other components reported."""
         return [alarm for board in (self._service, *self._reported) for alarm in board.alarms]
 
     def is_judged(self, alarm: Alarm) -> bool:

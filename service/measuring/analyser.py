@@ -134,8 +134,8 @@ class Analyser:
     ) -> None:
         """Restore the monitor from a block with stored findings, last sampled at ``sampled_s``.
 
-        `account` are the stored sample counts, shown instead of those of the monitor, which counts
-        replayed samples twice.
+        `account` are the stored sample counts, shown instead of the counts of the monitor, which
+        would count replayed samples twice.
         """
         monitor = self._monitors[block.unit]
         block = self._counts[block.unit].replayed(block)

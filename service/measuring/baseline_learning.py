@@ -166,7 +166,9 @@ class Learner:
     def learn(
         self, place: FilmPlace, now_ns: int, author: str = PADWATCH, reason: str = ""
     ) -> BearingBaseline | None:
-        """Learn and store a baseline by `author`; accept it if that is automatic and checks pass.
+        """Learn and store a baseline; put it in force if this is automatic and all checks pass.
+
+        `now_ns` is the host time, ns since 1970 UTC; `author` and `reason` are stored.
 
         Returns
         -------

@@ -157,7 +157,7 @@ class FilmMonitor:
     async def learn(self, place: FilmPlace, **why: str) -> BearingBaseline | None:
         """Learn a baseline of a bearing now; return None if there are too few readings.
 
-        ``why`` are author and reason, stored with the baseline; by default padwatch, no reason.
+        ``why`` are `author` and `reason`, stored with the baseline; default: "padwatch", no reason.
         """
         now_ns = self._clock.now_ns()
         async with self._acting:
@@ -199,7 +199,7 @@ class FilmMonitor:
         return baseline_step(action, place, versions, entries, actor, reason, self._clock.now_ns())
 
     async def put_in_force(self, place: FilmPlace) -> None:
-        """Use the baseline of a bearing that is in force by the steps stored in the database."""
+        """Load and use the baseline that is in force for a bearing according to the database."""
         films = self._films[place.unit]
         held = films.watch.judge.baseline(place.bearing)
         found, decisions = await asyncio.to_thread(in_force, self._store, place, films.rules)

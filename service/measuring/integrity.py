@@ -23,7 +23,7 @@ MAX_REPORTED = 100
 
 
 class IntegrityMonitor:
-    """Monitor of damaged and missing rows, outdated copies of the database, and a missing file.
+    """Monitor of the database: damaged or missing rows, an outdated copy, a missing file.
 
     The store error of `live` is set while the database file is missing or replaced.
 

@@ -27,7 +27,8 @@ Gaps = tuple[MicrometrePair, MicrometrePair | None]
 def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
     """Check gaps (x, y) in µm, entered by a user, against the probes of a bearing; return them.
 
-    ``near`` are gaps of the probes on the positive axes, ``opposite`` those of opposite probes.
+    ``near`` are gaps of the probes on the positive axes, ``opposite`` are gaps of the opposite
+    probes.
 
     Raises `ReferenceRefusedError` if a gap is missing, or given for a probe that the bearing does
     not have.

@@ -109,7 +109,7 @@ class Authenticator:
     """Authenticator of callers, with coroutines that run blocking operations in threads.
 
     `local_role` is the role of callers on this computer without credentials; None if these callers
-    must log in. `hashing` and `limits` are those of `AccessService`.
+    must log in. `hashing` is the password hasher, `limits` are the maximum durations of sessions.
     """
 
     def __init__(
@@ -147,7 +147,8 @@ class Authenticator:
     async def log_in(self, name: str, password: str, peer: str) -> LoggedIn | NotLoggedIn:
         """Check the password of an account, and start a session if it is correct.
 
-        `peer` is the client's address. A wrong password or too early a try returns `NotLoggedIn`.
+        `peer` is the client's address. The result is `NotLoggedIn` after a wrong password, or if
+        the attempt came too early.
 
         Raises `TooManyLoginsError` if there are too many concurrent logins.
         """

@@ -67,7 +67,7 @@ CHANGE_PASSWORD = "POST /api/v1/session/password"  # noqa: S105  an operation
 class Gate:
     """ASGI middleware that authenticates callers, and protects routes that are not open.
 
-    It gives audit entries the client address, and records refused changes in the audit trail.
+    It adds the client address to audit entries, and records refused changes in the audit trail.
     `declared` returns the operations of the application, with their requirements, by name.
     """
 

@@ -42,7 +42,8 @@ class Refusals:
         """Record a refused request; above the rate limit, count it for the next entry.
 
         If the entry cannot be stored, the error is logged and the request is counted. `operation`
-        is method and path of the request; `reason` and `status` are those of its answer.
+        is method and path of the request; `reason` and `status` are the reason and the HTTP status
+        in the answer.
         """
         if not self._allowance.take(self._clock.monotonic_s()):
             self.n_more += 1

@@ -108,8 +108,8 @@ def read_page(
 ) -> tuple[Page, str | None]:
     """Return one page of the entries of all chains, newest first, and the cursor of the next page.
 
-    `query` selects entries of each chain, and its limit is that of the page. `before` is an entry
-    number by chain; the page has only entries with smaller numbers.
+    `query` selects entries of each chain, and its limit is the maximum number of entries in the
+    page. `before` is an entry number by chain; the page has only entries with smaller numbers.
     """
     found = {}
     for name, audit in chains.items():

@@ -49,8 +49,8 @@ def version_model(
 ) -> BaselineVersionModel:
     """Return the API model of a baseline version.
 
-    `versions` are those in force and rejected after all steps; `steps` are all steps in the history
-    of the baselines of the bearing.
+    `versions` states which versions are in force and rejected after all steps; `steps` are all
+    steps in the history of the baselines of the bearing.
     """
     own = [step for step in steps if step.version == entry.version]
     reasons = (step.reason for step in own if step.step is BaselineStep.LEARNED)
