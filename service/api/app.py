@@ -54,7 +54,10 @@ from service.api.routes.trends import trend_router
 
 
 def header(description: str, example: Any, kind: str = "string", **limits: Any) -> dict[str, Any]:
-    """Return the OpenAPI entry of a header; `limits` are further members of its schema."""
+    """Return the OpenAPI entry of a header.
+
+    `kind` is the JSON type of its value; `limits` are further members of its schema.
+    """
     return {
         "description": description,
         "schema": {"type": kind, **limits},
@@ -146,7 +149,10 @@ NEEDED = "x-padwatch-needs"
 
 
 def describe_access(document: dict[str, Any], operations: Mapping[str, Declared]) -> None:
-    """Add security schemes, required permissions and refusals to the given OpenAPI document."""
+    """Add security schemes, required permissions and refusals to an OpenAPI document, in place.
+
+    `operations` are the operations of the application by name (method and path template).
+    """
     document.setdefault("components", {})["securitySchemes"] = SCHEMES
     for path, methods in document["paths"].items():
         for method, operation in methods.items():

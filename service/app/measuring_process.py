@@ -234,7 +234,7 @@ async def analysis_on(
 
 
 def plant_snapshot(analysis: Analysis, sources: Mapping[str, TimedSource]) -> PlantSnapshot:
-    """Return the present state of the measuring process."""
+    """Return the present state of the measuring process; `sources` are its sources by unit id."""
     captures, deliveries = analysis.captures, analysis.deliveries
     return PlantSnapshot(
         loops=dict(analysis.process.beats.look()),

@@ -30,7 +30,8 @@ Release = Mapping[str, str]
 def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[AuditAction]:
     """Return the audit entries of a service start; a changed configuration comes first.
 
-    `last_start` is the audit entry of the previous start; None for the first start.
+    `last_start` is the audit entry of the previous start; None for the first start. `now_ns` is the
+    host time, ns since 1970 UTC.
     """
     last = json.loads(last_start.after) if last_start and last_start.after else None
     before = last.get(CONFIGURATION) if isinstance(last, dict) else None

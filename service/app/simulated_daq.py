@@ -107,6 +107,8 @@ def _read_lines(loop: asyncio.AbstractEventLoop, put: Callable[[str], None]) -> 
 def execute_command(servers: Mapping[str, DaqServer], line: str) -> dict[str, str]:
     """Inject faults into the simulated device of a unit by a command ``UNIT FAULT [COUNT]``.
 
+    `servers` are the device servers by unit id; `line` is the command.
+
     Returns
     -------
     dict

@@ -82,7 +82,10 @@ class SocketOperators(Operators):
     exchange: ServingEnd
 
     async def send(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
-        """Send a command; return its answer, or raise `CommandFailedError` without an answer."""
+        """Send a command of the user `actor` about a unit; return the answer.
+
+        Raises `CommandFailedError` if there is no answer.
+        """
         try:
             answer: Answer = await self.exchange.ask(*encoded(command), actor, acting().peer)
         except MeasuringGoneError as error:

@@ -267,7 +267,9 @@ class Operators(ABC):
 
     @abstractmethod
     async def send(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
-        """Send a command; return the answer, which states whether the result is stored.
+        """Send a command of the user `actor` about a unit; return the answer.
+
+        The answer states whether the result is stored.
 
         Raises `CommandFailedError` if no process answers.
         """
@@ -296,6 +298,8 @@ class Operators(ABC):
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
         """Apply an engineer's action to the baselines of a bearing, and wait until it is stored.
+
+        `actor` is the name of the engineer, `reason` the reason that the engineer gave.
 
         Raises
         ------

@@ -123,7 +123,11 @@ def current_bearing(
     why_not: Reason | None,
     received_ns: int | None = None,
 ) -> CurrentBearing:
-    """Return the newest result of a bearing; all readings are missing for the reason `why_not`."""
+    """Return the newest result of a bearing, without readings if there is a reason `why_not`.
+
+    `age_s` is the age of the result, s; `received_ns` is the arrival time of its samples by the
+    clock of the serving host, ns since 1970 UTC. Unknown values are None.
+    """
     if assessment is None or why_not is not None:
         nothing = missing(why_not or Reason.WAITING_FOR_DATA)
         readings = {quantity.name: nothing for quantity in CATALOGUE}

@@ -70,7 +70,10 @@ ASSESSMENTS = Histogram(
 def timed(
     results: Iterator[Assessment], unit: str, now_s: Callable[[], float] = perf_counter
 ) -> Iterator[Assessment]:
-    """Yield the results of a unit; record the time that each takes in the metric `ASSESSMENTS`."""
+    """Yield the results of a unit; record the computing time of each in `ASSESSMENTS`.
+
+    `now_s` returns the time of a monotonic clock, s.
+    """
     began_s = now_s()
     for result in results:
         ASSESSMENTS.labels(unit).observe(now_s() - began_s)

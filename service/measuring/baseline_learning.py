@@ -139,7 +139,10 @@ class Learner:
         self._store, self._settings = store, settings
 
     def is_due(self, place: FilmPlace, now_ns: int) -> bool:
-        """Return whether the first baseline of a bearing, or a new version of it, is due."""
+        """Return whether the first baseline of a bearing, or a new version of it, is due.
+
+        `now_ns` is the host time, ns since 1970 UTC.
+        """
         versions = self.versions(place)
         since_ns = self._since_ns(place, versions)
         if versions.is_frozen or since_ns is None:
@@ -195,6 +198,8 @@ class Learner:
 
     def learn_response(self, unit: str, rules: FilmRules, now_ns: int) -> ShaftResponse | None:
         """Learn and store how the shaft motion of a unit responds to film stiffness.
+
+        `now_ns` is the host time, ns since 1970 UTC; later readings are not used.
 
         Returns
         -------
@@ -303,7 +308,10 @@ def healthy(film: FilmHistory) -> npt.NDArray[np.bool_]:
 
 
 def common_rows(found: Mapping[str, FilmHistory]) -> dict[str, npt.NDArray[np.bool_]]:
-    """Return the mask (n,) of readings at times common to all histories, by bearing."""
+    """Return the mask (n,) of the readings at times common to all histories, by bearing id.
+
+    `found` are the histories of the films by bearing id.
+    """
     times = {bearing: film.history.time_ns for bearing, film in found.items()}
     common = reduce(partial(np.intersect1d, assume_unique=True), times.values())
     return {bearing: np.isin(time_ns, common) for bearing, time_ns in times.items()}

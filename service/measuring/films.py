@@ -177,6 +177,8 @@ class FilmMonitor:
     ) -> Versions:
         """Apply an engineer's action to the baselines of a bearing; return their new state.
 
+        `actor` is the name of the engineer, `reason` the reason that the engineer gave.
+
         Raises
         ------
         BaselineRefusedError
@@ -217,7 +219,8 @@ async def film_monitor(
 ) -> FilmMonitor:
     """Build the monitor of all films and restore it from stored readings.
 
-    Raises `StoreError` if the readings cannot be read.
+    `machines` are the descriptions of the units by unit id. Raises `StoreError` if the readings
+    cannot be read.
     """
     rules = {unit.id: film_rules_of(unit, plant.films) for unit in plant.unit}
     monitor = FilmMonitor(machines, rules, plant.films, store, clock)

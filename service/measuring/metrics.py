@@ -43,7 +43,10 @@ def add_samples(
     sources: Mapping[str, TimedSource],
     now_ns: int,
 ) -> None:
-    """Add sample counts (offered = received + missing + rejected) and poll durations by unit."""
+    """Add sample counts (offered = received + missing + rejected) and poll durations by unit.
+
+    `sources` are the timed sources by unit id; `now_ns` is the host time, ns since 1970 UTC.
+    """
     families.declare(SAMPLES)
     for unit in units:
         status = live.status(unit)

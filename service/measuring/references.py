@@ -50,8 +50,8 @@ def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
 def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) -> Gaps:
     """Return the mean gaps (x, y) in µm of the newest stored result of a bearing.
 
-    Raises `ReferenceRefusedError` if there is no result, it is not of the last ten minutes, or a
-    gap has no value.
+    `now_ns` is the host time, ns since 1970 UTC. Raises `ReferenceRefusedError` if there is no
+    result, it is not of the last ten minutes, or a gap has no value.
     """
     if newest is None:
         raise ReferenceRefusedError("no result is stored yet; wait for one or give the gaps")

@@ -20,12 +20,12 @@ class ReportedAlarms(AlarmBoard):
         self._once: set[str] = set()
 
     def report(self, id_: str, condition: Judgement) -> None:
-        """Set the condition of an alarm until the next report."""
+        """Set the condition of the alarm with the id `id_` until the next report."""
         self._found[id_] = condition
         self._once.discard(id_)
 
     def report_event(self, id_: str, condition: Judgement) -> None:
-        """Set the condition of an alarm for one update."""
+        """Set the condition of the alarm with the id `id_` for one update."""
         self.report(id_, condition)
         self._once.add(id_)
 

@@ -166,7 +166,10 @@ class SampleLoss:
         self._seen: deque[tuple[int, int, int, int]] = deque()
 
     def share(self, account: SampleAccount, now_ns: int) -> float:
-        """Add the present sample counts; return the fraction lost in ten minutes, 0 to 1."""
+        """Add the present sample counts; return the fraction lost in ten minutes, 0 to 1.
+
+        `now_ns` is the time of the counts by the host clock, ns since 1970 UTC.
+        """
         offered = account.n_offered
         lost = account.n_gap + sum(account.rejected.values())
         if self._seen and offered < self._seen[-1][1]:

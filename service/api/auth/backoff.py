@@ -65,7 +65,8 @@ class Backoff:
         """Return the time until a login may be attempted, s; if it is 0, count the attempt.
 
         An attempt counts as a failure until it succeeds, so that concurrent attempts all count.
-        Unknown names count too, so that waits do not reveal which accounts exist.
+        `name` is the login name, `peer` the address of the client. Unknown names count too, so that
+        waits do not reveal which accounts exist.
         """
         place = client_of(peer)
         with self._lock:
@@ -80,7 +81,7 @@ class Backoff:
         return 0.0
 
     def knows(self, name: str, peer: str) -> bool:
-        """Whether an account has logged in from an address since the service started."""
+        """Whether the account `name` has logged in from the address `peer` since the start."""
         with self._lock:
             return (name, client_of(peer)) in self._known
 
@@ -116,7 +117,7 @@ class FailureCounts:
         return max(0, newest_ns + self._rule.wait_ns(number) - now_ns)
 
     def add(self, key: Hashable, now_ns: int) -> None:
-        """Add one failure of an account or address."""
+        """Add one failure of an account or address at the monotonic time `now_ns`, ns."""
         number, _ = self._recent(key, now_ns)
         self._failures[key] = number + 1, now_ns
         self._failures.move_to_end(key)

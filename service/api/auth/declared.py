@@ -54,7 +54,11 @@ OPEN: Any = Depends(Needs(None, Reach.NO_UNIT))
 def subject_router(
     path: str, tag: str, permission: Permission = Permission.READ, reach: Reach = Reach.PLANT
 ) -> APIRouter:
-    """Return a router for paths below ``/api/v1`` that require a permission by default."""
+    """Return a router for paths below ``/api/v1`` that require a permission by default.
+
+    `path` is the common start of the paths, `tag` their group in the OpenAPI document, and `reach`
+    the units that a route concerns if its path contains no unit.
+    """
     return APIRouter(prefix=f"/api/v1{path}", tags=[tag], dependencies=[needs(permission, reach)])
 
 

@@ -37,7 +37,7 @@ def plant_hasher() -> PasswordHasher:
 
 
 def new_password(written: str, name: str) -> str:
-    """Check a new password of an account; return the password in Unicode normal form NFKC.
+    """Check the new password `written` for an account; return it in Unicode normal form NFKC.
 
     The rules require length, but no classes of characters and no expiry (NIST SP 800-63B, 3.1.1).
 

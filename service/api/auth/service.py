@@ -169,7 +169,8 @@ class AccessService:
     ) -> str:
         """Add an account; return the normalised login name.
 
-        With `must_change`, the password must be changed at the first login.
+        With `must_change`, the password must be changed at the first login. `now_ns` is the host
+        time, ns since 1970 UTC.
 
         Raises
         ------
@@ -188,7 +189,8 @@ class AccessService:
     ) -> None:
         """Change the password of an account, and end all sessions of the account.
 
-        With `must_change`, the password must be changed at the next login.
+        With `must_change`, the password must be changed at the next login. `now_ns` is the host
+        time, ns since 1970 UTC.
 
         Raises
         ------
@@ -203,7 +205,7 @@ class AccessService:
     def offer_set_up(self, now_ns: int) -> str | None:
         """Return a new token for creating the first account; None if an account exists.
 
-        Earlier tokens become invalid.
+        Earlier tokens become invalid. `now_ns` is the host time, ns since 1970 UTC.
         """
         token = new_token()
         expires_ns = now_ns + round(SET_UP_S * NS_PER_S)
@@ -213,7 +215,7 @@ class AccessService:
         """Create the first account, an administrator; return whether the token was valid.
 
         Raises `NameRefusedError` or `PasswordRefusedError` if the name or password is rejected; the
-        token then remains valid.
+        token then remains valid. `now_ns` is the host time, ns since 1970 UTC.
         """
         name = account_name(name)
         password = new_password(password, name)
@@ -228,7 +230,7 @@ class AccessService:
         """Create an API key; return the stored record and the complete key, which is not stored.
 
         `units` are the units for which the key is valid, empty for all units; `days` is the
-        validity period of the key, days.
+        validity period of the key, days, from the host time `now_ns`, ns since 1970 UTC.
 
         Raises
         ------

@@ -124,7 +124,10 @@ class Allowances(dict[str, TokenBucket]):
     """Rate limit of comments or notes: a token bucket per person or key."""
 
     def take(self, request: Request, now_s: float) -> None:
-        """Take a token of the caller; raise a problem of status 429 if none is left."""
+        """Take a token of the caller; raise a problem of status 429 if no token is left.
+
+        `now_s` is the monotonic time, s.
+        """
         new = TokenBucket(N_COMMENTS, S_PER_COMMENT, now_s)
         if not self.setdefault(identity_of(request).actor, new).take(now_s):
             detail = f"too many comments; try again after {S_PER_COMMENT:g} s"
