@@ -69,7 +69,7 @@ class AlarmBoard:
         return self._alarms[id_]
 
     def update(self, watch: Watch, condition: Judgement, now_ns: int) -> None:
-        """Update an alarm from a judgement, unless the alarm is inactive and stays inactive."""
+        """Update an alarm from a judgement at `now_ns`, unless it is inactive and stays so."""
         is_within = condition.level is None and condition.is_known
         if not (is_within and self._alarms[watch.id].is_settled_inactive):
             self.record(watch.id, condition, now_ns)

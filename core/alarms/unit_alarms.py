@@ -134,7 +134,7 @@ class UnitAlarms(AlarmBoard):
     def films(
         self, conditions: Mapping[str, Mapping[str, Judgement]], now_ns: int
     ) -> list[AlarmNews]:
-        """Update film alarms at a sample time; return the changed alarms.
+        """Update film alarms at the sample time `now_ns`; return the changed alarms.
 
         `conditions` are the judgements of each direction, "x" and "y", by alarm id.
 
@@ -148,7 +148,7 @@ class UnitAlarms(AlarmBoard):
         return self.drain_news()
 
     def link(self, is_connected: bool, reason: str | None, host_ns: int) -> list[AlarmNews]:
-        """Update the link alarm; return the changed alarms. `reason` states why it is down."""
+        """Update the link alarm; return the changed alarms. `reason` is why the link is down."""
         self._link = (is_connected, reason)
         self._take_link(host_ns)
         return self.drain_news()

@@ -66,7 +66,7 @@ def measures_growth(bearing: Bearing) -> bool:
 
 
 def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
-    """Return the measured thermal growth, for use if a probe fails later; None if not measured."""
+    """Return the thermal growth in `readings`, for use if a probe fails later; None if unknown."""
     growth = readings["gap_growth_um"]
     if growth.value is None or growth.interval_95 is None:
         return None

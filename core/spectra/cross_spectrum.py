@@ -53,7 +53,7 @@ class CrossSpectrum:
         return np.sqrt(np.maximum(np.stack([both + turn, both - turn]), 0.0)) / 2.0
 
     def amplitude_ratio(self, numerator: int, denominator: int) -> FloatArray:
-        """Return the ratio of two channels' amplitudes over their common segments, (n_lines,).
+        """Return the amplitude ratio (n_lines,) of two channels, by index, over common segments.
 
         It is zero where the denominator is zero; `line_excitation` excludes such lines.
         """
@@ -65,7 +65,7 @@ class CrossSpectrum:
         return root
 
     def coherence(self, first: int, second: int) -> FloatArray:
-        """Return the squared coherence of two channels, (n_lines,).
+        """Return the squared coherence of two channels, given by index, (n_lines,).
 
         It is always 1 for one segment, and 0 where a channel has no power.
         """

@@ -26,7 +26,7 @@ def angles_of(first_deg: float | None, second_deg: float | None) -> tuple[float,
 
 
 def resolving_matrix(unit: Unit, first: str, second: str) -> FloatArray | None:
-    """Return the matrix (2, 2) from the readings of two channels to x and y.
+    """Return the matrix (2, 2) from the readings of channels `first` and `second` to x and y.
 
     None if the channels are at 0° and 90°, along x and y. Parallel channels are not accepted.
     """

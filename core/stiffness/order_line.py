@@ -116,7 +116,7 @@ class OrderLine:
         return float(self.orders.frequency_hz[self.at])
 
     def n_segments(self, first: int, last: int) -> int:
-        """Return the number of segments or changed polls in which both channels are usable."""
+        """Return the number of segments or changed polls with usable channels `first`, `last`."""
         if self.bins is not None:
             return int(self.orders.n_segments[first, last])
         both = self.usable[:, first] & self.usable[:, last]
@@ -354,7 +354,7 @@ NOT_MEASURED: Budgeted = (missing(Reason.NOT_MEASURED), None)
 
 
 def marked_hz(readings: Mapping[str, Reading], line: str) -> float | None:
-    """Return the frequency in Hz of the line "order1" or "vortex"; None without such a line."""
+    """Return the frequency in Hz of the line "order1" or "vortex"; None without this line."""
     reading = readings[f"{line}_frequency_hz"]
     return None if reading.quality.reason is Reason.OUTSIDE_BAND else reading.value
 

@@ -61,7 +61,7 @@ def effective_stiffness_n_per_m(
 
 
 def motion_across(spectrum: CrossSpectrum, line: int, shaft: int) -> complex:
-    """Return the ratio of coherent motion across a shaft channel to that along it; 1 if unknown."""
+    """Return the ratio of coherent motion across to motion along a shaft channel; 1 if unknown."""
     across = SHAFT_Y if shaft == SHAFT_X else SHAFT_X
     power = float(spectrum.power[line, shaft, across])
     return complex(spectrum.matrix[line, across, shaft]) / power if power > 0.0 else 1.0

@@ -168,7 +168,7 @@ class GapModel(ApiModel):
 
 
 class BasicUnitModel(ApiModel):
-    """Generating unit."""
+    """Generating unit: identifier, name and rated speed."""
 
     id: str
     name: str
