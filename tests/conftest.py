@@ -43,24 +43,27 @@ hypothesis_settings.load_profile("padwatch")
 START_NS = 1_767_225_600 * NS_PER_S
 
 
-PROGRAMS = ("tests/system/", "tests/torture/")
-BROWSER = ("tests/browser/",)
+SLOW = ("tests/system/", "tests/torture/", "tests/browser/")
 
 
 @pytest.hookimpl(trylast=True)  # when other tiers have been left out
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Refuse a test that would be in two tiers; begin with those that take long.
 
-    A worker begins with a part of the list. Tests that start programs stand at its head, those in a
-    browser in the middle, so that one of an even number of workers does them and not several at
-    the end, each with a browser and plants of its own.
+    Each of four workers begins with a quarter of the list. Each folder of slow tests begins a
+    quarter of its own, so that one worker runs it, with one browser and plants that stay, and
+    none of them is left to the end.
     """
-    first = [item for item in items if item.nodeid.startswith(PROGRAMS)]
-    first.sort(key=lambda item: "test_film_alarm" not in item.nodeid)  # eight minutes
-    paged = [item for item in items if item.nodeid.startswith(BROWSER)]
-    rest = [item for item in items if not item.nodeid.startswith(PROGRAMS + BROWSER)]
-    before = max(0, len(items) // 2 - len(first))
-    items[:] = [*first, *rest[:before], *paged, *rest[before:]]
+    slow = [[item for item in items if item.nodeid.startswith(folder)] for folder in SLOW]
+    slow[0].sort(key=lambda item: "test_film_alarm" not in item.nodeid)  # eight minutes
+    rest = [item for item in items if not item.nodeid.startswith(SLOW)]
+    n_items = len(items)
+    items.clear()
+    for n, folder in enumerate(slow):
+        n_before = max(0, -(-n_items * n // 4) - len(items))
+        items += [*rest[:n_before], *folder]
+        del rest[:n_before]
+    items += rest
     for item in items:
         if item.get_closest_marker("long") and item.get_closest_marker("torture"):
             raise pytest.UsageError(f"{item.nodeid} is marked both long and torture")

@@ -269,7 +269,7 @@ async def measure_in_flight(
 
     Raises `LinkError` or `ConfigError` if the device does not answer a single request.
     """
-    await read_once(device, address, 1, function)
+    await read_once(device, function, address, 1)
     n_answered = 1
     for n_requests in range(2, most + 1):
         client = ModbusClient(

@@ -55,8 +55,7 @@ def read(assembler: FrameAssembler, first: int, stop: int, n_bits: int | None, b
     return sorted({block.epoch for block in blocks}), blocks[0].first_index
 
 
-@pytest.mark.parametrize("tells", [False, True])
-@pytest.mark.parametrize("n_bits", [None, 16, 32])
+@pytest.mark.parametrize(("n_bits", "tells"), covering([32, 16, None], [True, False]))
 def test_each_life_is_a_count_of_its_own_unless_the_device_tells_all(n_bits, tells, life):
     first, _ = read(life(0.0, n_bits, tells), 0, 6000, n_bits)
     second, index = read(life(20.0, n_bits, tells), 12_000, 18_000, n_bits)

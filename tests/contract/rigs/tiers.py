@@ -1,6 +1,6 @@
 """Which combinations of a parametrised family run in the fast tier; see docs/reference/tests.md."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import pytest
@@ -29,6 +29,12 @@ def covering(*axes: Sequence[Any]) -> list[Any]:
 def fast_and_long(fast: Any, long: Any) -> list[Any]:
     """One value for the fast tier, and one for the long tier: numbers of seeds or repetitions."""
     return [fast, pytest.param(long, marks=pytest.mark.long)]
+
+
+def first_fast(n: int, values: Iterable[Any]) -> list[Any]:
+    """Values of a family: the first `n` for the fast tier, all others for the long tier."""
+    long = pytest.mark.long
+    return [v if i < n else pytest.param(v, marks=long) for i, v in enumerate(values)]
 
 
 def _row(axes: Sequence[Sequence[Any]], position: tuple[int, ...], is_fast: bool) -> Any:

@@ -33,6 +33,7 @@ def monitor(unit: Unit) -> UnitMonitor:
 GAPS_UM = (1950.0, 2060.0)
 
 
+@pytest.mark.long
 def test_results_come_with_each_hop_however_the_samples_are_cut(monitor, blocks, signals, results):
     rows, counts, single = signals(60.0), [], []
     for block in blocks(rows, n_each=1):

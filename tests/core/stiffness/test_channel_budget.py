@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from rigs.shaken_shaft import found, shaken
+from rigs.tiers import covering
 
 from core.machine.unit import Bearing, BearingAccuracy
 from core.spectra.cross_spectrum import average, roundness
@@ -55,8 +56,7 @@ def test_what_never_differs_says_nothing_of_how_well_it_is_known():
     assert mean_budget(45.5, [45.0, 46.0]).random == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("n_segments", [4, 8, 24])
-@pytest.mark.parametrize("coherence", [0.1, 0.6, 0.9, 0.999])
+@pytest.mark.parametrize(("coherence", "n_segments"), covering([0.1, 0.6, 0.9, 0.999], [24, 8, 4]))
 def test_intervals_of_a_coherence_hold_the_truth_and_stay_between_0_and_1(n_segments, coherence):
     shaft, noise = (wandering(0.0, seed)[:, :n_segments] for seed in (1, 2))
     bearing = np.sqrt(coherence) * shaft + np.sqrt(1.0 - coherence) * noise

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rigs.shaken_shaft import averaged
+from rigs.tiers import covering
 
 from benchmarks.flexible_rotor import (
     BEARINGS,
@@ -52,12 +53,11 @@ def test_the_rotor_bends_where_it_should(first_hz):
 
 
 @pytest.mark.parametrize(
-    ("bends_at_hz", "eccentricity"), [(8.0, 0.3), (11.7, 0.1), (11.7, 0.6), (25.0, 0.3)]
+    ("rotor", "bearing"),
+    covering([(8.0, 0.3), (11.7, 0.1), (11.7, 0.6), (25.0, 0.3)], [*BEARINGS]),
 )
-@pytest.mark.parametrize("bearing", [*BEARINGS])
-def test_films_under_a_flexible_rotor_are_found_as_at_the_running_speed(
-    bearing, bends_at_hz, eccentricity
-):
+def test_films_under_a_flexible_rotor_are_found_as_at_the_running_speed(rotor, bearing):
+    bends_at_hz, eccentricity = rotor
     truth = motion(eccentricity, bends_at_hz)[0][bearing].at(SPEED_RAD_S)
     found = [fitted(bearing, eccentricity, seed, bends_at_hz=bends_at_hz) for seed in range(4)]
 

@@ -146,6 +146,14 @@ async def test_a_block_ring_is_decoded_by_its_own_header(probe, counting_feed):
     assert "magic is" in other.stderr
 
 
+async def test_the_requests_that_a_device_answers_at_once_are_counted(probe, server):
+    found = await probe("in-flight", at(server), "--address", "100")
+    assert (found.exit_code, found.stdout) == (0, "requests_in_flight = 16\n"), found.output
+    unknown = await probe("in-flight", at(server), "--address", "65535")
+    assert unknown.exit_code == 1
+    assert "address" in unknown.stderr
+
+
 async def test_nothing_but_reads_is_sent(probe, server):
     await probe("modbus", at(server), "--address", "100")
     await probe("map", str(GATEWAY), "--at", at(server))

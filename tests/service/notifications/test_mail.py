@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from service.notifications.channel import Delivered, Failed, Refused, TrustedAuthorities
@@ -214,6 +214,7 @@ TEXTS = ("plant", "unit", "unit_name", "subject", "kind", "change", "actor", "re
          "operating_state", "state")  # fmt: skip
 
 
+@settings(max_examples=30)
 @given(
     texts=st.fixed_dictionaries({key: st.text(max_size=60) for key in TEXTS}), extra=st.booleans()
 )

@@ -81,6 +81,7 @@ def test_a_commit_that_is_refused_leaves_no_transaction_behind(store, path, exec
     assert n_rows(path, "assessment") == 1
 
 
+@pytest.mark.long
 def test_trends_are_read_while_others_are_written(store):
     n_batches, per_batch = 20, 20
     lengths: list[int] = []

@@ -240,6 +240,7 @@ def test_each_damage_has_its_signs(two_years, day_ns, damage, expected):
     np.testing.assert_allclose(found["bearing"] / found["shaft"], found["stiffness"], rtol=0.05)
 
 
+@pytest.mark.long
 def test_clearance_grown_over_90_days_takes_its_tenth_in_the_end_and_half_of_it_half_way(
     two_years, day_ns
 ):

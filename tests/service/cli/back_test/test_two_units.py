@@ -126,6 +126,7 @@ def test_damage_is_told_with_evidence_and_a_learned_fault_is_doubted(two_units, 
     assert doubt.endswith("the service would require acceptance by an engineer")
 
 
+@pytest.mark.long
 def test_causes_are_told_by_the_newest_readings_of_all_bearings(two_units, found):
     alarm = next(a for a in found.alarms if (a.unit, a.bearing, a.direction) == ("U2", "LJB", "x"))
     life, baselines = two_units.lives["U2"], [b for b in found.baselines if b.origin.unit == "U2"]
@@ -192,6 +193,7 @@ def test_exported_baselines_read_back_as_they_were(found, tmp_path):
         export_baselines(found, tmp_path / "out")
 
 
+@pytest.mark.long
 def test_an_overhaul_begins_a_new_baseline_of_its_bearing(two_units, histories):
     """What has changed before it is healthy after it, and nothing is compared across it."""
     event = MachineEvent("U2", "LJB", two_units.damaged_ns, "new pads")

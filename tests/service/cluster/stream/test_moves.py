@@ -15,7 +15,6 @@ from harness.ledger_plant import LedgerPlant
 from harness.moving_unit import Message, MovingUnit
 from harness.stream_rig import found_in
 from rigs.blocks import given_block, of_unit, starting_at
-from rigs.tiers import fast_and_long
 
 from core.arrays import FloatArray, SampleArray
 from core.quality import GOOD, Quality, Reading, Reason, bad, uncertain
@@ -127,7 +126,8 @@ def messages(unit: MovingUnit, seed: int) -> Iterator[Message]:
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("seed", fast_and_long(1, 2))
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2])
 async def test_results_are_the_same_wherever_and_however_often_it_is_cut_off(moving_unit, seed):
     rng = np.random.default_rng(seed)
     whole, moved = moving_unit("whole"), moving_unit("moved")

@@ -29,6 +29,7 @@ from service.store.sqlite import SqliteStore
 LONG = pytest.mark.long
 
 
+@pytest.mark.long
 def test_pieces_are_gathered_like_what_comes_at_once(plain, rolled, results, tmp_path):
     with closing(SqliteStore(tmp_path / "pieces.sqlite3")) as store:
         for first in range(0, N, 37):
