@@ -114,9 +114,10 @@ def _of_columns(
 
 
 def random_line(name: str, standard: float, freedoms: float = math.inf) -> BudgetLine:
-    """Return a random, normal contribution; `standard` is in the unit of the result.
+    """Return the budget line of a random contribution with a normal distribution.
 
-    `freedoms` are the degrees of freedom of `standard`; infinite if it is not estimated from data.
+    `standard` is its standard uncertainty in the unit of the result, and `freedoms` the degrees of
+    freedom of this uncertainty; infinite if it is not estimated from data.
     """
     return BudgetLine(name, Kind.RANDOM, Distribution.NORMAL, standard, 1.0, freedoms)
 

@@ -306,9 +306,9 @@ class ModbusClient:
                 if not protocol.unsolicited:
                     return
             raise LinkError(
-                f"{self.where}: the serial line was not silent for {timeout_s} s"
-                f" within {_MAX_SILENCE_TRIES * timeout_s:g} s: {protocol.unsolicited};"
-                " disconnect any other master"
+                f"{self.where}: the serial line was not silent for {timeout_s:g} s"
+                f" within {_MAX_SILENCE_TRIES * timeout_s:g} s; received without a request:"
+                f" {protocol.unsolicited}; disconnect any other master"
             )
         except (LinkError, asyncio.CancelledError):
             self.close()

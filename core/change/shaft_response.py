@@ -68,8 +68,9 @@ class ShaftResponse:
         shape = [len(row) for row in self.coefficients]
         if len(self.centre) != n or len(self.std) != n or shape != [_n_terms(n)] * n:
             raise ValueError(
-                f"{n} films need {n} rows of {_n_terms(n)} coefficients, got {len(shape)} rows,"
-                f" {len(self.centre)} values of centre and {len(self.std)} of std"
+                f"{n} films need {n} rows of {_n_terms(n)} coefficients, got rows of lengths"
+                f" {shape}; and {n} values of centre and std, got {len(self.centre)} and"
+                f" {len(self.std)}"
             )
         if not all(std > 0.0 for std in self.std):
             raise ValueError(f"std must be above 0, got {min(self.std):g}")

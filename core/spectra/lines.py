@@ -85,7 +85,8 @@ def taper_weights(n_samples: int) -> FloatArray:
 def bin_phasors(tapered_samples: FloatArray, n_lines: int) -> ComplexArray:
     """Return the phasors (n_channels, n_lines) at the first Fourier bins above zero.
 
-    `tapered_samples` (n_channels, n_samples) are multiplied by `taper_weights`; line 0 is bin 1.
+    `tapered_samples` (n_channels, n_samples) must already be multiplied by `taper_weights`, which
+    make the magnitudes zero-to-peak amplitudes. Line 0 is bin 1.
     """
     from scipy import fft  # slow import, not needed by a process without spectra
 

@@ -84,10 +84,12 @@ class BearingSnapshot:
 
 @dataclass(frozen=True)
 class UnitSnapshot:
-    """State of a unit that changes with each result; `bearings` and `films` are by bearing id.
+    """State of a unit that changes with each result.
 
     Parameters
     ----------
+    bearings, films
+        Newest results of the bearings and newest readings of their films, by bearing id.
     alarms
         All alarms of the unit.
     judged, chattering

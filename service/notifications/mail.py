@@ -57,7 +57,7 @@ def change_words(message: Message) -> str:
 
 
 def value_words(message: Message) -> str | None:
-    """Return value, 95 % uncertainty and limit in an alarm message as text.
+    """Return the value of an alarm, its 95 % uncertainty and its limit in a message as text.
 
     None if the alarm has no value.
     """

@@ -181,7 +181,7 @@ class RecordingState(StrEnum):
 
 @dataclass(frozen=True)
 class CheckResult:
-    """Result of the check of one recording; the reason is empty for a sound recording."""
+    """Result of the check of one recording; the reason is empty for an intact one."""
 
     kind: WaveformKind
     name: str

@@ -36,7 +36,7 @@ class RecordingEntry:
     manifest
         Manifest; None if it cannot be read.
     fault
-        Reason why the recording cannot be opened; None for a sound recording.
+        Reason why the recording cannot be opened; None if it can be opened.
     alarms
         Alarm events in the file ``alarm.json`` of a capture; empty for other recordings.
     n_bytes

@@ -28,15 +28,13 @@ class EvidenceWriter:
     def write(self, snapshot: Snapshot, *, with_history: bool = True) -> Place:
         """Write the bundle of a snapshot and return its location; keep an existing bundle.
 
-        Parameters
-        ----------
-        with_history
-            Whether to include readings from the store; if not, the document lists them as missing.
+        `with_history` is whether to include readings from the store; if not, the document lists
+        them as missing.
 
         Raises
         ------
         OSError
-            If the disk cannot be written; no files remain.
+            If the disk cannot be written to; no partial files remain.
         StoreError
             If the store cannot be read.
         """

@@ -127,7 +127,7 @@ class DynamicModel(Settings):
 
 
 class AnalysisModel(Settings):
-    """Settings of segments and averaging, with defaults from Brito et al., section 3.1."""
+    """Settings of signal segments and their averaging; defaults from Brito et al., section 3.1."""
 
     segment_samples: Annotated[int, Field(ge=256, le=1_048_576)] = 8192
     """Number of samples in one Hann-tapered segment."""

@@ -131,8 +131,8 @@ class Indexer:
         step = (time_ns - self._last_ns) / self._period_ns
         if step <= 0:
             raise ConfigError(
-                f"row {self._row + 1}: times must increase, but this time goes back by"
-                f" {abs(step):.3f} sampling periods"
+                f"row {self._row + 1}: times must increase, but this time is {abs(step):.3g}"
+                " sampling periods before that of the previous row (0: equal)"
             )
         off = float(self._deviations(np.array([time_ns], dtype=np.int64))[0])
         n_missing = round(off)
