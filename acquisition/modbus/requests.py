@@ -82,8 +82,8 @@ class Span:
             raise ConfigError(f"Modbus function must be 1, 2, 3 or 4, got {self.function}")
         if not 0 <= self.address < self.stop <= ADDRESS_SPACE:
             raise ConfigError(
-                f"Modbus addresses must be 0 to {ADDRESS_SPACE - 1}, got {self.count} from"
-                f" {self.address}"
+                f"a Modbus request must be of at least 1 address from 0 to {ADDRESS_SPACE - 1}, got"
+                f" {self.count} addresses from {self.address} on"
             )
 
     @property

@@ -147,12 +147,17 @@ def read_heads(file: Any, n_slow: int) -> Iterator[tuple[Heads, list[Rejected]]]
         )
 
 
+def _described(column: Any) -> str:
+    return f"'{column.name}' ({column.type}{'' if column.nullable else ', not null'})"
+
+
 def _require_shape(file: Any, path: Path, schema: Any, n_rows: int, group_rows: list[int]) -> None:
     found, metadata = file.schema_arrow, file.metadata
     if not found.equals(schema):
-        name = next((a for a, b in zip(found, schema, strict=False) if a != b), None)
-        words = f"column '{name.name}' ({name.type})" if name else "the number of columns"
-        raise ConfigError(f"{path}: {words} does not match the manifest")
+        pairs = zip(found, schema, strict=False)
+        differing = ((f"column {_described(a)}", _described(b)) for a, b in pairs if a != b)
+        words, wanted = next(differing, (f"{len(found)} columns", str(len(schema))))
+        raise ConfigError(f"{path}: file has {words}, but the manifest requires {wanted}")
     if metadata.num_rows != n_rows:
         raise ConfigError(f"{path}: file has {metadata.num_rows} rows, expected {n_rows}")
     found_rows = [metadata.row_group(n).num_rows for n in range(metadata.num_row_groups)]

@@ -248,7 +248,10 @@ class ServiceAlarms(AlarmBoard):
         return news
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Update the alarms from the health of the service at the host time ``host_ns``, ns."""
+        """Update the alarms from the health of the service; return the changed alarms.
+
+        `host_ns` is the host time, ns since 1970 UTC.
+        """
         if self._look is not None:
             health = self._look()
             for kind in self._judged:

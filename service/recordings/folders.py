@@ -84,7 +84,11 @@ def remove_incomplete(root: Path, units: Container[str | None]) -> list[Path]:
 
 
 def remove_recording(folder: Path) -> None:
-    """Remove a recording if it exists, the manifest first, so that a remainder is not complete."""
+    """Remove a recording if it exists.
+
+    The manifest is removed first, so that an interrupted removal leaves no folder that looks
+    complete.
+    """
     if folder.is_dir():
         for name in FILES:
             (folder / name).unlink(missing_ok=True)

@@ -103,7 +103,7 @@ class LastAverages:
             self._kept[refresh.bearing.id] = refresh
 
     def all(self) -> Iterable[Refresh]:
-        """Return the stored averages, in the order of the first average of each bearing."""
+        """Return the newest averages of each bearing, in the order in which bearings appeared."""
         return self._kept.values()
 
 

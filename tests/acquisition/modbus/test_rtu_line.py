@@ -46,7 +46,7 @@ async def test_a_line_is_only_used_when_it_is_silent(hostile_line, link_on):
             await asyncio.sleep(0.01)
 
     babbling = asyncio.create_task(babble())
-    with pytest.raises(LinkError, match=r"not silent for 0\.2 s within 1 s: .* bytes"):
+    with pytest.raises(LinkError, match=r"not silent for 0\.2 s within 1 s; received .* bytes"):
         await link.open()
     babbling.cancel()
     assert not hostile_line.requests

@@ -71,7 +71,10 @@ def refusal(folder: Path) -> str:
         ({"rate_hz": 0.0}, "rate_hz: Input should be greater than 0"),
         ({"rate_hz": float("nan")}, "rate_hz: Input should be a finite number"),
         ({"sample_type": "int8"}, "sample_type: Input should be 'int16' or 'float32'"),
-        ({"sample_type": "float32"}, "column 'c0' (int16) does not match the manifest"),
+        (
+            {"sample_type": "float32"},
+            "column 'c0' (int16, not null), but the manifest requires 'c0' (float",
+        ),
         ({"block_samples": 0}, "block_samples: Input should be greater than or equal to 1"),
         ({"channels": []}, "channels: Tuple should have at least 1 item"),
         ({"n_samples": 2**40}, "n_samples: Input should be less than or equal to 536870912"),
@@ -172,9 +175,9 @@ HOLES = "c1", [pa.array([None] * 1000, pa.int16())]
 @pytest.mark.parametrize(
     ("changed", "options", "words"),
     [
-        (lambda t: t.set_column(1, *DOUBLES), {}, "column 'c1' (double) does not match"),
-        (lambda t: t.set_column(1, *HOLES), {}, "column 'c1' (int16) does not match"),
-        (lambda t: t.append_column("c9", t["c0"]), {}, "number of columns does not match the"),
+        (lambda t: t.set_column(1, *DOUBLES), {}, "column 'c1' (double, not null), but the"),
+        (lambda t: t.set_column(1, *HOLES), {}, "column 'c1' (int16), but the"),
+        (lambda t: t.append_column("c9", t["c0"]), {}, "columns, but the manifest requires"),
         (lambda t: t, {"row_group_size": 500}, "samples.parquet: row groups must have"),
     ],
 )
