@@ -170,7 +170,10 @@ class _Counts:
 
     def read(self, first_row: int, n_rows: int) -> RawArray:
         if first_row + n_rows > self._n_rows:
-            raise ConfigError("the blocks have more samples than the samples file; it is damaged")
+            raise ConfigError(
+                f"the recording is damaged: its blocks have {first_row + n_rows} samples or more,"
+                f" but the samples file has {self._n_rows}"
+            )
         parts: list[Any] = []
         while n_rows > 0:
             group, offset = divmod(first_row, ROWS_PER_GROUP)

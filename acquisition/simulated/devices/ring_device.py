@@ -261,7 +261,7 @@ def _layout(first: SampleBlock, settings: RingDeviceSettings) -> RingLayout:
     Raises `ConfigError` if the slot has no int16 counts or the ring does not fit.
     """
     if first.counts.dtype != np.int16:
-        raise ConfigError(f"block ring: samples must be 16-bit counts, got {first.counts.dtype}")
+        raise ConfigError(f"block ring: samples must be int16 counts, got {first.counts.dtype}")
     n_slow = len(first.side.slow)
     layout = RingLayout(
         n_channels=len(first.counts),

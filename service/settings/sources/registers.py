@@ -315,4 +315,6 @@ def require_apart(values: Sequence[MapValue], base: int) -> None:
                     *("value", n, "address"),
                 )
         if value.id in [other.id for other in values[:n]]:
-            raise MisfitError(f"contains {value.id!r} twice; each value must be unique", "value")
+            raise MisfitError(
+                f"contains the id {value.id!r} twice; each value needs its own", "value"
+            )

@@ -213,7 +213,7 @@ BEHIND = [
         ('"float32"', '"float16"', ":6: value[1].type = 'float16'"),
         ("address = 10", "address = 0", "value[1].address: must be 1 to 65535"),
         ("address = 10", "address = 65536", "value[1].address: must be 1 to 65535"),
-        ('"b"', '"a"', "value: contains 'a' twice"),
+        ('"b"', '"a"', "value: contains the id 'a' twice"),
         ("base = 1", "base = 2", ":2: base = 2: Input should be 0, 1, 10001"),
         (
             "base = 1",

@@ -207,5 +207,5 @@ def test_a_feed_without_a_whole_slot_is_refused():
 def test_a_feed_in_engineering_units_is_refused(counting_feed):
     raw = counting_feed().advance(50)
     feed = SimpleNamespace(advance=lambda _: replace(raw, counts=raw.counts.astype(np.float32)))
-    with pytest.raises(ConfigError, match="must be 16-bit counts, got float32"):
+    with pytest.raises(ConfigError, match="must be int16 counts, got float32"):
         RingDevice(feed)
