@@ -184,7 +184,7 @@ def cause_by_damping(
     has_company = len(known) == len(bearings) > 0 and all(each.follows(own) for each in known)
     if has_company:
         own = _mean([own, *known])
-    holds = all(line.verdict is LineVerdict.HOLDS for line in lines.values())
+    holds = bool(lines) and all(line.verdict is LineVerdict.HOLDS for line in lines.values())
     cause, why = _cause(own, found, has_company, holds)
     if cause is None:
         return found

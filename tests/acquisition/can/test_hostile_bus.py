@@ -133,7 +133,7 @@ async def test_an_unplugged_serial_adapter_leaves_no_thread(tmp_path, shape, dev
 
 async def test_padwatch_sends_nothing_but_open_and_close(shape, device, source_of):
     async with SlcanTcpServer(device) as server:
-        source = source_of(shape, server.endpoint)
+        source = source_of(shape, server.endpoint, stale_after_s=60.0)
         for _ in range(2):
             async with source.connect() as stream:
                 server.produce(1)

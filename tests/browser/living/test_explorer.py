@@ -34,9 +34,9 @@ def days(request: Request) -> float:
 @pytest.mark.long
 async def test_two_bearings_are_compared_and_the_address_says_so(plant, page, complaints):
     await page.goto(plant.url + "#/trends")
-    await expect(page.locator("summary").first).to_have_text("Bearings: 1")
+    await expect(page.locator("#main summary").first).to_have_text("Bearings: 1")
 
-    await page.locator("summary").first.click()
+    await page.locator("#main summary").first.click()
     await page.get_by_role("checkbox", name="U1 LJB").check()
     await page.get_by_role("radio", name="Month").check()
 
@@ -156,7 +156,7 @@ async def test_a_time_without_results_says_so(plant, page):
 
     await page.get_by_label("While at").select_option("standstill")
     await expect(sentence).to_contain_text("at standstill")
-    await page.locator("summary").first.click()
+    await page.locator("#main summary").first.click()
     for bearing in ("U1 UJB", "U1 LJB"):
         await page.get_by_role("checkbox", name=bearing).uncheck()
     none = page.get_by_text("Choose at least one bearing.")
@@ -171,7 +171,7 @@ async def test_an_address_restores_what_was_shown_and_is_complained_of_in_words(
     await expect(page.locator("[data-chart=trend-operation-mw]")).to_be_visible()
     await expect(page.get_by_role("radio", name="Week")).to_be_checked()
     await expect(page.get_by_label("While at")).to_have_value("full_load")
-    await expect(page.locator("summary").first).to_have_text("Bearings: 1")
+    await expect(page.locator("#main summary").first).to_have_text("Bearings: 1")
 
     address = "#/trends?b=U1/UJB&b=U9/XYZ&q=stiffness_xx_n_per_m&q=warp_factor&last=2592000"
     await page.goto(plant.url + address)
@@ -190,7 +190,7 @@ async def test_the_page_of_a_bearing_leads_to_its_trends(plant, page):
 
     await await_curve(page)
     await expect(page.get_by_role("radio", name="Year")).to_be_checked()
-    await expect(page.locator("summary").first).to_have_text("Bearings: 1")
+    await expect(page.locator("#main summary").first).to_have_text("Bearings: 1")
     assert "b=U1%2FLJB" in await page.evaluate("location.hash")
     assert "order1_shaft_x_um_pk" in await page.evaluate("location.hash")
 
