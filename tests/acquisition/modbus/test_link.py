@@ -60,12 +60,12 @@ async def test_what_the_device_does_not_have_is_a_config_error_that_says_what_wa
 @pytest.mark.parametrize(
     ("ask", "complaint"),
     [
-        (lambda link: link.read(65_535, 2), "addresses must be 0 to 65535, got 2 from 65535"),
-        (lambda link: link.read(-1, 1), "got 1 from -1"),
-        (lambda link: link.read(0, 0), "got 0 from 0"),
+        (lambda link: link.read(65_535, 2), "from 0 to 65535, got 2 addresses from 65535"),
+        (lambda link: link.read(-1, 1), "got 1 addresses from -1"),
+        (lambda link: link.read(0, 0), "got 0 addresses from 0"),
         (lambda link: link.read(0, 1, function=6), "function must be 1, 2, 3 or 4, got 6"),
         (lambda link: link.read(0, 1, function=5), "function must be 1, 2, 3 or 4, got 5"),
-        (lambda link: link.read_fifos([65_536]), "got 1 from 65536"),
+        (lambda link: link.read_fifos([65_536]), "got 1 addresses from 65536"),
     ],
 )
 async def test_what_no_device_can_have_is_never_asked(ask, complaint, linked, bench_server):
