@@ -93,7 +93,7 @@ async def time_range(
     before the end.
     """
     if (start is None) == (last is None):
-        detail = "exactly one of start and last, such as last=24h, must be given"
+        detail = "exactly one of start and last, such as last=24h, is required"
         raise ProblemError(422, "Wrong parameter", detail, "start")
     now_ns = request.app.state.clock.now_ns()
     end_ns = ns_from_datetime(end, "end") if end else (now_ns // MINUTE_NS + 1) * MINUTE_NS
