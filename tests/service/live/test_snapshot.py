@@ -38,7 +38,7 @@ READ = FilmReading(
 
 @pytest.fixture
 def published(assessment: Callable[..., Assessment]) -> UnitSnapshot:
-    """A unit with a result, of which one value is not a number, a film and an active alarm."""
+    """A unit with a film, an active alarm, and a result in which one value is NaN."""
     found = assessment()
     readings = {**found.readings, "power_mw": Reading(float("nan"))}
     alarm = Alarm(IDENTITY, level=AlarmLevel.DANGER, occurrence=3, is_acknowledged=False)
