@@ -50,17 +50,18 @@ SLOW = ("tests/system/", "tests/torture/", "tests/browser/")
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Refuse a test that would be in two tiers; begin with those that take long.
 
-    Each of four workers begins with a quarter of the list. Each folder of slow tests begins a
-    quarter of its own, so that one worker runs it, with one browser and plants that stay, and
-    none of them is left to the end.
+    Each worker begins with an equal part of the list. Each folder of slow tests begins a part of
+    its own, so that one worker runs it, with one browser and plants that stay, and none of them
+    is left to the end.
     """
+    n_workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", 1))
     slow = [[item for item in items if item.nodeid.startswith(folder)] for folder in SLOW]
     slow[0].sort(key=lambda item: "test_film_alarm" not in item.nodeid)  # eight minutes
     rest = [item for item in items if not item.nodeid.startswith(SLOW)]
     n_items = len(items)
     items.clear()
     for n, folder in enumerate(slow):
-        n_before = max(0, -(-n_items * n // 4) - len(items))
+        n_before = max(0, -(-n_items * n // n_workers) - len(items))
         items += [*rest[:n_before], *folder]
         del rest[:n_before]
     items += rest

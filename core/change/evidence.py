@@ -105,7 +105,7 @@ class GatheredEvidence:
         scales = self.scales or (ScaleSums(),) * len(times)
         if len(scales) != len(times):
             found = f"{len(scales)} time scales, but the baseline has {len(times)}"
-            raise ValueError(f"evidence has {found}; discard the evidence of another baseline")
+            raise ValueError(f"evidence has {found}; it is of another baseline, so discard it")
         newest = (*self.newest, compared.deviation)[-MEDIAN_READINGS:]
         middle = median(newest)
         return GatheredEvidence(

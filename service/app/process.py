@@ -69,9 +69,9 @@ class Supervision:
         if set(troubles) != self._logged:
             self._logged = set(troubles)
             if words:
-                log.error("loops of the program have ended or are stuck", loops=words)
+                log.error("background tasks have ended or no longer respond", tasks=words)
             else:
-                log.info("all loops of the program run again")
+                log.info("all background tasks respond again")
         if words:
             self._manager.notify(STATUS="; ".join(words))
         else:

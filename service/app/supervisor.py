@@ -129,7 +129,7 @@ def _end_of(process: subprocess.Popen[bytes]) -> int:
     try:
         return process.wait(STOPS_WITHIN_S)
     except subprocess.TimeoutExpired:
-        log.warning("the serving process is killed because it did not stop in time")
+        log.warning("the serving process did not stop in time and is killed")
         process.kill()
         return process.wait()
 

@@ -65,7 +65,10 @@ def access_desk(
     With `is_demo`, local clients have the admin role without a login.
     """
     if (difference := store.accept(clock.now_ns())) is not None:
-        log.error("the database of accounts is not that of the last run", reason=difference)
+        log.error(
+            "the database of accounts was replaced or restored since the last run",
+            reason=difference,
+        )
     service, access = plant.service, plant.access
     local_role: Role | None = Role.ADMIN if is_demo else Role.VIEWER
     if access.login or service.socket is not None or not is_loopback(service.host):

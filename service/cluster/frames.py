@@ -48,7 +48,9 @@ def require_possible(block: SampleBlock) -> None:
     if not all(math.isfinite(reading.value or 0.0) for reading in block.slow.values()):
         raise WireError("impossible", f"a block with a slow value that is not finite; {SENDER}")
     if any(rejection.n_samples < 0 for rejection in block.rejected):
-        raise WireError("impossible", f"a block with fewer than 0 rejected samples; {SENDER}")
+        raise WireError(
+            "impossible", f"a block with a negative number of rejected samples; {SENDER}"
+        )
 
 
 FINGERPRINT_BYTES = 16

@@ -123,7 +123,7 @@ class Leadership:
         finally:
             self.is_leading = False
             self._beats.release(*self._loops)
-        log.warning("this process stops the plant-wide tasks: the database lock is lost")
+        log.warning("the database lock is lost; this process stops the plant-wide tasks")
 
 
 FORM = re.compile(r"([0-9]{1,4})/([0-9]{1,4})")

@@ -42,7 +42,9 @@ def memories_of(stored: Iterable[StreamPosition]) -> dict[str, UnitMemory]:
     found = {position.unit: read(position.memory) for position in stored}
     for unit, memory in found.items():
         if memory is None:
-            log.error("the analysis starts anew: its stored state cannot be read", unit=unit)
+            log.error(
+                "stored analysis state cannot be read; the analysis restarts without it", unit=unit
+            )
     return {unit: memory for unit, memory in found.items() if memory is not None}
 
 
@@ -168,7 +170,9 @@ class UnitProgress:
                 unit=self.unit,
             )
         elif first_sequence > stored.window_sequence:
-            log.warning("the stream lacks old samples of the averaging window", unit=self.unit)
+            log.warning(
+                "the stream no longer has all samples of the averaging window", unit=self.unit
+            )
 
     async def take(self, sequence: int, payload: bytes) -> bool:
         """Process the message `payload` with its sequence number; return False if it is unusable.

@@ -98,7 +98,11 @@ class Feed:
         except UnreadableSnapshotError as error:
             if str(error) != self._unreadable:
                 reason = self._unreadable = str(error)
-                log.error("a reported unit state is unreadable", unit=beat.unit, reason=reason)
+                log.error(
+                    "a unit state from the measuring process cannot be read",
+                    unit=beat.unit,
+                    reason=reason,
+                )
             return None
         unit = UnitReport(beat.unit, link, beat.revision, snapshot)
         revision = None if document is None else document[:2]

@@ -93,7 +93,9 @@ class IntegrityMonitor:
         found = self.stored.adopt(self._clock.now_ns())
         if found:
             self.rolled_back = "; ".join(finding.detail for finding in found)
-            log.error("the database is not that of the last run", reason=self.rolled_back)
+            log.error(
+                "the database was replaced or restored since the last run", reason=self.rolled_back
+            )
         news = [place for place in self.stored.damaged if place not in self._reported]
         news = news[: max(0, MAX_REPORTED - len(self._reported))]
         if news:

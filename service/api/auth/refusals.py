@@ -65,6 +65,9 @@ class Refusals:
         try:
             await asyncio.to_thread(self._audit.record, [entry])
         except StoreError as error:
-            log.error("refused request not recorded; the next entry counts it", reason=str(error))
+            log.error(
+                "a refused request cannot be written to the audit trail; the next entry will count it",
+                reason=str(error),
+            )
             return False
         return True

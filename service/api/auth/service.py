@@ -274,7 +274,7 @@ def _tried() -> Iterator[None]:
     try:
         yield
     except StoreError as error:
-        log.warning("the time of use of a session or key was not stored", reason=str(error))
+        log.warning("the last use of a session or key cannot be stored", reason=str(error))
 
 
 def tidy_name(name: str) -> str:

@@ -258,7 +258,10 @@ def _read(
     found = context.store.spectra.read(query)
     if found.damaged_ns:
         log.error(
-            "spectra are damaged", unit=query.unit, bearing=query.bearing, n=len(found.damaged_ns)
+            "stored spectra are damaged and left out",
+            unit=query.unit,
+            bearing=query.bearing,
+            n=len(found.damaged_ns),
         )
     shown = [each for each in found.spectra if each.resolution == found.spectra[-1].resolution]
     bin_hz, n_lines = shown[-1].resolution if shown else (0.0, 0)

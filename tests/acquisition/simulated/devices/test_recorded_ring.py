@@ -11,9 +11,11 @@ from rigs.modbus import transport_of
 
 from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
+from acquisition.modbus.ring_profile import RingLayout
 from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.simulated.devices.modbus_links import ModbusRtuServer, ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
+from acquisition.simulated.devices.ring_faults import ReadingWatch
 from acquisition.simulated.feed import FeedEndedError
 from core.samples.blocks import SampleBlock
 from core.samples.calibration import UnitCalibration
@@ -209,3 +211,41 @@ def test_a_feed_in_engineering_units_is_refused(counting_feed):
     feed = SimpleNamespace(advance=lambda _: replace(raw, counts=raw.counts.astype(np.float32)))
     with pytest.raises(ConfigError, match="must be int16 counts, got float32"):
         RingDevice(feed)
+
+
+LAYOUT = RingLayout(1, 10, 8, 600_000, 0, ring_address=100, slot_stride=40)
+LOOK = ()
+
+
+@pytest.mark.parametrize(
+    ("written_read_or_looked", "n_unread", "waiting"),
+    [
+        pytest.param([(0, 1, 2), LOOK, [0, 1]], 1, False, id="one is left"),
+        pytest.param([(0, 1, 2), LOOK, [0, 1], [2], LOOK], 0, True, id="read in order"),
+        pytest.param([(0, 1, 2), LOOK, [2], LOOK], 0, True, id="older ones are left out"),
+        pytest.param([(0,), LOOK, [0], (1, 2, 3), [3]], 3, False, id="the newest was not told of"),
+        pytest.param([(0, 1), LOOK, (2, 3), [1], LOOK], 2, False, id="those after the look"),
+        # read where the two slots before the first one would be, and the first one
+        pytest.param(
+            [(0,), LOOK, (1, 2, 3, 4, 5, 6), [6, 7, 0], LOOK], 6, False, id="places of older slots"
+        ),
+        pytest.param([(0, 1), LOOK, [0, 1], None, (0,), LOOK], 1, False, id="an empty ring"),
+    ],
+)
+def test_a_slot_is_read_when_a_reader_that_was_told_of_it_cannot_come_back_for_it(
+    written_read_or_looked, n_unread, waiting
+):
+    """Sequences in tuples are written, places in lists are read."""
+    watch = ReadingWatch(LAYOUT)
+    for done in written_read_or_looked:
+        if done is None:
+            watch.clear()
+        elif done == LOOK:
+            watch.note_look()
+        for number in done or ():
+            if isinstance(done, tuple):
+                watch.note_written(number)
+            else:
+                start = LAYOUT.slot_address(number)
+                watch.note_read(range(start, start + LAYOUT.slot_registers))
+    assert (watch.n_unread, watch.waiting) == (n_unread, waiting)
