@@ -13,7 +13,7 @@ from on_screen import (
     number_with,
 )
 from playwright.async_api import Browser, Page, expect
-from rigs.tiers import fast_and_long
+from rigs.tiers import first_fast
 
 SEGMENTS = {":unit": "U1", ":bearing": "UJB"}
 BEARING = "#/units/U1/bearings/UJB"
@@ -121,7 +121,7 @@ async def test_a_wrong_clock_of_the_browser_changes_no_time_on_a_page(plant, bro
     await context.close()
 
 
-@pytest.mark.parametrize("schemes", fast_and_long(("light", "dark"), ("dark", "light")))
+@pytest.mark.parametrize("schemes", first_fast(1, [("light", "dark"), ("dark", "light")]))
 async def test_no_page_shuts_anybody_out_in_light_or_in_dark(plant, page, schemes):
     pages = await addresses(page, plant.url)
     for number, address in enumerate(pages):

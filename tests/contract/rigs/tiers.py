@@ -26,11 +26,6 @@ def covering(*axes: Sequence[Any]) -> list[Any]:
     return [_row(axes, position, position in fast) for position in positions]
 
 
-def fast_and_long(fast: Any, long: Any) -> list[Any]:
-    """One value for the fast tier, and one for the long tier: numbers of seeds or repetitions."""
-    return [fast, pytest.param(long, marks=pytest.mark.long)]
-
-
 def first_fast(n: int, values: Iterable[Any]) -> list[Any]:
     """Values of a family: the first `n` for the fast tier, all others for the long tier."""
     long = pytest.mark.long

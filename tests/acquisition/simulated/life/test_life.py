@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rigs.tiers import fast_and_long
+from rigs.tiers import first_fast
 
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.life import live
@@ -17,7 +17,7 @@ from core.arrays import FloatArray
 from core.baseline.history import ReadingOutcome
 
 Life = Callable[..., UnitLife]
-SEEDS = (0, *fast_and_long(1, 2))
+SEEDS = (0, *first_fast(1, [1, 2]))
 
 
 @pytest.mark.long

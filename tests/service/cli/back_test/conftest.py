@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 import pytest
-from rigs.tiers import fast_and_long
+from rigs.tiers import first_fast
 
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.life import live
@@ -81,7 +81,7 @@ class TwoUnits:
     parquet: Path
 
 
-@pytest.fixture(scope="session", params=fast_and_long((90, 110, 0.45), (365, 400, 1.3)), ids=str)
+@pytest.fixture(scope="session", params=first_fast(1, [(90, 110, 0.45), (365, 400, 1.3)]), ids=str)
 def two_units(tmp_path_factory, request) -> Iterator[TwoUnits]:
     learning_days, damaged_day, years = request.param
     damaged_ns = START_NS + damaged_day * DAY_NS

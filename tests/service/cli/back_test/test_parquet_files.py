@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from rigs.tiers import fast_and_long
+from rigs.tiers import first_fast
 
 from service.cli.offline.backtest_cells import ReadingsError
 from service.cli.offline.backtest_files import read_histories
@@ -155,7 +155,7 @@ def test_texts_that_unpack_to_more_than_memory_end_the_reading_process_only(tmp_
     assert str(refused.value) == f"{path}: reading requires more than 3 GiB of memory"
 
 
-@pytest.mark.parametrize("n_seeds", fast_and_long(2, 16))
+@pytest.mark.parametrize("n_seeds", first_fast(1, [2, 16]))
 def test_a_damaged_file_is_read_or_refused_and_never_ends_the_program(written, n_seeds):
     path, random = written(), np.random.default_rng(0)
     whole = path.read_bytes()
