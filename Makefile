@@ -10,7 +10,7 @@ NPM_FOLDER := tests/browser/javascript
 AXE := $(NPM_FOLDER)/node_modules/axe-core/axe.min.js
 SPHINX := --fail-on-warning --keep-going --nitpicky --fresh-env
 
-WORKERS ?= 4
+WORKERS ?= 8
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 .PHONY: install develop run axe test test-long mutants check lint types contracts docs screenshots drawings bench fuzz accuracy torture soak \
