@@ -161,7 +161,7 @@ export function countWords(count) {
   if (danger) parts.push(`${danger} danger`);
   if (unseen) parts.push(`${unseen} unacknowledged`);
   if (!active && !unseen) parts.push("No alarms");
-  if (unjudged) parts.push(`${unjudged} not judged`);
+  if (unjudged) parts.push(`${unjudged} ${unjudged === 1 ? "alarm" : "alarms"} not judged`);
   const look = danger ? "danger" : active ? "alert" : "quiet";
   return [active || unseen || unjudged ? look : "normal", parts.join(", ")];
 }

@@ -59,7 +59,7 @@ async def test_an_alarm_is_acknowledged_shelved_and_unshelved_by_keys(plant, pag
     await expect(row.get_by_role("button", name="Shelve…")).to_be_focused()
     await expect(row.get_by_role("alert")).to_be_empty()
     await expect(page.locator(".alarms-head .actor")).to_contain_text("You act as A. Name.")
-    await expect(head).to_contain_text("1 alarm, 16 not judged")
+    await expect(head).to_contain_text("1 alarm, 16 alarms not judged")
 
     await page.keyboard.press("Enter")
     await expect(page.get_by_label("Why it is shelved")).to_be_focused()
