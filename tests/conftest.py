@@ -172,12 +172,6 @@ def stepped_clock() -> SteppedClock:
 
 
 @pytest.fixture
-def clock_of_its_own() -> Callable[[], SteppedClock]:
-    """Builds stepped clocks, for plants that live side by side."""
-    return SteppedClock
-
-
-@pytest.fixture
 def counting_feed() -> Callable[..., CountingFeed]:
     """Builds counting feeds; keywords as in `CountingFeed`."""
     return CountingFeed

@@ -123,13 +123,13 @@ def cases() -> list:
 
 @pytest.mark.parametrize(("kind", "make", "n_contents"), cases())
 async def test_no_wrong_reply_becomes_a_sample(
-    kind, make, n_contents, counting_feed, counts_calibration, clock_of_its_own
+    kind, make, n_contents, counting_feed, counts_calibration, stepped_clock
 ):
     n_trials = min(n_contents, N_AT_ONCE[kind.link])
     async with AsyncExitStack() as plant:
         trials = []
         for seed in range(n_trials):
-            rig = kind(counting_feed(), counts_calibration(), clock_of_its_own())
+            rig = kind(counting_feed(), counts_calibration(), type(stepped_clock)())
             trials.append(Trial(await plant.enter_async_context(rig), seed))
         await asyncio.gather(*(trial.lie(make, n_contents // n_trials) for trial in trials))
     assert sum(trial.n_told for trial in trials) >= n_contents

@@ -19,8 +19,6 @@ from acquisition.simulated.plant.rotor import (
     rotor_matrices,
     unbalance_force_n,
 )
-from benchmarks.accuracy_plant import machine
-from core.machine.channel import Measurand
 
 Life = Callable[..., UnitLife]
 
@@ -103,6 +101,3 @@ def test_a_lag_comes_63_percent_of_the_way_in_its_time_and_slower_when_it_is_slo
 
     assert followed[9] == pytest.approx(1.0 - np.exp(-1.0))
     assert followed[19] == pytest.approx(followed[9] * np.exp(-0.1))
-
-
-MACHINE = machine(Measurand.ACCELERATION_M_S2)

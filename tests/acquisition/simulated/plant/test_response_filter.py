@@ -1,7 +1,5 @@
 """Forces on a simulated machine, and the response and noise of its transducers."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 import scipy.signal
@@ -9,7 +7,6 @@ import scipy.signal
 from acquisition.errors import ConfigError
 from acquisition.simulated.plant.chain import AccelerometerNoise
 from acquisition.simulated.plant.excitation import (
-    Excitation,
     FollowedRotation,
     HydraulicForce,
     RopeForce,
@@ -113,14 +110,6 @@ def test_no_two_channels_share_their_noise():
 
 def rotation(turn_hz: float, speed_wander: float = 0.0) -> Rotation:
     return Rotation(np.random.default_rng(7), turn_hz, RATE_HZ, speed_wander)
-
-
-STREAMS: dict[str, Callable[[], Excitation]] = {
-    "unbalance": lambda: UnbalanceForce(1.0, rotation(1.538, 0.003)),
-    "rope": lambda: RopeForce(np.random.default_rng(1), 1.0, 0.385, 0.01, RATE_HZ),
-    "white": lambda: HydraulicForce(np.random.default_rng(2), 1.0, None, RATE_HZ),
-    "band": lambda: HydraulicForce(np.random.default_rng(3), 1.0, 20.0, RATE_HZ),
-}
 
 
 def test_unbalance_turns_forward_once_per_revolution_with_constant_force():

@@ -93,13 +93,6 @@ class Client:
         self.body = await self.reader.readexactly(length)
         return int(head.split()[1])
 
-    async def is_closed(self) -> bool:
-        """Wait for the end of the connection."""
-        try:
-            return await self.reader.read() == b""
-        except ConnectionError:
-            return True
-
 
 @dataclass
 class Running:
