@@ -314,7 +314,6 @@ def test_a_latched_loss_outlasts_the_healthy_verdict(unit):
     assert alarms.alarm(FILM).level is AlarmLevel.ALERT
 
 
-VECTOR_ALERT = AlarmLevel.ALERT
 VECTOR_LIMITS = Limits(30.0, 60.0, 2.0)
 NO_PHASE = missing(Reason.NOT_MEASURED)
 WELL = VectorReference("U1", "UJB", OperatingState.FULL_LOAD, {"shaft_x": OrderVector(60.0, 10.0)})
@@ -342,7 +341,7 @@ def test_a_vector_that_turns_either_way_is_noticed_though_its_length_stays():
     found = judged(readings(60.0, 70.0), WELL, None)
 
     assert found.value == pytest.approx(60.0)  # 60° of an equilateral triangle
-    assert found.level is VECTOR_ALERT
+    assert found.level is ALERT
     assert found.reason == "above_limit"
     almost = judged(readings(60.0, 350.0), WELL, None)
 
@@ -350,9 +349,7 @@ def test_a_vector_that_turns_either_way_is_noticed_though_its_length_stays():
 
 
 @pytest.mark.parametrize("reference", [WELL, LENGTH])
-@pytest.mark.parametrize(
-    ("amplitude", "level"), [(80.0, None), (95.0, VECTOR_ALERT), (25.0, VECTOR_ALERT)]
-)
+@pytest.mark.parametrize(("amplitude", "level"), [(80.0, None), (95.0, ALERT), (25.0, ALERT)])
 def test_without_a_phase_only_the_length_counts_and_that_is_said(reference, amplitude, level):
     found = judged(readings(amplitude, NO_PHASE), reference, None)
 
@@ -361,12 +358,12 @@ def test_without_a_phase_only_the_length_counts_and_that_is_said(reference, ampl
 
 
 def test_without_a_reference_or_its_phase_nothing_is_known_and_standstill_suppresses():
-    found = judged(readings(60.0, NO_PHASE), WELL, VECTOR_ALERT)
+    found = judged(readings(60.0, NO_PHASE), WELL, ALERT)
 
     assert (found.is_known, found.reason) == (False, "no_phase")
 
     standing = readings(missing(Reason.STANDSTILL), NO_PHASE)
-    found = judged(standing, WELL, VECTOR_ALERT)
+    found = judged(standing, WELL, ALERT)
 
     assert (found.is_known, found.suppressed_by) == (False, "standstill")
 
