@@ -66,7 +66,7 @@ class Refusals:
             await asyncio.to_thread(self._audit.record, [entry])
         except StoreError as error:
             log.error(
-                "a refused request cannot be written to the audit trail; the next entry will count it",
+                "a refused request cannot be audited; the next entry will count it",
                 reason=str(error),
             )
             return False
