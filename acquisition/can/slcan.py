@@ -110,7 +110,7 @@ class SlcanBus(slcanBus):
         ):
             if speed is not None and speed not in known:
                 words = ", ".join(str(n) for n in known if n)
-                raise ConfigError(f"slcan: {name} is {speed} bit/s, allowed are {words}")
+                raise ConfigError(f"slcan: {name} must be one of {words} bit/s, got {speed}")
 
     def shutdown(self) -> None:
         """Close the adapter's channel and the port, even if the adapter is gone."""

@@ -78,9 +78,10 @@ class DynamicStiffness:
         Coefficients (k_i1, k_i2, c_i1, c_i2) of the rows x and y, the directions of the force; N/m
         and N·s/m. They apply at 1× if the film depends on frequency.
     covariance : (2, 4, 4)
-        Random covariance of the coefficients of each row.
+        Covariance of the random errors of the coefficients of each row.
     model : (2, 4)
-        Half-width of the error of the coefficients because the film depends on frequency.
+        Half-widths of the uniform systematic errors of the coefficients, due to a film that
+        depends on frequency.
     changes : (4, 2, 4)
         Change of the coefficients per unit of relative stiffness, mass in kg and damping in N·s/m
         of the bracket, and delay of the bearing channels in s.

@@ -135,7 +135,11 @@ class FilmInputs:
         return CORRELATED_LINES / (2.0 * self.n_segments)
 
     def terms(self, deviation: FloatArray) -> FilmTerms:
-        """Return the terms of films with a `deviation` (n, 1 or 2) of the lag from its prior."""
+        """Return the terms of films whose lag deviates from the mean of its prior.
+
+        `deviation` is in standard deviations of the prior, (n, 1) for both rows of a film, or
+        (n, 2) for each row.
+        """
         lines = self.lines
         shape, slope = tilt_lag(lines.omega, self.turn_rad_s, deviation)
         functions = np.empty((*shape.shape[:2], 4, shape.shape[2]), dtype=np.complex128)

@@ -60,13 +60,13 @@ def _names(plant: PlantFile) -> list[str]:
 def access_desk(
     plant: PlantFile, store: AccessStore, clock: Clock, is_demo: bool = False
 ) -> Authenticator:
-    """Return the authenticator of requests; log an error if the accounts were replaced.
+    """Return the authenticator of requests; log an error if its database may not be the newest.
 
     With `is_demo`, local clients have the admin role without a login.
     """
     if (difference := store.accept(clock.now_ns())) is not None:
         log.error(
-            "the database of accounts was replaced or restored since the last run",
+            "the database of accounts may not be the newest; check accounts, logins and API keys",
             reason=difference,
         )
     service, access = plant.service, plant.access

@@ -342,7 +342,8 @@ def _read(adapter: TypeAdapter[T], head: bytes) -> T:
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(str(part) for part in first["loc"])
-        message = f"a message with an invalid head: {where}: {first['msg']}"
+        words = f"{where}: {first['msg']}" if where else first["msg"]
+        message = f"a message with an invalid head: {words}; {SENDER}"
         raise WireError("not_understood", message) from None
 
 
@@ -350,5 +351,5 @@ def _require_own(unit: str, identity: UnitIdentity) -> None:
     if unit != identity.unit:
         raise WireError(
             "other_unit",
-            f"a message of unit {unit} in the subject of unit {identity.unit}; {SENDER}",
+            f"a message of unit {unit} on the subject of unit {identity.unit}; {SENDER}",
         )

@@ -94,7 +94,8 @@ class IntegrityMonitor:
         if found:
             self.rolled_back = "; ".join(finding.detail for finding in found)
             log.error(
-                "the database was replaced or restored since the last run", reason=self.rolled_back
+                "the database may not be the newest; results and alarms may be missing",
+                reason=self.rolled_back,
             )
         news = [place for place in self.stored.damaged if place not in self._reported]
         news = news[: max(0, MAX_REPORTED - len(self._reported))]

@@ -65,7 +65,7 @@ def places(root: Path, unit: str | None = None) -> list[Place]:
 
 
 def note_beginning(root: Path, now_ns: int) -> None:
-    """Write the time since which evidence is kept, ns since 1970 UTC, unless it is written.
+    """Write `now_ns`, ns since 1970 UTC, as the time since which evidence is kept, if none is yet.
 
     Raises `OSError` if the file or its folder cannot be written.
     """

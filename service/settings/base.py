@@ -28,7 +28,10 @@ class MisfitError(ValueError):
 
 
 class MissingError(MisfitError):
-    """Validation error: a key is missing that other keys require; ``at`` ends with the key."""
+    """Validation error: a key is missing that other keys require; ``at`` ends with the key.
+
+    The message begins with "is missing".
+    """
 
 
 class SecretMisfitError(MisfitError):

@@ -6,7 +6,7 @@ from pydantic import Field, StringConstraints, model_validator
 
 from core.machine.unit import PREFERENCE, Estimator
 from service.settings.alarms import BearingAlarmSettings
-from service.settings.base import Identifier, MisfitError, Settings
+from service.settings.base import Identifier, MisfitError, MissingError, Settings
 
 MicrometrePair = tuple[
     Annotated[float, Field(gt=0.0, le=10_000.0)], Annotated[float, Field(gt=0.0, le=10_000.0)]
@@ -151,12 +151,11 @@ class BearingSettings(Settings):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        probes = (self.opposite_x, self.opposite_y)
-        if any(probes) != (self.opposite_reference_um is not None):
-            raise MisfitError(
-                "must be given if opposite_x or opposite_y is given, and only then",
-                "opposite_reference_um",
-            )
+        has_probes, key = bool(self.opposite_x or self.opposite_y), "opposite_reference_um"
+        if has_probes and self.opposite_reference_um is None:
+            raise MissingError("is missing; opposite_x and opposite_y require it", key)
+        if not has_probes and self.opposite_reference_um is not None:
+            raise MisfitError("applies only with opposite_x or opposite_y; remove it", key)
         if self.bracket_stiffness_n_per_m is None:
             for key in OF_KNOWN_BRACKETS & self.model_fields_set:
                 raise MisfitError("applies only with bracket_stiffness_n_per_m; remove it", key)

@@ -248,7 +248,7 @@ class ChannelSettings(Settings):
                 words = " or ".join(f'"{name}"' for name in SHAFT_TRANSDUCERS)
                 raise MisfitError(f"applies only to transducer {words}, not {self.transducer}", key)
         if self.slow_roll is not None and self.probe is None:
-            raise MisfitError("is required with slow_roll, which applies to one probe", "probe")
+            raise MissingError("is missing; slow_roll applies to one probe", "probe")
 
     def _check_sensitivity(self) -> None:
         allowed, low, high = SENSITIVITIES[self.transducer]

@@ -135,7 +135,9 @@ def sentence(
         if isinstance(error["ctx"]["error"], SecretMisfitError):
             return f"{key}: {error['ctx']['error']}"
         return f"{shown if found else f'{key} (by default)'}: {error['ctx']['error']}"
-    if not found:
+    if is_missing:
+        problem = f"{key} {error['ctx']['error']}"
+    elif not found:
         problem = f"{key} is missing"
     elif error["type"] == "union_tag_invalid":
         problem = f"{shown}: must be {error['ctx']['expected_tags'].replace(', ', ' or ')}"

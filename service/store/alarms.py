@@ -199,7 +199,7 @@ def _alarm(row: tuple[Any, ...]) -> Alarm:
         )
     except ValueError as error:
         raise StoreError(
-            f"stored alarm {found['id']} is invalid: {error}; restore a backup"
+            f"stored alarm {found['id']} is invalid ({error}); restore a backup"
         ) from error
 
 
@@ -224,7 +224,7 @@ def _event(row: tuple[Any, ...]) -> AlarmEvent:
         )
     except ValueError as error:
         name = f"stored event {found['number']} of alarm {found['alarm']}"
-        raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
+        raise StoreError(f"{name} is invalid ({error}); restore a backup") from error
 
 
 def _identity(found: dict[str, Any]) -> AlarmIdentity:

@@ -171,7 +171,7 @@ class BaselineTables(AuditedTables):
             return None if found is None else from_json(BearingBaseline, found[0])
         except ValueError as error:
             name = f"baseline {version} of unit {unit} bearing {bearing}"
-            raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
+            raise StoreError(f"{name} is invalid ({error}); restore a backup") from error
 
     def add_steps(self, steps: Sequence[StoredStep]) -> None:
         """Write baseline steps; writing the same steps again has no effect."""
@@ -196,7 +196,7 @@ class BaselineTables(AuditedTables):
         try:
             return {unit: from_json(ShaftResponse, document) for unit, document in rows}
         except ValueError as error:
-            raise StoreError(f"a shaft response is invalid: {error}; restore a backup") from error
+            raise StoreError(f"a shaft response is invalid ({error}); restore a backup") from error
 
     def _add_steps(self, writer: Connection, steps: Sequence[StoredStep]) -> None:
         self._audit.add(writer, _actions(writer, steps))

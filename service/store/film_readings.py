@@ -223,7 +223,7 @@ def select_decisions(reader: Connection, unit: str, bearing: str) -> list[Stored
         }
     except ValueError as error:
         name = f"stored decision of unit {unit} bearing {bearing}"
-        raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
+        raise StoreError(f"{name} is invalid ({error}); restore a backup") from error
     return [found[name] for name in QUANTITIES if name in found]
 
 

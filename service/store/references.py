@@ -213,7 +213,7 @@ class GapReferenceStore(_References[GapReference]):
             return GapReference(unit, bearing, set_ns, author, *gaps, ReferenceSource(source), note)
         except ValueError as error:
             name = f"stored gap reference of unit {unit} bearing {bearing}"
-            raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
+            raise StoreError(f"{name} is invalid ({error}); restore a backup") from error
 
     def _object(self, reference: GapReference) -> str:
         return f"{reference.unit}:{reference.bearing}"
@@ -245,7 +245,7 @@ class VectorReferenceStore(_References[SetVectorReference]):
             reference = VectorReference(unit, bearing, OperatingState(state), found)
         except (ValueError, TypeError) as error:
             name = f"stored 1× reference of unit {unit} bearing {bearing}"
-            raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
+            raise StoreError(f"{name} is invalid ({error}); restore a backup") from error
         return SetVectorReference(reference, set_ns, author, note)
 
     def _object(self, reference: SetVectorReference) -> str:

@@ -126,5 +126,5 @@ def _file(row: tuple[Any, ...]) -> WaveformFile:
         found |= {"kind": WaveformKind(found["kind"]), "state": WaveformState(found["state"])}
     except ValueError as error:
         name = f"index entry of recording {found['name']}"
-        raise StoreError(f"{name} is invalid: {error}; restore a backup") from error
+        raise StoreError(f"{name} is invalid ({error}); restore a backup") from error
     return WaveformFile(**found)

@@ -195,7 +195,9 @@ def _times_of(
         values = _numbers(times.values, start, stop, place)
         if axis.form == "timestamp":
             return values.astype(np.int64)
-        return numbers_to_ns(values, axis, axis.start_ns or file.start_ns)
+        return numbers_to_ns(
+            values, axis, file.start_ns if axis.start_ns is None else axis.start_ns
+        )
 
     return times_ns
 

@@ -38,7 +38,7 @@ def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None
     if origin == "epoch":
         start_ns = -axis.utc_offset_s * 1_000_000_000
     if start_ns is None:
-        raise ConfigError("the file states no start of its elapsed times; add it to the mapping")
+        raise ConfigError("the elapsed times have no origin; set start under [time] in the mapping")
     return utc_ns(_whole_us(values, _US_PER[unit]), start_ns)
 
 

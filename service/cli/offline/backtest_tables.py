@@ -193,7 +193,9 @@ def _batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
             if len(batch):
                 yield converted(pa.Table.from_batches([batch]), row, "row"), size * n_read // n_rows
         if n_read != n_rows:
-            raise ReadingsError(f"damaged Parquet file: {n_read} rows, but {n_rows} by its footer")
+            raise ReadingsError(
+                f"damaged Parquet file: it has {n_read} rows, but its footer states {n_rows}"
+            )
 
 
 MEMORY_BYTES = 3 * 2**30

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AwareDatetime, Field, StringConstraints, model_validator
 
-from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
+from service.settings.base import Identifier, MisfitError, MissingError, Settings, refuse_twice
 
 ColumnName = Annotated[str, StringConstraints(min_length=1, max_length=500)]
 GroupName = Annotated[str, StringConstraints(max_length=500)]
@@ -156,12 +156,16 @@ class ImportMapping(Settings):
         if time.source == "file" and self.format in IN_UTC and time.zone != "UTC":
             raise MisfitError(f'must be "UTC" for {self.format}, which stores UTC', "time", "zone")
         for key in ("column", "form"):
-            if (getattr(time, key) is None) == (time.source == "column"):
-                words = "is required with" if time.source == "column" else "applies only with"
-                raise MisfitError(f'{words} source "column"', "time", key)
+            is_given, is_needed = getattr(time, key) is not None, time.source == "column"
+            if is_needed and not is_given:
+                raise MissingError('is missing; source "column" requires it', "time", key)
+            if is_given and not is_needed:
+                raise MisfitError('applies only to source "column"; remove it', "time", key)
         self._check_form()
         if not time.zone and time.start is None:
-            raise MisfitError('is required: "UTC", or an offset such as "-03:00"', "time", "zone")
+            raise MissingError(
+                'is missing; give "UTC" or an offset such as "-03:00"', "time", "zone"
+            )
 
     def _check_form(self) -> None:
         form, start = self.time.form or "", self.time.start
@@ -172,17 +176,17 @@ class ImportMapping(Settings):
         has_start = self.format == "mdf4"
         needs = self.time.source == "start" or (form.startswith("elapsed") and not has_start)
         if needs and start is None:
-            raise MisfitError("is required as the origin of the times", "time", "start")
+            raise MissingError("is missing; it is the origin of the times", "time", "start")
         allowed = needs or form.startswith("elapsed")
         if start is not None and not allowed:
             raise MisfitError("does not apply to absolute times; remove it", "time", "start")
 
     def _check_channels(self) -> None:
-        if (self.format in CAN_LOGS) == bool(self.channel):
+        if self.channel and self.format in CAN_LOGS:
             words = f"comes from the DBC file for {self.format}; remove it"
-            raise MisfitError(
-                words if self.channel else f"is required for {self.format}", "channel"
-            )
+            raise MisfitError(words, "channel")
+        if not self.channel and self.format not in CAN_LOGS:
+            raise MissingError(f"is missing; format {self.format} requires it", "channel")
         refuse_twice(("channel", n, "id", c.id) for n, c in enumerate(self.channel))
         refuse_twice(("slow_channel", n, "id", c.id) for n, c in enumerate(self.slow_channel))
         if self.format not in WITH_GROUPS:

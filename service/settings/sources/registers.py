@@ -11,7 +11,7 @@ from acquisition.modbus.cells import FLOATS, INTEGERS, N_BYTES, ByteOrder, Cell,
 from acquisition.modbus.register_map import FlagCheck, FullScale, MapValue, Meaning, ScaleRegister
 from acquisition.modbus.requests import ADDRESS_SPACE, REGISTER_FUNCTIONS
 from core.spectra.polls import AMPLITUDE_PARTS, VectorPart, VectorRow
-from service.settings.base import Identifier, MisfitError, Settings
+from service.settings.base import Identifier, MisfitError, MissingError, Settings
 
 Function = Literal[1, 2, 3, 4]
 Address = Annotated[int, Field(ge=0, le=465_535)]
@@ -248,11 +248,12 @@ class MapDefaults:
         if not in_register and not is_bit:
             words = 'must be "bit" for functions 1 and 2, which read single bits'
             raise MisfitError(words, *at, "type")
-        if (cell.bit is not None) != (is_bit and in_register):
-            raise MisfitError(
-                'must be given for type "bit" with function 3 or 4, and not given otherwise',
-                *(*at, "bit"),
-            )
+        if cell.bit is None and is_bit and in_register:
+            words = 'is missing; type "bit" with function 3 or 4 requires it'
+            raise MissingError(words, *at, "bit")
+        if cell.bit is not None and not (is_bit and in_register):
+            words = 'applies only to type "bit" with function 3 or 4; remove it'
+            raise MisfitError(words, *at, "bit")
         self.require_in_space(cell.address, cell.n_places, *at)
         return cell
 

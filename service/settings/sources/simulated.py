@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AwareDatetime, Field, model_validator
 
-from service.settings.base import MisfitError, Settings, refuse_twice
+from service.settings.base import MisfitError, MissingError, Settings, refuse_twice
 
 
 class SimulatedDamageSettings(Settings):
@@ -173,6 +173,6 @@ class SimulationSettings(SimulatedLifeSettings):
                 )
         for key in NEEDED if self.life_seed is None else ():
             if key not in self.model_fields_set:
-                raise MisfitError("is required without life_seed", key)
+                raise MissingError("is missing; it is required without life_seed", key)
         refuse_twice(("bearing", n, "bearing", b.bearing) for n, b in enumerate(self.bearing))
         return self

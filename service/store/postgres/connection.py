@@ -316,7 +316,8 @@ def renamed(where: str) -> Iterator[None]:
         kind = RefusedRowError if isinstance(error, OF_THE_ROW) else StoreError
         raise kind(sentence(where, error)) from error
     except UnicodeEncodeError as error:
-        raise RefusedRowError(f"{where}: {error}") from error
+        text = f"the text {error.object[:60]!a} has characters that UTF-8 cannot store"
+        raise RefusedRowError(f"{where}: {text}") from error
     except OSError as error:
         raise StoreError(f"{where}: {error}") from error
 

@@ -193,7 +193,7 @@ def test_what_is_exported_can_be_imported_again(folder, plant_path, unit, tmp_pa
     [
         ('unit = "um"', 'unit = "mm/s"', 1, "ujb_shaft_x: unit 'mm/s' cannot be converted to gap"),
         ("ujb_shaft_x", "ujb_shaft_z", 1, "ujb_shaft_z is mapped, but unit U1 has only ujb_shaft"),
-        ('zone = "UTC"', "", 2, "time.zone (by default): is required"),
+        ('zone = "UTC"', "", 2, "time.zone is missing; give"),
         (
             'unit = "r/min"',
             'unit = "degF"',

@@ -68,14 +68,14 @@ def test_a_start_needs_no_time_zone_beside_its_own(tmp_path):
 
 FORMAT, UNIT = 'format = "csv"', 'unit = "um"'
 WRONG_CSV = [
-    ('zone = "-03:00"\n', "", ":3: time.zone: is required: "),
+    ('zone = "-03:00"\n', "", ":3: time.zone is missing; give "),
     ('"-03:00"', '"CET"', ":7: time.zone = 'CET': String should match pattern"),
     ('"-03:00"', '"-15:00"', "time.zone = '-15:00': String should match"),
     (FORMAT, 'format = "wav"', ":1: format = 'wav': Input should be 'mdf4'"),
     (FORMAT, 'format = "tdms"', ":6: time.form = 'iso8601': applies only to csv, not to tdms"),
     ('"column"\n', '"file"\n', ':4: time.source = \'file\': must be "column" or "start" for csv'),
-    ('form = "iso8601"\n', "", 'time.form: is required with source "column"'),
-    ("iso8601", "elapsed_s", "time.start: is required as the origin of the times"),
+    ('form = "iso8601"\n', "", 'time.form is missing; source "column" req'),
+    ("iso8601", "elapsed_s", "time.start is missing; it is the origin of the times"),
     ("iso8601", "timestamp", "time.form = 'timestamp': applies only to tdms, not to csv"),
     ("zone = ", "start = 2026-01-01\nzone = ", "time.start"),
     ("zone = ", "start = 2026-01-01T00:00:00\nzone = ", "time.start"),
@@ -84,7 +84,7 @@ WRONG_CSV = [
     (UNIT, "unit = 3", ":12: channel[1].unit = 3: Input should be a valid string"),
     (UNIT, f'{UNIT}\ngroup = "a"', ":13: channel[1].group: csv has no groups"),
     (UNIT, f"{UNIT}\ngain = 2", ":13: channel[1].gain = 2: unknown key"),
-    (CSV[CSV.index("[[channel]]") :], "", "channel: is required for csv"),
+    (CSV[CSV.index("[[channel]]") :], "", "channel is missing; format csv"),
     ("[[channel]]", CSV[CSV.index("[[channel]]") :] + "[[channel]]", "is used twice"),
 ]
 WRONG_MDF = [
@@ -92,7 +92,7 @@ WRONG_MDF = [
     ("[time]", 'bus = "can0"\n[time]', ":3: bus = 'can0': applies only to CAN logs, not to mdf4"),
     ("mdf4", "tdms", ":5: time.zone = '-03:00': must be \"UTC\" for tdms"),
     ("mdf4", "candump", 'must be "UTC" for candump'),
-    ('source = "file"', 'source = "start"', "time.start: is required"),
+    ('source = "file"', 'source = "start"', "time.start is missing"),
 ]
 
 
@@ -172,7 +172,7 @@ BEHIND = [
     ('detector = "pp"', "value[2].detector"),
     ('quantity = "order1_amplitude"', 'value[2].detector: must be "pk", "pp" or "rms"'),
     ('quantity = "order1_phase"', 'value[2].phase: must be "lag" or "lead"'),
-    ("bit = 3", "value[2].bit: must be given for type"),
+    ("bit = 3", "value[2].bit = 3: applies only to type"),
     ("invalid_values = [0.5]", "value[2].invalid_values: must be integers of 16 b"),
     ("scale_register = { address = 25 }", "scale_register: must be read in the same request"),
     ("full_scale = { minimum = 0.0 }", "value[2].full_scale.maximum: exactly one of maximum and"),
@@ -189,7 +189,7 @@ BEHIND = [
     (FLAG + "ok_values = [0, 16]\nmask = 0x00F0", "ok_values: must be within the mask, 0 to 15"),
     (FLAG + "ok_values = [0]\nclipped_values = [-1]", "0 to 65535, got -1"),
     ("function = 1", 'value[2].type: must be "bit" for functions 1 and 2'),
-    ("type = 'bit'", "value[2].bit: must be given for type"),
+    ("type = 'bit'", "value[2].bit is missing; type"),
     ("scale_register = { address = 21, divisor = 0.0 }", "scale_register.divisor"),
     ("full_scale = { minimum = 1.0, maximum = 1.0 }", "full_scale.minimum: must differ"),
     (

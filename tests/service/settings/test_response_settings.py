@@ -238,7 +238,7 @@ ROLL = f"{CHANNEL_1}slow_roll."
         ("taken = 2026-03-01T10:00:00Z, ", "", f"{ROLL}taken is missing", "offset"),
         (', probe = "SN123" }', " }", f"{ROLL}probe is missing", "another probe"),
         (', probe = "SN123" }', ', probe = "" }', f"{ROLL}probe = ''", "1 char"),
-        (SHAFT_X + 'probe = "SN123"\n', SHAFT_X, f"{CHANNEL_1}probe (by default)", "slow_roll"),
+        (SHAFT_X + 'probe = "SN123"\n', SHAFT_X, f"{CHANNEL_1}probe is missing", "slow_roll"),
         ("sensitivity = 4.0\n", "", f"{CHANNEL_1}sensitivity (by default)", "0.5 to 50 V/mm"),
         ('sensitivity_unit = "V/mm"\n', "", f"{CHANNEL_1}sensitivity_unit (by", '"V/mm" or "mV/'),
     ],

@@ -120,7 +120,7 @@ def test_a_reference_that_makes_no_sense_is_an_error_of_the_store(store):
             " source, note FROM gap_reference"
         )
 
-    with pytest.raises(StoreError, match="unit U1 bearing UJB is invalid: author is empty"):
+    with pytest.raises(StoreError, match="unit U1 bearing UJB is invalid \\(author is empty"):
         store.gap_references.in_force()
 
 
