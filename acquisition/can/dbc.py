@@ -163,6 +163,6 @@ def _refuse_wide_ranges(text: str, path: Path) -> None:
     )
     if n_values > _MAX_MULTIPLEXER_VALUES:
         raise ConfigError(
-            f"{path}: the ranges of SG_MUL_VAL_ have {n_values} values, allowed are at most"
-            f" {_MAX_MULTIPLEXER_VALUES}; remove the values that no frame has"
+            f"{path}: the ranges of SG_MUL_VAL_ must have at most {_MAX_MULTIPLEXER_VALUES}"
+            f" values, got {n_values}; remove values that no frame has"
         )

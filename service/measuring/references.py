@@ -96,10 +96,11 @@ def _check_age(time_ns: int, now_ns: int) -> None:
 def _usable(newest: StoredReadings, name: str) -> float:
     reading = newest.readings.get(name)
     if reading is None:
-        raise ReferenceRefusedError(f"the newest stored result has no {name}")
+        raise ReferenceRefusedError(f"the newest stored result has no {name}; give the gaps")
     if reading.value is None:
         raise ReferenceRefusedError(
-            f"{name} of the newest stored result has no value: {reading.quality.reason}"
+            f"{name} of the newest stored result has no value"
+            f" ({reading.quality.reason}); wait for another result or give the gaps"
         )
     return reading.value
 

@@ -83,7 +83,7 @@ def _require_ours(connection: sqlite3.Connection, path: Path, origin: Origin | N
     schema = _number(connection, "user_version")
     if schema > len(MIGRATIONS):
         raise BackupError(
-            f"{path} has schema {schema}; this padwatch supports up to {len(MIGRATIONS)};"
+            f"{path} has schema version {schema}; this padwatch supports up to {len(MIGRATIONS)};"
             " use the padwatch that wrote it, or a newer one"
         )
 

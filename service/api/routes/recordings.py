@@ -256,7 +256,7 @@ async def _download(
 def library_of(context: Context) -> RecordingLibrary:
     """Return the library of recordings; raise a problem of status 404 if this process has none."""
     if context.recordings is None:
-        words = "this process has no recordings; request them from the one that analyses the unit"
+        words = "this process has no recordings; ask the process that analyses the unit"
         raise ProblemError(404, "No recordings", words)
     return RecordingLibrary(context.recordings, context.plant().faults)
 

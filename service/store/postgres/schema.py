@@ -151,7 +151,7 @@ def migrate(session: Session, where: str, origin: Origin) -> None:
         newest = len(schema.MIGRATIONS)
         if before > newest:
             raise StoreError(
-                f"{where} has schema {before}; this padwatch supports up to {newest};"
+                f"{where} has schema version {before}; this padwatch supports up to {newest};"
                 " run the padwatch that wrote it, or restore a backup"
             )
         for number in range(before + 1, newest + 1):

@@ -42,7 +42,7 @@ def migrate(connection: sqlite3.Connection, name: str, origin: Origin | None = O
         raise StoreError(f"{name} is not a padwatch database; choose another data folder")
     if version > len(schema.MIGRATIONS):
         raise StoreError(
-            f"{name} has schema {version}; this padwatch supports up to {len(schema.MIGRATIONS)};"
+            f"{name} has schema version {version}; this padwatch supports up to {len(schema.MIGRATIONS)};"
             " run the padwatch that wrote it, or restore a backup"
         )
     numbers = range(len(schema.MIGRATIONS))

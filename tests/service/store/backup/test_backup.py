@@ -203,7 +203,7 @@ def spoil(copy: Path, *statements: str) -> None:
 SPOILT: dict[str, tuple[Callable[[Path], None], str]] = {
     "newer": (
         lambda copy: spoil(copy, f"PRAGMA user_version = {len(MIGRATIONS) + 1}"),
-        f"has schema {len(MIGRATIONS) + 1}; this padwatch supports up to {len(MIGRATIONS)}",
+        f"has schema version {len(MIGRATIONS) + 1}; this padwatch supports up to {len(MIGRATIONS)}",
     ),
     "a replay's": (
         lambda copy: spoil(copy, f"PRAGMA application_id = {APPLICATION_IDS[Origin.REPLAY]}"),
