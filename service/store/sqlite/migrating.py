@@ -42,8 +42,8 @@ def migrate(connection: sqlite3.Connection, name: str, origin: Origin | None = O
         raise StoreError(f"{name} is not a padwatch database; choose another data folder")
     if version > len(schema.MIGRATIONS):
         raise StoreError(
-            f"{name} has schema version {version}; this padwatch supports up to {len(schema.MIGRATIONS)};"
-            " run the padwatch that wrote it, or restore a backup"
+            f"{name} has schema version {version}; this padwatch supports up to"
+            f" {len(schema.MIGRATIONS)}; run the padwatch that wrote it, or restore a backup"
         )
     numbers = range(len(schema.MIGRATIONS))
     scripts = [schema.migration_of(number, is_access=origin is None) for number in numbers]
