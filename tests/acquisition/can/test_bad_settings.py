@@ -180,7 +180,7 @@ def test_an_unused_message_may_be_multiplexed_twice_over_but_not_by_billions_of_
     compiled(dbc, X)
     ranges = NESTED_RANGES.replace("1-1", "1-1, 3-4000000000")
     dbc.write_text(DBC + NESTED + ranges, encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"have 3999999997 values, .* at most 100000"):
+    with pytest.raises(ConfigError, match=r"at most 100000 values, got 3999999997"):
         compiled(dbc, X)
 
 
