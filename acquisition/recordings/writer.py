@@ -179,8 +179,8 @@ class RecordingWriter:
             expected.channels,
         ) or any(known.get(channel.id) != channel for channel in own.slow):
             raise ConfigError(
-                f"the samples of unit {own.unit} from index {block.first_index} on have another"
-                " calibration than the recording; begin a new recording"
+                f"the samples of unit {own.unit} from index {block.first_index} on differ"
+                " from the recording in rate or calibration; begin a new recording"
             )
         if block.counts.dtype.name != self.unit.sample_type:
             raise ConfigError(

@@ -73,9 +73,11 @@ def fault_after_segment(
 def film_judgement(found: Mapping[str, Judgement], held: Judgement) -> Judgement:
     """Return the judgement of a film, combined from the judgements `found` of directions x and y.
 
-    Value, limit and reason are those of the direction with the highest level or, at equal levels,
-    the largest change. While a direction that exceeded its limit in `held`, the last judgement of
-    the film, is unknown, the level does not decrease.
+    `held` is the last judgement of the film. If a known direction exceeds its limit, value, limit
+    and reason are those of the known direction with the highest level or, at equal levels, the
+    largest change; the level is not below that of `held` while a direction of `held` is unknown.
+    If none does, the result is unknown while a direction of `held` is unknown or, if `held` has no
+    level, while any direction is unknown.
     """
     known = {axis: each for axis, each in found.items() if each.is_known}
     unjudged = [each for axis, each in found.items() if axis not in known]

@@ -153,11 +153,16 @@ def _film(k_n_per_m: FloatArray, c_n_s_per_m: FloatArray, lags: tuple[TiltLag, .
 
 
 class PadLaw(NamedTuple):
-    """Film of one pivoted pad whose thickness at the pivot is h.
+    """Film of one pivoted pad: coefficients of polynomials in ln(h / 400 µm), in ascending powers.
 
-    Polynomials in ln(h / 400 µm), of ascending powers, for unit viscosity and angular velocity: the
-    logarithms of stiffness and damping at the running speed times (h / 400 µm)³, the size of
-    `TiltLag` over stiffness, and the angle in rad by which the shaft turns during its lag.
+    h is the film thickness at the pivot; viscosity and angular velocity ω are 1.
+
+    Parameters
+    ----------
+    stiffness, damping
+        Polynomials of ln(k (h / 400 µm)³) and ln(ω c (h / 400 µm)³).
+    lagging, turn_rad
+        Polynomials of the size of `TiltLag` over k, and of the turn of the shaft during the lag.
     """
 
     stiffness: tuple[float, ...]

@@ -180,13 +180,12 @@ class ValueSettings(CellSettings):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        has_detector = self.quantity in AMPLITUDE_PARTS
-        if (self.detector is not None) != has_detector:
-            words = 'must be "pk", "pp" or "rms" for an amplitude, and not given otherwise'
-            raise MisfitError(words, "detector")
-        if (self.phase is not None) != (self.quantity == VectorPart.ORDER1_PHASE):
-            words = 'must be "lag" or "lead" for a phase, and not given otherwise'
-            raise MisfitError(words, "phase")
+        for key, parts in (("detector", AMPLITUDE_PARTS), ("phase", {VectorPart.ORDER1_PHASE})):
+            is_given, is_needed = getattr(self, key) is not None, self.quantity in parts
+            if is_needed and not is_given:
+                raise MissingError(f"is missing; quantity {self.quantity} requires it", key)
+            if is_given and not is_needed:
+                raise MisfitError(f"applies only to quantity {' or '.join(parts)}; remove it", key)
         if self.scale_register is not None and self.full_scale is not None:
             words = "cannot be combined with full_scale; remove one of them"
             raise MisfitError(words, "scale_register")

@@ -165,8 +165,8 @@ class Writer:
         if outcome == "aborted":
             raise StoreError(sentence(self._where, lost))
         raise StoreError(
-            f"{self._where}: the connection was lost during a commit whose outcome is unknown;"
-            " the results are written again"
+            f"{self._where}: the connection was lost during a commit; it is unknown whether the"
+            " transaction is stored"
         )
 
     def _outcome(self, number: str) -> str | None:

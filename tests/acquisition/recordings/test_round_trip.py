@@ -250,7 +250,7 @@ def test_another_unit_or_calibration_is_refused(tmp_path, unit, numbered):
         {"channels": gains},
     ):
         with (
-            pytest.raises(ConfigError, match="another calibration"),
+            pytest.raises(ConfigError, match="in rate or calibration"),
             RecordingWriter(tmp_path / "run", unit.model_copy(update=change), "x") as recorder,
         ):
             recorder.write(block)

@@ -170,8 +170,8 @@ CALENDAR = f'[time]\nkind = "calendar"\nfirst = {{ address = 50 }}\nfields = {FI
 BEHIND = [
     ("scale = 0.0", "value[2].scale = 0.0: must not be 0"),
     ('detector = "pp"', "value[2].detector"),
-    ('quantity = "order1_amplitude"', 'value[2].detector: must be "pk", "pp" or "rms"'),
-    ('quantity = "order1_phase"', 'value[2].phase: must be "lag" or "lead"'),
+    ('quantity = "order1_amplitude"', "value[2].detector is missing; quantity"),
+    ('quantity = "order1_phase"', "value[2].phase is missing; quantity"),
     ("bit = 3", "value[2].bit = 3: applies only to type"),
     ("invalid_values = [0.5]", "value[2].invalid_values: must be integers of 16 b"),
     ("scale_register = { address = 25 }", "scale_register: must be read in the same request"),
