@@ -106,7 +106,7 @@ async def test_two_hundred_of_each_fault_and_no_false_sample(fault, shape, devic
 
 async def test_a_device_that_repeats_itself_for_ever_is_stale(shape, device, source_of):
     async with SlcanTcpServer(device) as server:
-        source = source_of(shape, server.endpoint, stale_after_s=0.3)
+        source = source_of(shape, server.endpoint, stale_after_s=3.0)
         async with source.connect() as stream:
             await Watch(stream).up_to(50)
             server.inject("freeze", 30)
