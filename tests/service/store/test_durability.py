@@ -346,7 +346,7 @@ def test_a_database_of_a_newer_padwatch_is_refused_by_its_schema_number(store_pl
     store_place.open().close()
     store_place.execute(NEWER[store_place.kind])
 
-    said = f"schema {NEWEST + 1}; this padwatch supports up to {NEWEST}; run the padwatch"
+    said = f"schema version {NEWEST + 1}; this padwatch supports up to {NEWEST}; run the padwatch"
     with pytest.raises(StoreError, match=said):
         store_place.open()
 
