@@ -26,11 +26,6 @@ from service.store.films import FilmStore
 AUTHOR = "padwatch demo"
 EVENT = "learned from a simulated year"
 
-OVERLAP_SPREAD = 1.6
-"""Factor on the scatter of mean shaft motion if time runs faster: readings then overlap, so that a
-mean averages less noise than in the simulated year. Without the factor, the misfit of the film as
-cause varies from 14 to 53 in the demonstration; up to 30 is accepted."""
-
 
 def without_past(store: FilmStore, plant: PlantFile) -> list[UnitSettings]:
     """Return the units that have monitored films, but no film readings in the store."""
@@ -103,9 +98,6 @@ def _fill_unit(
         store.add_baseline(learned, steps)
     response = learn_response(past, np.logical_and.reduce(settled))
     if response is not None:
-        if settings.time_lapse > 1.0:
-            std = tuple(OVERLAP_SPREAD * each for each in response.std)
-            response = replace(response, std=std)
         store.set_response(unit.id, response, now_ns)
 
 
