@@ -62,7 +62,7 @@ class CommandExecutor:
             words = "the command was executed but not stored, and a restart undoes it"
             return Answer(CommandState.INTERRUPTED, f"{words}: {error}")
         except (StoreError, TimeoutError) as error:
-            words = "the action is not confirmed, because storing it failed"
+            words = "the action is withdrawn, because storing it failed"
             return Answer(
                 CommandState.WITHDRAWN, f"{words}: {error or 'the store does not respond'}"
             )

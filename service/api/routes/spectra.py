@@ -136,7 +136,8 @@ def _require_few(n_spectra: int, n_numbers: int) -> None:
     if n_spectra * n_numbers > MAX_NUMBERS:
         detail = (
             f"{n_spectra} spectra of {n_numbers} amplitudes are too many; ask for at most"
-            f" {max(2, MAX_NUMBERS // n_numbers)} spectra, or lower max_frequency_hz"
+            f" {max(2, MAX_NUMBERS // n_numbers)} spectra or fewer channels, or lower"
+            " max_frequency_hz"
         )
         raise ProblemError(422, "Wrong parameter", detail, "max_spectra")
 
