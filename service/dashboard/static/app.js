@@ -25,8 +25,9 @@ async function askOverview(signal) {
     if (session() === null || isLocked()) await askSession(signal);
     live = isLocked() ? SILENCE : await heard(signal);
   } catch (failure) {
+    if (failure.status === 401) await askSession(signal).catch(() => {}); // a login that is over is no fault
     if (signal.aborted) return;
-    live = failedNow(live, failureWords(failure), moment());
+    live = failure.status === 401 && isLocked() ? SILENCE : failedNow(live, failureWords(failure), moment());
   }
   if (page === null) openPage();
   else draw();

@@ -81,7 +81,7 @@ async def test_a_wrong_password_is_said_in_a_sentence_and_many_make_one_wait(pla
     page = remote_page
     await page.goto(plant.url)
     button = page.locator(".entries button")
-    said = page.get_by_role("alert").filter(visible=True)
+    said = page.locator(".entries").get_by_role("alert")
     await log_in(page, "operator", "not the password")
     await expect(said).to_contain_text("wrong")
 
@@ -238,7 +238,7 @@ async def test_an_own_password_is_changed_and_a_change_without_an_answer_is_repo
     await wanted.fill(other)
     await again.fill(other + "er")
     await page.keyboard.press("Enter")
-    await expect(page.get_by_role("alert").filter(visible=True)).to_contain_text("not the same")
+    await expect(page.locator(".entries").get_by_role("alert")).to_contain_text("not the same")
     await again.fill(other)
     await page.keyboard.press("Enter")
     await expect(page.get_by_text("Your password is changed.")).to_be_visible()
@@ -255,7 +255,7 @@ async def test_an_own_password_is_changed_and_a_change_without_an_answer_is_repo
     doubt = page.get_by_text("has not confirmed the change of your password")
     await expect(doubt).to_be_visible()
     await log_in(page, PAINTER, other)
-    await expect(page.get_by_role("alert").filter(visible=True)).to_contain_text("wrong")
+    await expect(page.locator(".entries").get_by_role("alert")).to_contain_text("wrong")
     await log_in(page, PAINTER)
     await expect(page.get_by_role("heading", name="Your password")).to_be_visible()
     await page.get_by_role("button", name="Log out").click()
