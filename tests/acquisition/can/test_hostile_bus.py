@@ -119,7 +119,7 @@ async def test_a_device_that_repeats_itself_for_ever_is_stale(shape, device, sou
 async def test_an_unplugged_serial_adapter_leaves_no_thread(tmp_path, shape, device, source_of):
     async with SlcanPtyServer(device, link=tmp_path / "adapter") as server:
         source = source_of(
-            shape, server.endpoint, options={"sleep_after_open": 0.0}, stale_after_s=30.0
+            shape, server.endpoint, options={"sleep_after_open": 0.0}, when_full="wait"
         )
         for n in range(1, 6):
             async with source.connect() as stream:
@@ -133,7 +133,7 @@ async def test_an_unplugged_serial_adapter_leaves_no_thread(tmp_path, shape, dev
 
 async def test_padwatch_sends_nothing_but_open_and_close(shape, device, source_of):
     async with SlcanTcpServer(device) as server:
-        source = source_of(shape, server.endpoint, stale_after_s=60.0)
+        source = source_of(shape, server.endpoint, when_full="wait")
         for n in range(1, 3):
             async with source.connect() as stream:
                 server.produce(1)
