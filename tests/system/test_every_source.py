@@ -50,7 +50,7 @@ def sources(folder: Path) -> dict[str, str]:
     tcp = "host = '127.0.0.1'\nport = 0\ntimeout_s = 20.0\n"
 
     def line(name: str) -> str:
-        return f"device = '{folder / name}'\n{FAST_LINE}\ntimeout_s = 20.0\n"
+        return f"device = '{folder / name}'\n{FAST_LINE}\ntimeout_s = 5.0\n"
 
     polled = f"kind = 'modbus_polled'\npoll_period_s = {POLLED_EACH_S}\n"
     vector = "kind = 'modbus_vector'\npoll_period_s = 0.2\nn_polls = 20\nhop_polls = 10\n"
