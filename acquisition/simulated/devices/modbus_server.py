@@ -19,6 +19,10 @@ from acquisition.simulated.devices.server import DaqServer
 _ROUNDING = 1e-6
 """Tolerance in steps for a sleep that ends too early by a rounding error."""
 
+_MAX_STEPS = 100
+"""Largest number of overdue steps produced before requests are answered again; a computer that is
+too slow for the device would otherwise never answer."""
+
 
 class ModbusServer(DaqServer):
     """Base class of the servers of one simulated Modbus device.
@@ -117,6 +121,8 @@ class ModbusServer(DaqServer):
             self._origin_s = clock.monotonic_s()
         while not self._device.ended:
             n_passed = int((clock.monotonic_s() - self._origin_s) / step_s + _ROUNDING)
-            self._device.produce(n_passed - self._n_paced)
-            self._n_paced = max(n_passed, self._n_paced)
-            await clock.sleep(self._origin_s + (n_passed + 1) * step_s - clock.monotonic_s())
+            n_steps = max(0, min(n_passed - self._n_paced, _MAX_STEPS))
+            self._device.produce(n_steps)
+            self._n_paced += n_steps
+            due_s = self._origin_s + (min(n_passed, self._n_paced) + 1) * step_s
+            await clock.sleep(max(0.0, due_s - clock.monotonic_s()))
