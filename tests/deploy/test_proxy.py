@@ -39,7 +39,7 @@ http {{
 }}
 """
 
-PATIENCE_S = 30.0
+PATIENCE_S = 120.0
 
 
 def configured(folder: Path, certificate: tuple[Path, Path], port: int) -> Path:

@@ -164,7 +164,7 @@ def test_host_stamps_rise_with_the_index_and_follow_the_nominal_rate(plant):
 
 BLOCK = 50
 UPTIME_S = 4711.0
-PATIENCE_S = 20.0
+PATIENCE_S = 120.0
 DBC = 'VERSION ""\nBU_: N\nBO_ 544 M: 8 N\n' + "".join(
     f' SG_ s{c} : {16 * c}|16@1- (1,0) [0|0] "V" N\n' for c in range(4)
 )

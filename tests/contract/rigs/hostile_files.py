@@ -44,7 +44,7 @@ print(json.dumps([own, child, said]))
 def measured(job: ImportJob, *paths: Path) -> tuple[int, int, list[str]]:
     """Peaks of the importing and of the reading processes in MB, and what was said of each file."""
     command = [sys.executable, "-c", READ, json.dumps(asdict(job)), *map(str, paths)]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
+    result = subprocess.run(command, capture_output=True, text=True, timeout=800, check=True)
     own_mb, child_mb, said = json.loads(result.stdout)
     return own_mb, child_mb, said
 

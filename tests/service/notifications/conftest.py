@@ -22,7 +22,7 @@ from service.notifications.webhook import Webhook
 from service.settings.notifications import DEFAULT_CHANGES, WebhookSettings
 from service.store.sqlite import SqliteStore
 
-PATIENCE_S = 30.0
+PATIENCE_S = 120.0
 """Until a test gives up; none waits that long when all is well."""
 
 ALERT = Judgement(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")

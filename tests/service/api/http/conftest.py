@@ -19,7 +19,7 @@ from service.api.problems import install_problem_handlers, refuse_unknown_parame
 from service.runtime.asker import ASKER, Asker
 from service.settings.processes import HttpLimitSettings
 
-PATIENCE_S = 20.0
+PATIENCE_S = 120.0
 """Ends a test that would hang; none waits for it otherwise."""
 
 LARGE = b"x" * 64 * 1024 * 1024

@@ -176,7 +176,6 @@ async def publish_stretch(plant: PlantFile, first: int, last: int) -> None:
     await stream_rig.publish(plant, chain.from_iterable(islice(pairs, first, last)))
 
 
-@pytest.mark.timeout(300)
 async def test_results_are_those_of_a_single_process_through_kills_of_the_analysis_and_of_nats(
     tmp_path, server
 ):

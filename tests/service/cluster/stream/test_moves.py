@@ -125,7 +125,6 @@ def messages(unit: MovingUnit, seed: int) -> Iterator[Message]:
                 yield sequence, payload
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2])
 async def test_results_are_the_same_wherever_and_however_often_it_is_cut_off(moving_unit, seed):
