@@ -15,7 +15,6 @@ from service.app.storage import (
     evidence_folders,
     recordings_folder,
 )
-from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.films import FilmMonitor
 from service.measuring.live_view import LiveView
 from service.recordings.around_alarms import Captures, CaptureSettings
@@ -97,7 +96,7 @@ def evidence_of(
     captures: Captures,
     clock: Clock,
 ) -> EvidenceCollector:
-    """Return the collector of alarm evidence, which `watch` connects to the alarms."""
+    """Return the collector of alarm evidence, which must be connected to the alarms."""
     limits, folders = plant.evidence, evidence_folders(plant)
     configuration = built_configuration(plant)
     maker = Maker(plant, configuration, f"padwatch {version('padwatch')}", origin)
@@ -105,15 +104,6 @@ def evidence_of(
     camera = SnapshotTaker({unit.id: unit for unit in plant.unit}, live, films)
     room = EvidenceRetention(folders.evidence, limits, clock)
     return EvidenceCollector(folders, camera, writer, room, configuration, captures, clock)
-
-
-def watch(
-    keeper: EvidenceCollector, alarms: AlarmEngine, captures: Captures, origin: Origin
-) -> None:
-    """Connect the collector of evidence to alarms and captures; a replay collects no evidence."""
-    if origin is Origin.LIVE:
-        alarms.set_observer(keeper.see)
-        captures.set_listener(keeper.captured)
 
 
 def space_watch(plant: PlantFile, clock: Clock) -> SpaceWatch:

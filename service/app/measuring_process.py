@@ -1,49 +1,61 @@
-"""Analysis part of a process, which makes results, alarms, evidence and messages from blocks."""
+"""Measuring process: results, alarms, evidence and messages from blocks; `padwatch run`."""
 
 import asyncio
-from collections.abc import Callable, Collection, Mapping, Sequence
+import socket
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 
 from prometheus_client.process_collector import ProcessCollector
 
 from acquisition.clock import Clock
-from core.alarms.alarm import AlarmNews
+from core.alarms.alarm import PLANT, AlarmNews
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.app import kept_files
-from service.app.notifications import receivers_of
-from service.app.service_health import Pressure, health_of
+from service.app.listener import require_protected
+from service.app.notifications import receivers_of, router_of
+from service.app.process import Supervision
+from service.app.service_audit import ServiceTrail
+from service.app.storage import database_path, open_access, open_store
+from service.app.supervisor import ServingChild, Start
+from service.cluster.consumer import Consumer
 from service.cluster.measuring_side import CommandWorker, Reporter, process_name
+from service.live.alarm_list import SHARED
 from service.live.metrics import add_alarms, add_films, add_units
 from service.live.references import ReferencesInForce
 from service.live.snapshot import CaptureStatus, PlantSnapshot, SourceCounts
 from service.measuring.acquirer import Bus
-from service.measuring.alarm_engine import WHOLE, AlarmEngine, PlantPart, alarm_engine
-from service.measuring.analyser import NO_MEMORIES, Analyser, UnitMemory
-from service.measuring.commands import CommandExecutor
-from service.measuring.films import FilmMonitor, film_monitor
+from service.measuring.alarm_engine import WHOLE, PlantPart, alarm_engine
+from service.measuring.analyser import BUS_CAPACITY, NO_MEMORIES, Analyser, Runner, UnitMemory
+from service.measuring.commands import CommandExecutor, Questions
+from service.measuring.films import film_monitor
 from service.measuring.integrity import IntegrityMonitor
 from service.measuring.live_view import LiveView
 from service.measuring.metrics import add_disks, add_integrity, add_samples, add_store
 from service.measuring.recorder import FILE, ParkedRows, Recorder
-from service.measuring.service_alarms import StreamStatus
-from service.measuring.snapshots import SnapshotBuilder
-from service.measuring.sources import vector_rows
+from service.measuring.service_alarms import ServiceHealth
+from service.measuring.snapshots import SnapshotBuilder, SocketReports
+from service.measuring.sources import WatchedUnit, timed_sources, vector_rows
 from service.notifications.message import LiveContext
 from service.notifications.metrics import add_deliveries
 from service.notifications.sender import Deliveries
-from service.recordings.around_alarms import Captures
-from service.recordings.continuous_recorder import ContinuousRecorder
-from service.recordings.keeper import RecordingIndexer
+from service.recordings.continuous_recorder import DropReason
 from service.recordings.metrics import add_recordings
 from service.reports.collector import EvidenceCollector
-from service.runtime.disk import SpaceWatch
+from service.runtime.child import Child
 from service.runtime.heartbeats import Heartbeats, Loop, Pulse
 from service.runtime.metrics import Families
 from service.runtime.polls import TimedSource
+from service.runtime.process import exempt_start
+from service.runtime.service_manager import NO_MANAGER, ServiceManager
+from service.settings.core_values import stale_after_s
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
+from service.store.holds import exclusive_use
 from service.store.loops import RetentionLoop, RollupLoop, ScrubLoop
 from service.store.port import StoreError
 from service.store.retention import ages_of
@@ -52,10 +64,11 @@ from service.store.store import Store
 
 @dataclass(frozen=True)
 class ProcessContext:
-    """Context of one process: plant, store, live view and heartbeats.
+    """Context of one measuring process: plant, store, live view and heartbeats.
 
     `origin` is the origin, live or replay, of the data in the store and in all API responses;
-    `beats` are the heartbeats of all loops of the process.
+    `beats` are the heartbeats of all loops of the process; from `alarm_context` alarm messages take
+    values.
     """
 
     plant: PlantFile
@@ -64,33 +77,108 @@ class ProcessContext:
     store: Store
     live: LiveView
     beats: Heartbeats
+    alarm_context: LiveContext
 
 
-@dataclass(frozen=True)
+@contextmanager
+def process_context(plant: PlantFile, origin: Origin, clock: Clock) -> Iterator[ProcessContext]:
+    """Open the store of a measuring process; raise `StoreError` if it cannot be used."""
+    live = LiveView([unit.id for unit in plant.unit], clock, stale_after_s(plant))
+    context = LiveContext(live.assessment)
+    router = router_of(plant, origin, context, clock)
+    with closing(open_store(plant, origin, router)) as store:
+        yield ProcessContext(plant, origin, clock, store, live, Heartbeats(clock), context)
+
+
 class Analysis:
     """Parts of the analysis and the background services of a process.
 
-    The caller passes blocks to `analyser`, runs `recorder` and the loops of `own_loops` and
-    `shared_loops`, and finally calls `close`.
+    The caller awaits `start`, passes blocks to `analyser`, runs `recorder` and the loops of
+    `own_loops` and `shared_loops`, and finally calls `close`.
+
+    Parameters
+    ----------
+    process, monitors
+        Context of this process, and the monitor of each of its units by unit id.
+    part
+        Part of the plant for which this process is responsible.
+    sources
+        Timed sources by unit id; empty if blocks come over a stream.
+
+    Attributes
+    ----------
+    bus
+        Queue of the blocks that wait for the analysis; always empty with a stream.
+    stream
+        Consumer of the stream; None before it is started, and without a stream.
     """
 
-    process: ProcessContext
-    analyser: Analyser
-    recorder: Recorder
-    deliveries: Deliveries
-    captures: Captures
-    tape: ContinuousRecorder
-    recordings: RecordingIndexer
-    alarms: AlarmEngine
-    films: FilmMonitor
-    evidence: EvidenceCollector
-    references: ReferencesInForce
-    rolling: RollupLoop
-    retaining: RetentionLoop
-    space: SpaceWatch
-    soundness: IntegrityMonitor
-    executor: CommandExecutor
-    snapshots: SnapshotBuilder
+    def __init__(
+        self,
+        process: ProcessContext,
+        monitors: Mapping[str, UnitMonitor],
+        part: PlantPart = WHOLE,
+        sources: Mapping[str, TimedSource] = MappingProxyType({}),
+    ) -> None:
+        plant, origin, store, clock = process.plant, process.origin, process.store, process.clock
+        self.process, self._monitors, self._part, self._sources = process, monitors, part, sources
+        self.bus = Bus(BUS_CAPACITY, clock)
+        self.stream: Consumer | None = None
+        self.soundness = IntegrityMonitor(store, clock, process.live)
+        self.deliveries = Deliveries(receivers_of(plant, origin, clock), store.outbox, clock)
+        self.recorder = Recorder(
+            store,
+            process.live,
+            clock,
+            ParkedRows(Path(plant.service.data_folder) / FILE),
+            on_stored=self.deliveries.wake,
+            finds_again=part != WHOLE,
+        )
+        self.captures = kept_files.captures_of(plant, origin, clock)
+        self.recordings = kept_files.waveform_keeper(plant, store, clock)
+        pressure = Pressure(self.bus, self.recordings.is_full)
+        self.tape = kept_files.tape_of(plant, origin, clock, pressure.look)
+        self.space = kept_files.space_watch(plant, clock)
+        self.references = ReferencesInForce(
+            *([monitor.unit for monitor in monitors.values()], store, clock),
+            on_change=lambda unit: monitors[unit.id].replace_description(unit),
+        )
+
+    async def start(self, memories: Mapping[str, UnitMemory] = NO_MEMORIES) -> None:
+        """Restore the stored state, before the first block.
+
+        `memories` are saved states by unit, only of units without missing samples since they were
+        saved. Raises `StoreError` if stored state cannot be read; a start without it would lose it.
+        """
+        plant, origin, store = self.process.plant, self.process.origin, self.process.store
+        live, clock = self.process.live, self.process.clock
+        recorder, monitors = self.recorder, self._monitors
+        await self.soundness.look()  # before the first write
+        if origin is Origin.LIVE:  # a replay starts without stored results and has no gap
+            for unit, monitor in monitors.items():
+                monitor.go_on(await asyncio.to_thread(store.reach, unit))
+        self.alarms = alarms = await alarm_engine(
+            *(plant, origin, store, recorder.put, clock, self._listen, vector_rows(plant)),
+            *(self.health, self._part, {unit: memory.alarms for unit, memory in memories.items()}),
+        )
+        machines = {unit: monitor.unit for unit, monitor in monitors.items()}
+        self.films = films = await film_monitor(plant, machines, store.films, clock)
+        for unit, memory in memories.items():
+            films.resume(unit, memory.films)
+        self.process.alarm_context.watch_films(films.newest)
+        captures = self.captures
+        self.evidence = kept_files.evidence_of(plant, origin, live, films, store, captures, clock)
+        if origin is Origin.LIVE:  # a replay collects no evidence
+            alarms.set_observer(self.evidence.see)
+            captures.set_listener(self.evidence.captured)
+        await self.references.look()  # before the first result
+        self.analyser = Analyser(monitors, live, recorder, alarms, films)
+        self.executor = CommandExecutor(alarms, films, live, recorder, store, clock)
+        self.snapshots = SnapshotBuilder(plant.unit, live, alarms, films, clock)
+
+    def _listen(self, block: SampleBlock, news: Sequence[AlarmNews]) -> None:
+        self.captures.take(block, news)
+        self.tape.take(block)
 
     @property
     def own_loops(self) -> dict[str, Loop]:
@@ -111,11 +199,25 @@ class Analysis:
     @property
     def shared_loops(self) -> dict[str, Loop]:
         """Loops for the whole plant, by name; only one process runs them."""
-        loops: dict[str, Loop] = {"gather": self.rolling.run, "deliver": self._deliver}
+        store, clock = self.process.store, self.process.clock
+        rolling = RollupLoop(store.rollups, clock)
+        loops: dict[str, Loop] = {"gather": rolling.run, "deliver": self._deliver}
         if self.process.origin is Origin.LIVE:
-            loops["retain"] = self.retaining.run
-            loops["scrub"] = ScrubLoop(self.process.store.integrity, self.process.clock).run
+            ages = ages_of(self.process.plant.retention)
+            loops["retain"] = RetentionLoop(store.retention, ages, clock).run
+            loops["scrub"] = ScrubLoop(store.integrity, clock).run
         return loops
+
+    def reporting_loops(self, held: Callable[[], Collection[str]]) -> dict[str, Loop]:
+        """Return the loops that report the state of units and execute commands, by name.
+
+        `held` returns the units of this process, also `PLANT` if it reports alarms without a unit,
+        `SHARED` if it runs the plant-wide tasks.
+        """
+        name, store, clock = process_name(), self.process.store, self.process.clock
+        reporter = Reporter(name, held, self.snapshots, store.unit_states, clock)
+        commands = CommandWorker(name, held, self.executor, store, clock)
+        return {"report": reporter.run, "commands": commands.run}
 
     async def _deliver(self, pulse: Pulse) -> None:
         pulse.rest()  # each sender has its own heartbeat
@@ -130,127 +232,71 @@ class Analysis:
         await self.tape.close()
         self.recordings.close()
 
+    @property
+    def recording_error(self) -> str | None:
+        """Error of the continuous recorder or of the indexer; None without an error."""
+        return self.tape.trouble or self.recordings.lasting_trouble
 
-async def analysis_on(
-    process: ProcessContext,
-    monitors: Mapping[str, UnitMonitor],
-    bus: Bus,
-    alarm_context: LiveContext,
-    part: PlantPart = WHOLE,
-    memories: Mapping[str, UnitMemory] = NO_MEMORIES,
-    stream: StreamStatus | None = None,
-) -> Analysis:
-    """Build the parts of the analysis, and restore their stored state.
+    def health(self) -> ServiceHealth:
+        """Return the present health of the service, for its alarms."""
+        live, bus, stream = self.process.live, self.bus, self.stream
+        found = {unit: live.status(unit) for unit in self._monitors}
+        return ServiceHealth(
+            store_error=live.store_error,
+            store_behind_s=self.recorder.behind_s,
+            n_unstored=live.n_unstored,
+            unstored_reason=live.unstored_reason,
+            n_recordings_damaged=self.recordings.n_lost,
+            readings={
+                "waiting_share": bus.depth / bus.capacity,
+                "analysis_delay_s": max(bus.oldest_wait_s, stream.behind_s if stream else 0.0),
+                "captures_error": self.captures.trouble,
+                "recording_error": self.recording_error,
+                "stored_trouble": self.soundness.trouble,
+                "stream_trouble": stream.trouble if stream else None,
+            },
+            accounts={u: s.account for u, s in found.items() if s.last_sample_ns is not None},
+            disk=self.space.condition,
+        )
 
-    Raises `StoreError` if stored state cannot be read; a start without the state would lose it.
+    def snapshot(self) -> PlantSnapshot:
+        """Return the present state of this process."""
+        captures = self.captures
+        return PlantSnapshot(
+            loops=dict(self.process.beats.look()),
+            checks={"disk": str(self.space), "stored data": self.soundness.trouble or "ok"},
+            audit_error=self.process.store.audit.head_error,
+            captures=CaptureStatus(captures.trouble, captures.error, captures.being_made),
+            evidence=self.evidence.status,
+            continuous=tuple(self.tape.units),
+            continuous_trouble=self.tape.trouble,
+            faults=dict(self.recordings.faults),
+            receivers=self.deliveries.statuses,
+            sources={unit: counts_of(source) for unit, source in self._sources.items()},
+        )
 
-    Parameters
-    ----------
-    process, monitors
-        Context of this process, and the monitor of each of its units by unit id.
-    bus
-        Queue of the blocks that wait for the analysis.
-    alarm_context
-        Context from which alarm messages take values; this function adds the newest films to it.
-    part
-        Part of the plant for which this process is responsible.
-    memories
-        Saved state by unit, only of units without missing samples since it was saved.
-    stream
-        Status of the stream; None if the blocks come directly from the sources.
-    """
-    plant, origin, store, clock = process.plant, process.origin, process.store, process.clock
-    live = process.live
-    soundness = IntegrityMonitor(store, clock, live)
-    await soundness.look()  # before the first write
-    if origin is Origin.LIVE:  # a replay starts without stored results and has no gap
-        for unit, monitor in monitors.items():
-            monitor.go_on(await asyncio.to_thread(store.reach, unit))
-    deliveries = Deliveries(receivers_of(plant, origin, clock), store.outbox, clock)
-    recorder = Recorder(
-        store,
-        live,
-        clock,
-        ParkedRows(Path(plant.service.data_folder) / FILE),
-        on_stored=deliveries.wake,
-        finds_again=stream is not None,
-    )
-    captures = kept_files.captures_of(plant, origin, clock)
-    recordings = kept_files.waveform_keeper(plant, store, clock)
-    pressure = Pressure(bus, recordings.is_full)
-    tape = kept_files.tape_of(plant, origin, clock, pressure.look)
-    space = kept_files.space_watch(plant, clock)
-    look = health_of(
-        monitors, live, recorder, captures, bus, space, tape, recordings, soundness, stream
-    )
-
-    def listen(block: SampleBlock, news: Sequence[AlarmNews]) -> None:
-        captures.take(block, news)
-        tape.take(block)
-
-    alarms = await alarm_engine(
-        plant,
-        origin,
-        store,
-        recorder.put,
-        clock,
-        listen,
-        vector_rows(plant),
-        look,
-        part,
-        {unit: memory.alarms for unit, memory in memories.items()},
-    )
-    machines = {unit: monitor.unit for unit, monitor in monitors.items()}
-    films = await film_monitor(plant, machines, store.films, clock)
-    for unit, memory in memories.items():
-        films.resume(unit, memory.films)
-    alarm_context.watch_films(films.newest)
-    evidence = kept_files.evidence_of(plant, origin, live, films, store, captures, clock)
-    kept_files.watch(evidence, alarms, captures, origin)
-    references = ReferencesInForce(
-        *(machines.values(), store, clock),
-        on_change=lambda unit: monitors[unit.id].replace_description(unit),
-    )
-    await references.look()  # before the first result
-    return Analysis(
-        process=process,
-        analyser=Analyser(monitors, live, recorder, alarms, films),
-        recorder=recorder,
-        deliveries=deliveries,
-        captures=captures,
-        tape=tape,
-        recordings=recordings,
-        alarms=alarms,
-        films=films,
-        evidence=evidence,
-        references=references,
-        rolling=RollupLoop(store.rollups, clock),
-        retaining=RetentionLoop(store.retention, ages_of(plant.retention), clock),
-        space=space,
-        soundness=soundness,
-        executor=CommandExecutor(alarms, films, live, recorder, store, clock),
-        snapshots=SnapshotBuilder(plant.unit, live, alarms, films, clock),
-    )
-
-
-def plant_snapshot(analysis: Analysis, sources: Mapping[str, TimedSource]) -> PlantSnapshot:
-    """Return the present state of the measuring process; `sources` are its sources by unit id."""
-    captures, deliveries = analysis.captures, analysis.deliveries
-    return PlantSnapshot(
-        loops=dict(analysis.process.beats.look()),
-        checks={
-            "disk": str(analysis.space),
-            "stored data": analysis.soundness.trouble or "ok",
-        },
-        audit_error=analysis.process.store.audit.head_error,
-        captures=CaptureStatus(captures.trouble, captures.error, captures.being_made),
-        evidence=analysis.evidence.status,
-        continuous=tuple(analysis.tape.units),
-        continuous_trouble=analysis.tape.trouble,
-        faults=dict(analysis.recordings.faults),
-        receivers=deliveries.statuses,
-        sources={unit: counts_of(source) for unit, source in sources.items()},
-    )
+    async def metrics(self) -> bytes:
+        """Return all metrics of this process in the Prometheus text format."""
+        try:
+            receivers = await self.deliveries.look()
+        except StoreError:
+            receivers = None
+        process, families = self.process, Families()
+        live, now_ns = process.live, process.clock.now_ns()
+        units = {unit.id: [bearing.id for bearing in unit.bearing] for unit in process.plant.unit}
+        families.add_program(process.store.kind)
+        add_samples(families, live, units, self._sources, now_ns)
+        add_units(families, live, units)
+        add_films(families, live, self.films.newest, units)
+        add_alarms(families, self.alarms.alarms, self.alarms.count(), list(units))
+        add_store(families, self.bus, self.recorder, live)
+        add_integrity(families, self.soundness)
+        add_disks(families, self.space)
+        add_recordings(families, self.tape, self.captures, self.recordings)
+        add_evidence(families, self.evidence)
+        add_deliveries(families, receivers, now_ns)
+        families.include(ProcessCollector(registry=None))
+        return families.text
 
 
 def counts_of(source: TimedSource) -> SourceCounts:
@@ -259,48 +305,6 @@ def counts_of(source: TimedSource) -> SourceCounts:
     if found is None:
         return SourceCounts(0, None, None, refused)
     return SourceCounts(found.n, found.newest_s, found.mean_s, refused)
-
-
-def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> Mapping[str, Loop]:
-    """Return the loops that report the state of units and execute operators' commands, by name.
-
-    `held` returns the units of this process, also `PLANT` if it reports alarms without a unit,
-    `SHARED` if it runs the plant-wide tasks.
-    """
-    process, name = analysis.process, process_name()
-    store, clock = process.store, process.clock
-    reporter = Reporter(name, held, analysis.snapshots, store.unit_states, clock)
-    carrying_out = CommandWorker(name, held, analysis.executor, store, clock)
-    return {"report": reporter.run, "commands": carrying_out.run}
-
-
-async def measuring_metrics(
-    analysis: Analysis, bus: Bus, sources: Mapping[str, TimedSource]
-) -> bytes:
-    """Return all metrics of the measuring process in the Prometheus text format.
-
-    `sources` are the timed sample sources by unit id.
-    """
-    try:
-        receivers = await analysis.deliveries.look()
-    except StoreError:
-        receivers = None
-    process, families = analysis.process, Families()
-    live, now_ns = process.live, process.clock.now_ns()
-    units = {unit.id: [bearing.id for bearing in unit.bearing] for unit in process.plant.unit}
-    families.add_program(process.store.kind)
-    add_samples(families, live, units, sources, now_ns)
-    add_units(families, live, units)
-    add_films(families, live, analysis.films.newest, units)
-    add_alarms(families, analysis.alarms.alarms, analysis.alarms.count(), list(units))
-    add_store(families, bus, analysis.recorder, live)
-    add_integrity(families, analysis.soundness)
-    add_disks(families, analysis.space)
-    add_recordings(families, analysis.tape, analysis.captures, analysis.recordings)
-    add_evidence(families, analysis.evidence)
-    add_deliveries(families, receivers, now_ns)
-    families.include(ProcessCollector(registry=None))
-    return families.text
 
 
 EVIDENCE = {
@@ -318,3 +322,132 @@ def add_evidence(families: Families, evidence: EvidenceCollector) -> None:
     families.add("evidence_failed_total", evidence.n_failed)
     families.add("evidence_lost_total", evidence.n_lost)
     families.add("evidence_pending", evidence.n_pending)
+
+
+BEHIND_S = 3.0
+"""Waiting time of a block, s, above which recording pauses; the analysis has priority."""
+
+BEHIND_SHARE = 0.25
+"""Filled share of the block queue above which recording pauses."""
+
+CAUGHT_UP = 1.0 / 3.0
+"""Share of `BEHIND_S` and `BEHIND_SHARE` below which recording resumes."""
+
+
+class Pressure:
+    """Control that pauses recording while the analysis is behind or the disk is nearly full.
+
+    `is_full` returns whether the disk is nearly full.
+    """
+
+    def __init__(self, bus: Bus, is_full: Callable[[], bool]) -> None:
+        self._bus, self._is_full = bus, is_full
+        self._is_behind = False
+
+    def look(self) -> DropReason | None:
+        """Return the reason why recording must pause now; None if it may continue."""
+        share = CAUGHT_UP if self._is_behind else 1.0
+        self._is_behind = (
+            self._bus.oldest_wait_s > share * BEHIND_S
+            or self._bus.depth > share * BEHIND_SHARE * self._bus.capacity
+        )
+        if self._is_behind:
+            return DropReason.ANALYSIS_BEHIND
+        return DropReason.DISK_FULL if self._is_full() else None
+
+
+@dataclass(frozen=True)
+class ServiceRun:
+    """Configuration of a service run with live data or with recordings.
+
+    Parameters
+    ----------
+    units
+        Source and monitor of every unit of the plant.
+    origin
+        Origin of the data in the database and in the API responses.
+    ends
+        Whether the service stops when all sources have ended.
+    is_demo
+        Whether local clients have the admin role without a login.
+    child
+        Serving process that was started before; with None one is started.
+    at_end
+        Function called with the newest results when all sources have ended; None for no call.
+    """
+
+    plant: PlantFile
+    units: Mapping[str, WatchedUnit]
+    origin: Origin = Origin.LIVE
+    ends: bool = False
+    is_demo: bool = False
+    child: Child | None = None
+    at_end: Callable[[LiveView], None] | None = None
+
+
+async def run_service(
+    service_run: ServiceRun,
+    listener: socket.socket,
+    clock: Clock,
+    announce: Callable[[str], None],
+    manager: ServiceManager = NO_MANAGER,
+) -> None:
+    """Run the service until SIGINT or SIGTERM, or as configured until all sources have ended.
+
+    Parameters
+    ----------
+    service_run, clock
+        Configuration of the run, and the host clock.
+    listener
+        Listening socket, which the serving process inherits.
+    announce
+        Function that is called with the URL when requests are served, and with the set-up token if
+        there is no account.
+    manager
+        Service manager, notified when the service is ready, alive and stopping.
+
+    Raises
+    ------
+    StoreError
+        If the database cannot be used.
+    ClosedError
+        If the service would be reachable from other hosts without TLS or accounts.
+    """
+    plant, origin, units = service_run.plant, service_run.origin, service_run.units
+    with exclusive_use(database_path(plant)), process_context(plant, origin, clock) as process:
+        with closing(open_access(plant, origin)) as access:
+            require_protected(plant, access)
+        live, beats = process.live, process.beats
+        monitors = {unit: watched.monitor for unit, watched in units.items()}
+        analysis = Analysis(process, monitors, sources=timed_sources(units))
+        await analysis.start()
+        parts = (analysis.analyser, analysis.recorder, analysis.bus, beats, clock)
+        runner = Runner(units, live, *parts)
+        audit = ServiceTrail(plant, origin, process.store.audit, clock)
+        await audit.begin()
+        held = [*(unit.id for unit in plant.unit), PLANT]
+        supervision = Supervision(manager, beats, live, units, clock)
+        reports = SocketReports([*held, SHARED], analysis.snapshots, analysis.snapshot, clock)
+        questions = Questions(analysis.executor, live, analysis.soundness, analysis.metrics)
+        start = Start(plant, origin, service_run.is_demo)
+        ready = partial(supervision.announce, announce)
+        serving = ServingChild(
+            *(start, listener, reports.report, questions.answer, ready, clock, service_run.child)
+        )
+
+        async def run() -> None:
+            await runner.run()
+            if service_run.at_end is not None:
+                service_run.at_end(live)
+
+        loops: dict[str, Loop] = {"clock": audit.watch_clock, "serve": serving.run}
+        loops |= analysis.own_loops | analysis.shared_loops
+        if plant.store.postgresql is not None and origin is Origin.LIVE:  # may have replicas
+            loops |= analysis.reporting_loops(lambda: held)
+        ends = service_run.ends
+        exempt_start()
+        try:
+            await supervision.run_until_stopped(loops, run, lambda _: serving.stop(), ends=ends)
+        finally:
+            await analysis.close()
+            await audit.end()

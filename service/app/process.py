@@ -45,7 +45,7 @@ class Supervision:
         """Notify the service manager that the service is ready."""
         self._manager.notify(READY="1", STATUS=self._status())
 
-    def announce(self, write: Callable[[str], None], url: str, token: str | None) -> None:
+    def announce(self, write: Callable[[str], None], url: str, token: str | None = None) -> None:
         """Notify the service manager; `write` the URL and, unless it is None, the set-up token."""
         self.ready()
         write(url)

@@ -2,10 +2,11 @@
 
 import asyncio
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import replace
 from functools import partial
+
+from prometheus_client.process_collector import ProcessCollector
 
 from acquisition.clock import Clock
 from service.api.auth.authenticator import Authenticator
@@ -14,17 +15,28 @@ from service.app.listener import require_protected
 from service.app.notifications import receivers_of
 from service.app.process import Supervision
 from service.app.service_audit import ServiceTrail
-from service.app.serving_process import context_of, references_of, serve_requests
+from service.app.serving_process import context_of, serve_requests
 from service.app.storage import open_access, open_store
 from service.app.web import access_desk
-from service.cluster.replica_metrics import replica_metrics
 from service.cluster.serving_side import DatabaseOperators, Feed, replica_receivers
 from service.live.client import LiveClient
+from service.live.metrics import add_alarms, add_films, add_units
+from service.live.receivers import ReceiverView
+from service.notifications.metrics import add_deliveries
 from service.runtime.heartbeats import Heartbeats, Pulse
+from service.runtime.metrics import Families
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
+from service.store.port import StoreError
 from service.store.store import Store
+
+REPORTS = {
+    "reports_readable": "This is 1 if the reports in the database could be read.",
+    "unit_analysed": "This is 1 while a process reports on the unit.",
+    "unit_silence_seconds": "This is the time since the last report of the process that analyses"
+    " the unit.",
+}
 
 
 class Replica:
@@ -34,44 +46,50 @@ class Replica:
         self._plant, self._store, self._clock = plant, store, clock
         self.live = LiveClient(plant, store.films, clock)
         self.feed = Feed(store, self.live, clock)
-        self.references = references_of(plant, store, clock)
         its = receivers_of(plant, Origin.LIVE, clock)
         self.receivers = partial(asyncio.to_thread, replica_receivers, its, store.outbox)
 
-    async def start(self) -> None:
-        """Read the present state of the plant; call it before the first request.
-
-        Raises `StoreError` if the state cannot be read.
-        """
-        await self.feed.start()
-        await self.references.look()
-
     def checks(self) -> dict[str, str]:
         """Return the status of the analysis of each unit as text, by name of the check."""
-        return {f"analysis of {unit.id}": self._words_of(unit.id) for unit in self._plant.unit}
+        checks, units = {}, self.live.units
+        for unit in self._plant.unit:
+            words = "no heartbeat yet"
+            if (silence_s := units.silence_s(unit.id)) is not None:
+                words = "" if units.is_alive(unit.id) else "silent: "
+                words += f"last heartbeat {silence_s:.1f} s ago"
+            checks[f"analysis of {unit.id}"] = words
+        return checks
 
-    def _words_of(self, unit: str) -> str:
-        silence_s = self.live.units.silence_s(unit)
-        if silence_s is None:
-            return "no heartbeat yet"
-        said = f"last heartbeat {silence_s:.1f} s ago"
-        return said if self.live.units.is_alive(unit) else f"silent: {said}"
-
-    async def _metrics(self) -> bytes:
-        kind = self._store.kind
-        return await replica_metrics(self._plant, self.live, self.receivers, self._clock, kind)
+    async def metrics(self) -> bytes:
+        """Return the metrics of this process and of the units reported to it."""
+        views: Sequence[ReceiverView] | None
+        try:
+            views = await self.receivers()
+        except StoreError:
+            views = None
+        bearings = {unit.id: [each.id for each in unit.bearing] for unit in self._plant.unit}
+        families, live, units = Families(), self.live, self.live.units
+        families.add_program(self._store.kind)
+        families.declare(REPORTS)
+        families.add("reports_readable", units.read_error is None)
+        for unit in bearings:
+            families.add("unit_analysed", units.is_alive(unit), unit=unit)
+            families.add("unit_silence_seconds", units.silence_s(unit), unit=unit)
+        add_units(families, units, bearings)
+        add_films(families, units, live.films.newest, bearings)
+        add_alarms(families, live.alarms.alarms, live.alarms.count(), list(bearings))
+        add_deliveries(families, views, self._clock.now_ns())
+        families.include(ProcessCollector(registry=None))
+        return families.text
 
     def context(self, desk: Authenticator, beats: Heartbeats) -> Context:
         """Return the API context of this process."""
-        store, live = self._store, self.live
-        context = context_of(
-            *(self._plant, store, live, DatabaseOperators(store, live.alarms, self._clock)),
-            *(self.references, desk, self._clock),
-        )
-        return replace(
-            context,
+        operators = DatabaseOperators(self._store, self.live.alarms, self._clock)
+        return context_of(
+            *(self._plant, self._store, self.live, operators, self._clock),
+            access=desk,
             receivers=self.receivers,
-            metrics=self._metrics,
+            metrics=self.metrics,
             loops=beats.look,
             checks=self.checks,
         )
@@ -97,14 +115,12 @@ async def run_serve(
     """
     with closing(open_store(plant)) as store, closing(open_access(plant)) as access:
         require_protected(plant, access)
-        desk = access_desk(plant, access, clock)
         replica, beats = Replica(plant, store, clock), Heartbeats(clock)
-        await replica.start()
+        context = replica.context(access_desk(plant, access, clock), beats)
+        await replica.feed.start()
         audit = ServiceTrail(plant, Origin.LIVE, store.audit, clock)
         await audit.begin()
-        context = replica.context(desk, beats)
-        units = [unit.id for unit in plant.unit]
-        supervision = Supervision(manager, beats, replica.live.units, units, clock)
+        supervision = Supervision(manager, beats, replica.live.units, context.units, clock)
         ended, served = asyncio.Event(), asyncio.Event()
 
         async def ready(url: str, token: str | None) -> None:
@@ -112,8 +128,8 @@ async def run_serve(
 
         async def serve(pulse: Pulse) -> None:
             pulse.rest()
-            loops = {"feed": replica.feed.run, "references": replica.references.run}
-            await serve_requests(context, plant, listener, desk, loops, ended, ready)
+            loops = {"feed": replica.feed.run}
+            await serve_requests(context, plant, listener, loops, ended, ready)
             served.set()
 
         async def drain(_: asyncio.Task[None]) -> None:
@@ -123,5 +139,4 @@ async def run_serve(
         try:
             await supervision.run_until_stopped({"serve": serve}, drain=drain)
         finally:
-            await desk.close()
             await audit.end()

@@ -6,16 +6,14 @@ import socket
 import sys
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import closing, suppress
-from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import structlog
 
 from acquisition.clock import Clock, SystemClock
 from service.api.app import GuardedApi
-from service.api.auth.authenticator import Authenticator
 from service.api.context import Context
-from service.api.downloads import Downloads
 from service.api.problems import ProblemError
 from service.app.storage import (
     built_configuration,
@@ -71,7 +69,6 @@ async def serve_requests(
     context: Context,
     plant: PlantFile,
     listener: socket.socket,
-    desk: Authenticator,
     loops: Mapping[str, Loop],
     stopped: asyncio.Event,
     on_ready: Callable[[str, str | None], Awaitable[None]],
@@ -84,20 +81,24 @@ async def serve_requests(
     """
     app = application(context, evidence)
     server = server_of(app, plant, context.origin, app.repeating)
-    beats = Heartbeats(context.clock)
-    async with asyncio.TaskGroup() as tasks:
-        running = beats.start(loops, tasks)
-        [serving] = beats.start({"serve": partial(server.run_on, listener)}, tasks)
-        while not server.started:
-            await asyncio.sleep(0.01)
-        token = await desk.offer_set_up()
-        await on_ready(url_of(listener, has_tls=server.config.is_ssl), token)
-        running.append(tasks.create_task(_rendered(app), name="document"))
-        await stopped.wait()
-        server.should_exit = True
-        await asyncio.wait([serving])
-        for task in running:
-            task.cancel()
+    beats, references = Heartbeats(context.clock), context.references
+    try:
+        await references.look()
+        async with asyncio.TaskGroup() as tasks:
+            running = beats.start({"references": references.run, **loops}, tasks)
+            [serving] = beats.start({"serve": partial(server.run_on, listener)}, tasks)
+            while not server.started:
+                await asyncio.sleep(0.01)
+            token = await context.access.offer_set_up()
+            await on_ready(url_of(listener, has_tls=server.config.is_ssl), token)
+            running.append(tasks.create_task(_rendered(app), name="document"))
+            await stopped.wait()
+            server.should_exit = True
+            await asyncio.wait([serving])
+            for task in running:
+                task.cancel()
+    finally:
+        await context.access.close()
 
 
 def context_of(
@@ -105,11 +106,10 @@ def context_of(
     store: Store,
     live: LiveClient,
     operators: Operators,
-    references: ReferencesInForce,
-    desk: Authenticator,
     clock: Clock,
+    **own: Any,
 ) -> Context:
-    """Return the context of the API, with the parts that are the same in every serving process."""
+    """Return the context of the API; `own` are the fields that differ between the processes."""
     return Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},
@@ -118,28 +118,20 @@ def context_of(
         films=live.films,
         plant=lambda: live.plant,
         operators=operators,
-        references=references,
+        references=ReferencesInForce(map(machine_of, plant.unit), store, clock),
         store=store,
         clock=clock,
         refresh_s=refresh_s(plant),
-        receivers=lambda: asyncio.to_thread(receiver_views, live.plant.receivers, store.outbox),
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
-        access=desk,
+        **own,
     )
 
 
-def references_of(plant: PlantFile, store: Store, clock: Clock) -> ReferencesInForce:
-    """Return the reader of the gap references that apply, for a process without monitors."""
-    return ReferencesInForce(map(machine_of, plant.unit), store, clock)
-
-
-def evidence_of(
-    plant: PlantFile, store: Store, live: LiveClient, clock: Clock, downloads: Downloads
-) -> EvidenceService:
+def evidence_of(plant: PlantFile, context: Context) -> EvidenceService:
     """Return the service for downloads of alarm evidence."""
-    archive = EvidenceArchive(evidence_folders(plant), store)
-    days = plant.evidence.trend_days
-    return EvidenceService(archive, lambda: live.plant.evidence, days, clock, downloads)
+    archive = EvidenceArchive(evidence_folders(plant), context.store)
+    parts = (plant.evidence.trend_days, context.clock, context.downloads)
+    return EvidenceService(archive, lambda: context.plant().evidence, *parts)
 
 
 ACCESS_EVERY_S = 10.0
@@ -177,9 +169,6 @@ async def serve_beside(
         exchange = operators.exchange = ServingEnd(writer, take)
         listening = asyncio.create_task(exchange.run(reader), name="reports")
         listening.add_done_callback(lambda _: stopped.set())
-        references = references_of(plant, store, clock)
-        await references.look()
-        desk = access_desk(plant, access, clock, start.is_demo)
 
         async def metrics() -> bytes:
             try:
@@ -188,34 +177,29 @@ async def serve_beside(
                 raise ProblemError(503, "No answer", str(error)) from error
             return found
 
-        context = replace(
-            context_of(plant, store, live, operators, references, desk, clock),
-            origin=start.origin,
-            configuration=built_configuration(plant),
-            metrics=metrics,
-            recordings=(evidence_folders(plant).captures, recordings_folder(plant)),
-        )
-        evidence = evidence_of(plant, store, live, clock, context.downloads)
-        await asyncio.wait(
-            [listening, waiting := asyncio.ensure_future(informed.wait())],
-            return_when=asyncio.FIRST_COMPLETED,
-        )
-        waiting.cancel()
-
         async def ready(url: str, token: str | None) -> None:
             with suppress(MeasuringGoneError):
                 await exchange.ask("ready", json.dumps([url, token]))
 
+        context = context_of(
+            *(plant, store, live, operators, clock),
+            access=access_desk(plant, access, clock, start.is_demo),
+            origin=start.origin,
+            configuration=built_configuration(plant),
+            receivers=lambda: asyncio.to_thread(receiver_views, live.plant.receivers, store.outbox),
+            metrics=metrics,
+            recordings=(evidence_folders(plant).captures, recordings_folder(plant)),
+        )
+        waiting = asyncio.ensure_future(informed.wait())
+        await asyncio.wait([listening, waiting], return_when=asyncio.FIRST_COMPLETED)
+        waiting.cancel()
+        report = partial(report_access, access, exchange)
+        loops = {"access": partial(periodic, report, ACCESS_EVERY_S, clock)}
+        evidence = evidence_of(plant, context)
         try:
-            report = partial(report_access, access, exchange)
-            loops: dict[str, Loop] = {
-                "references": references.run,
-                "access": partial(periodic, report, ACCESS_EVERY_S, clock),
-            }
-            await serve_requests(context, plant, listener, desk, loops, stopped, ready, evidence)
+            await serve_requests(context, plant, listener, loops, stopped, ready, evidence)
         finally:
             listening.cancel()
-            await desk.close()
 
 
 async def _main(connection: socket.socket, listener: socket.socket) -> None:

@@ -12,7 +12,7 @@ import typer
 from acquisition.clock import SystemClock
 from service.app.health_page import HOST
 from service.app.listener import listener_of
-from service.app.service import ServiceRun, run_service
+from service.app.measuring_process import ServiceRun, run_service
 from service.app.storage import open_store
 from service.cli.options import (
     DEMO,

@@ -13,6 +13,7 @@ import typer
 from acquisition.clock import SystemClock
 from acquisition.errors import LinkError
 from service.app.listener import listener_of
+from service.app.measuring_process import ServiceRun, run_service
 from service.app.recordings import (
     PlayedOut,
     recordings_by_unit,
@@ -20,7 +21,6 @@ from service.app.recordings import (
     replay_source,
     replayed_plant,
 )
-from service.app.service import ServiceRun, run_service
 from service.app.simulated_daq import Wire, over_wire
 from service.app.storage import database_path
 from service.cli.daq import RunningDaq, SpeedOption, daq_process

@@ -81,6 +81,11 @@ class Consumer:
         return self._state.trouble
 
     @property
+    def behind_s(self) -> float:
+        """Largest delay of the analysed blocks behind their devices, s."""
+        return max((progress.behind_s for progress in self.units.values()), default=0.0)
+
+    @property
     def waiting(self) -> frozenset[str]:
         """Ids of the units with fetched messages that are not being processed yet."""
         return frozenset(unit for unit, queue in self._queues.items() if not queue.empty())

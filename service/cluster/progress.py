@@ -227,9 +227,8 @@ class UnitProgress:
         """
         if self._clock.monotonic_s() - self._arrived_s <= after_s:
             return
-        if self._live.status(self.unit).state in MAY_ARRIVE or self._analyser.is_connected(
-            self.unit
-        ):
+        is_connected = self._analyser.alarms.is_connected(self.unit)
+        if is_connected or self._live.status(self.unit).state in MAY_ARRIVE:
             silence = f"no block for {after_s:g} s; check that `padwatch acquire` is running"
             reason = trouble or self._why_refused or silence
             self._take_news(LinkNews(self.unit, LinkState.NOT_CONNECTED, reason))
@@ -287,7 +286,7 @@ class UnitProgress:
             self.sequence = sequence
             return
         # the link state is not yet known from the replay or from a stored alarm
-        is_known = self._analyser.is_connected(self.unit)
+        is_known = self._analyser.alarms.is_connected(self.unit)
         if not is_known or self._live.status(self.unit).state is not LinkState.CONNECTED:
             self._take_news(LinkNews(self.unit, LinkState.CONNECTED))
         findings = await self._analyser.analyse(message.block, self._sampled_s(message))
@@ -311,7 +310,7 @@ class UnitProgress:
         self._why_refused = str(error)
         # a message up to the stored position was already reported before the restart
         if self._stored is None or sequence > self._stored.sequence:
-            self._analyser.refuse(self.unit, str(error))
+            self._analyser.alarms.refuse(self.unit, str(error))
         if not self.refused[error.kind]:
             log.error("a message is rejected", unit=self.unit, reason=str(error))
         self.refused[error.kind] += 1

@@ -96,7 +96,7 @@ class Analyser:
         films: FilmMonitor,
     ) -> None:
         self._monitors, self._live, self._recorder = monitors, live, recorder
-        self._alarms, self._films = alarms, films
+        self.alarms, self._films = alarms, films
         self._counts = {unit: Counts() for unit in monitors}
         for unit in monitors:
             ASSESSMENTS.labels(unit)  # a unit without results has a count of zero
@@ -127,7 +127,7 @@ class Analyser:
         for assessment in assessments:
             self._live.set_assessment(assessment, sampled_s)
         self._live.set_received(block, monitor.account, sampled_s)
-        news = self._alarms.take(block, assessments, self._films.conditions(films))
+        news = self.alarms.take(block, assessments, self._films.conditions(films))
         if assessments or gaps or news:
             return Findings(assessments, gaps, news, films)
         return NOTHING
@@ -155,7 +155,7 @@ class Analyser:
         """Return the analysis state of a unit, from which another process continues."""
         return UnitMemory(
             self.state(unit),
-            self._alarms.memory(unit),
+            self.alarms.memory(unit),
             self._films.memory(unit),
             self._counts[unit].count,
         )
@@ -170,17 +170,9 @@ class Analyser:
         """Restore a stored state of a unit's monitor after the replay of its newest samples."""
         self._monitors[unit].settle(memory.monitor)
 
-    def refuse(self, unit: str, reason: str) -> None:
-        """Report a refused stream message of a unit to the alarms."""
-        self._alarms.refuse(unit, reason)
-
     def note_link(self, news: LinkNews) -> None:
         """Update the link alarm of a unit."""
-        self._alarms.link(news.unit, news.is_connected, news.reason)
-
-    def is_connected(self, unit: str) -> bool:
-        """Return whether samples of a unit arrive, by the newest report on its link."""
-        return self._alarms.is_connected(unit)
+        self.alarms.link(news.unit, news.is_connected, news.reason)
 
 
 async def _yield() -> None:

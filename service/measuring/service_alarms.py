@@ -64,18 +64,6 @@ class ServiceHealth:
 HealthProbe = Callable[[], ServiceHealth]
 
 
-@dataclass(frozen=True)
-class StreamStatus:
-    """Status of a stream of blocks.
-
-    `trouble` returns the reason why no blocks arrive, None if they arrive; `behind_s` returns the
-    delay of the newest analysed block, s.
-    """
-
-    trouble: Callable[[], str | None]
-    behind_s: Callable[[], float]
-
-
 log = structlog.get_logger()
 
 

@@ -26,7 +26,7 @@ from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.api.auth.authenticator import Authenticator
 from service.api.context import Context
-from service.app.kept_files import captures_of, evidence_of, watch
+from service.app.kept_files import captures_of, evidence_of
 from service.app.serving_process import evidence_of as downloads_of
 from service.app.storage import built_configuration, evidence_folders
 from service.live.client import LiveClient, SocketOperators
@@ -181,15 +181,15 @@ async def build(plant: PlantFile, store: SqliteStore, access: AccessStore, folde
     monitors = {unit.id: UnitMonitor(machine_of(unit), analysis) for unit in plant.unit}
     references = ReferencesInForce([monitor.unit for monitor in monitors.values()], store, clock)
     recorder = Recorder(store, live, clock, ParkedRows(folder / FILE))
-    origin = Origin.LIVE
-    alarms = await alarm_engine(plant, origin, store, recorder.put, clock)
+    alarms = await alarm_engine(plant, Origin.LIVE, store, recorder.put, clock)
     captures = captures_of(plant, Origin.REPLAY, clock)
     machines = {unit: monitor.unit for unit, monitor in monitors.items()}
     films = await film_monitor(plant, machines, store.films, clock)
     service = plant.service.model_copy(update={"data_folder": str(folder)})
     own = plant.model_copy(update={"service": service})
-    evidence = evidence_of(own, origin, live, films, store, captures, clock)
-    watch(evidence, alarms, captures, origin)
+    evidence = evidence_of(own, Origin.LIVE, live, films, store, captures, clock)
+    alarms.set_observer(evidence.see)
+    captures.set_listener(evidence.captured)
     loops: dict[str, str | None] = {}
     executor = CommandExecutor(alarms, films, live, recorder, store, clock)
     integrity = IntegrityMonitor(store, clock, live)
@@ -228,7 +228,7 @@ async def build(plant: PlantFile, store: SqliteStore, access: AccessStore, folde
         recordings=[evidence_folders(own).captures],
         access=Authenticator(access, clock, Role.ADMIN),  # as in the demonstration
     )
-    desk = downloads_of(own, store, serving, clock, context.downloads)
+    desk = downloads_of(own, context)
     return Service(
         *(live, serving, reports, store, access, clock, references, alarms, recorder, evidence),
         *(films, loops, context, desk),

@@ -6,7 +6,6 @@ import sys
 import pytest
 
 MEASURING = [
-    "service.app.service",
     "service.app.measuring_process",
     "service.app.cluster_processes",
 ]

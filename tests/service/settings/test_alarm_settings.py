@@ -20,7 +20,7 @@ from core.limits import Limits
 from core.machine.unit import Bearing
 from core.monitor.catalogue import CATALOGUE
 from service.app.kept_files import captures_of
-from service.app.service_health import health_of
+from service.app.measuring_process import Analysis
 from service.measuring.service_alarms import ServiceRules
 from service.settings.alarm_kinds import ALARM_KINDS, SERVICE_KINDS
 from service.settings.core_values import chatter_rule_of, references_of, rules_of
@@ -259,9 +259,10 @@ def test_every_kind_names_a_rule_and_a_reading_that_exist(rules):
     for kind in SERVICE_KINDS.values():
         assert kind.rule in names_of(ServiceRules), kind.name
     parts = MagicMock()
-    parts.oldest_wait_s, parts.depth, parts.capacity = 0.0, 0, 1
-    look = health_of([], *([parts] * 8))
-    assert set(look().readings) == {kind.reading for kind in SERVICE_KINDS.values()} - {None}
+    parts.bus.oldest_wait_s, parts.stream.behind_s = 0.0, 0.0
+    assert set(Analysis.health(parts).readings) == {
+        kind.reading for kind in SERVICE_KINDS.values()
+    } - {None}
     assert len(ALARM_KINDS) == len(units.ALARM_KINDS) + len(SERVICE_KINDS)
 
 

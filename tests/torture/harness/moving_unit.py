@@ -10,12 +10,10 @@ import numpy as np
 
 from acquisition.clock import Clock, SystemClock
 from harness.stream_rig import ground_of
-from service.app.measuring_process import Analysis, analysis_on
+from service.app.measuring_process import Analysis
 from service.cluster.progress import UnitProgress, memories_of, usable
 from service.cluster.session import identity_of
-from service.measuring.acquirer import Bus
 from service.measuring.recorder import Findings
-from service.notifications.message import LiveContext
 from service.settings.plant import PlantFile, load_plant_file
 from service.store.sqlite import SqliteStore
 
@@ -112,9 +110,8 @@ class MovingUnit:
         live = ground.live
         found = store.position(unit.id)
         memories = memories_of([found] if found else [])
-        analysis = await analysis_on(
-            ground, monitors, Bus(512, clock), LiveContext(live.assessment), memories=memories
-        )
+        analysis = Analysis(ground, monitors)
+        await analysis.start(memories)
         parts = (analysis.analyser, live, analysis.recorder, clock)
         stored, memory = usable(found, STREAM, newest), memories.get(unit.id)
         done = store.reach(unit.id) if stored is None else None

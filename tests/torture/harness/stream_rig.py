@@ -20,14 +20,14 @@ from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer
 from harness.waiting import at_work
 from service.app.cluster_processes import Analysing
-from service.app.measuring_process import ProcessContext, analysis_on
+from service.app.measuring_process import Analysis, ProcessContext
 from service.app.storage import open_store
 from service.cluster.frames import Taken, decoded
 from service.cluster.ownership import Partition
 from service.cluster.publisher import Publisher
 from service.cluster.session import identity_of, stream_name, subject
 from service.live.status import LinkState
-from service.measuring.acquirer import Bus, LinkNews
+from service.measuring.acquirer import LinkNews
 from service.measuring.live_view import LiveView
 from service.measuring.sources import monitor_of
 from service.notifications.message import LiveContext
@@ -105,7 +105,8 @@ def ground_of(plant: PlantFile, clock: Clock, store: Store) -> tuple[ProcessCont
     monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in plant.unit}
     beats = Heartbeats(clock)
     live = LiveView(monitors, clock, stale_after_s(plant))
-    return ProcessContext(plant, Origin.LIVE, clock, store, live, beats), monitors
+    context = LiveContext(live.assessment)
+    return ProcessContext(plant, Origin.LIVE, clock, store, live, beats, context), monitors
 
 
 @asynccontextmanager
@@ -114,8 +115,7 @@ async def analysing(plant: PlantFile) -> AsyncIterator[tuple[Analysing, ProcessC
     store = open_store(plant)
     ground, monitors = ground_of(plant, SystemClock(), store)
     assert plant.stream is not None
-    context = LiveContext(ground.live.assessment)
-    process = Analysing(plant, Partition(), plant.stream, monitors, ground, context)
+    process = Analysing(plant, Partition(), plant.stream, monitors, ground)
     task = asyncio.create_task(process.run())
     try:
         yield process, ground
@@ -153,9 +153,8 @@ async def single_process(plant_file: Path, sent: Sequence[Sent]) -> Path:
     path = Path(plant.service.data_folder) / "padwatch.sqlite3"
     store = SqliteStore(path)
     ground, monitors = ground_of(plant, clock, store)
-    analysis = await analysis_on(
-        ground, monitors, Bus(512, clock), LiveContext(ground.live.assessment)
-    )
+    analysis = Analysis(ground, monitors)
+    await analysis.start()
     try:
         for unit, message in sent:
             if isinstance(message, LinkNews):

@@ -60,7 +60,7 @@ async def pair(running: Any, plant: PlantFile) -> AsyncIterator[Pair]:
     """Both, and the replica has seen two reports: it knows that somebody is alive."""
     reporter, carrying_out = process_of(running, plant, "one")
     replica = Replica(plant, running.store, running.clock)
-    await replica.start()
+    await replica.feed.start()
     app = described_app(replica.context(running.context.access, Heartbeats(running.clock)))
     transport = httpx2.ASGITransport(app)
     async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:

@@ -65,7 +65,7 @@ async def test_a_process_that_has_died_is_not_shown_as_healthy(pair):
 async def test_a_report_that_was_there_before_the_replica_is_no_sign_of_life(running, pair, plant):
     await pair.reporter.report()
     late = Replica(plant, running.store, running.clock)
-    await late.start()
+    await late.feed.start()
     await late.feed.look()
     assert not late.live.units.is_alive("U1")
     assert not late.live.units.current("U1", "UJB").is_current

@@ -21,7 +21,7 @@ from core.monitor.assessment import Assessment
 from core.quality import Level, Quality, Reading, Reason, bad, missing
 from core.samples.blocks import DeviceClock, Rejection, SampleBlock
 from core.samples.gaps import SampleAccount
-from service.app.service import ServiceRun, run_service
+from service.app.measuring_process import ServiceRun, run_service
 from service.live.status import LinkState
 from service.measuring.analyser import ASSESSMENTS
 from service.measuring.live_view import LiveView

@@ -14,8 +14,8 @@ from prometheus_client.metrics_core import Metric
 
 from core.change.decision import Verdict
 from core.change.film_judge import FilmFinding, FilmNews
+from service.app.replica_process import REPORTS
 from service.cluster.consumer import add_consumer
-from service.cluster.replica_metrics import REPORTS
 from service.live.metrics import add_films, add_units
 from service.measuring.live_view import LiveView
 from service.runtime.metrics import Families

@@ -10,8 +10,8 @@ import pytest
 import structlog
 
 from acquisition.clock import SystemClock
+from service.app.measuring_process import ServiceRun, run_service
 from service.app.process import Supervision
-from service.app.service import ServiceRun, run_service
 from service.live.status import LinkState
 from service.measuring.live_view import LiveView
 from service.measuring.sources import live_units

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from service.app.service_health import health_of
+from service.app.measuring_process import Analysis
 from service.recordings.library import RecordingLibrary
 from service.runtime.disk import DiskSpace
 from service.store.port import StoreError
@@ -189,35 +189,21 @@ def test_a_disk_that_does_not_say_leaves_the_others_measured(rig):
 
 def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig, index):
     keeper = rig.keeper(lambda: rig.caretaker)
-    parts: Any = SimpleNamespace(
-        store_error=None,
-        behind_s=0.0,
-        n_unstored=0,
-        depth=0,
-        capacity=1,
-        oldest_wait_s=0.0,
-        unstored_reason=None,
-        words=None,
-        condition=None,
-        trouble=None,
-    )
-    look = health_of([], *[parts] * 6, recordings=keeper, soundness=parts)
+    parts: Any = SimpleNamespace(tape=SimpleNamespace(trouble=None), recordings=keeper)
     folder = rig.make(0)
     index.is_away = True
     keeper.look()
     assert rig.names() == [folder.name]  # nothing is lost
     rig.clock.s += 55.0
     keeper.look()
-    assert look().readings["recording_error"] is None
+    assert Analysis.recording_error.fget(parts) is None
     rig.clock.s += 5.0
-    assert (
-        look().readings["recording_error"]
-        == "recordings are not maintained: database or disk is full"
-    )
+    found = Analysis.recording_error.fget(parts)
+    assert found == "recordings are not maintained: database or disk is full"
     index.is_away = False
     keeper.look()
 
-    assert look().readings["recording_error"] is None
+    assert Analysis.recording_error.fget(parts) is None
     keeper.close()
 
 
