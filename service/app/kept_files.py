@@ -35,7 +35,6 @@ from service.settings.core_values import analysis_of, film_rules_of
 from service.settings.plant import PlantFile
 from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.storage import BYTES_PER_GB, Origin
-from service.settings.units import UnitSettings
 from service.store.store import Store
 from service.store.waveforms import WaveformKind
 
@@ -47,10 +46,11 @@ def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
     # a vector rack has no samples
     waveforms = [u for u in plant.unit if not isinstance(u.source, ModbusVectorSettings)]
     units = waveforms if kept else []
-    settings = CaptureSettings(
-        **found.values_for(CaptureSettings),
-        window_s=max((_window_s(plant, unit) for unit in units), default=0.0),
-    )
+    watched = [u for u in units if not isinstance(film_rules_of(u, plant.films), str)]
+    analysis = analysis_of(plant.analysis)
+    n_samples = analysis.segment_samples + (analysis.n_segments - 1) * analysis.hop_samples
+    window_s = max((n_samples / unit.sampling_hz for unit in watched), default=0.0)
+    settings = CaptureSettings(**found.values_for(CaptureSettings), window_s=window_s)
     return Captures(
         Path(plant.service.data_folder) / CAPTURES,
         settings,
@@ -58,15 +58,6 @@ def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
         {unit.id: unit.sampling_hz for unit in units},
         clock,
     )
-
-
-def _window_s(plant: PlantFile, unit: UnitSettings) -> float:
-    """Return the length of an averaging window of a watched film; 0 if none is watched."""
-    if isinstance(film_rules_of(unit, plant.films), str):
-        return 0.0
-    analysis = analysis_of(plant.analysis)
-    n_samples = analysis.segment_samples + (analysis.n_segments - 1) * analysis.hop_samples
-    return n_samples / unit.sampling_hz
 
 
 def tape_of(

@@ -1,6 +1,7 @@
 """Measuring process: results, alarms, evidence and messages from blocks; `padwatch run`."""
 
 import asyncio
+import os
 import socket
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
@@ -8,6 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
+from uuid import uuid4
 
 from prometheus_client.process_collector import ProcessCollector
 
@@ -23,7 +25,7 @@ from service.app.service_audit import ServiceTrail
 from service.app.storage import database_path, open_access, open_store
 from service.app.supervisor import ServingChild, Start
 from service.cluster.consumer import Consumer
-from service.cluster.measuring_side import CommandWorker, Reporter, process_name
+from service.cluster.measuring_side import CommandWorker, Reporter
 from service.live.alarm_list import SHARED
 from service.live.metrics import add_alarms, add_films, add_units
 from service.live.references import ReferencesInForce
@@ -39,7 +41,7 @@ from service.measuring.metrics import add_disks, add_integrity, add_samples, add
 from service.measuring.recorder import FILE, ParkedRows, Recorder
 from service.measuring.service_alarms import ServiceHealth
 from service.measuring.snapshots import SnapshotBuilder, SocketReports
-from service.measuring.sources import WatchedUnit, timed_sources, vector_rows
+from service.measuring.sources import WatchedUnit
 from service.notifications.message import LiveContext
 from service.notifications.metrics import add_deliveries
 from service.notifications.sender import Deliveries
@@ -158,7 +160,7 @@ class Analysis:
             for unit, monitor in monitors.items():
                 monitor.go_on(await asyncio.to_thread(store.reach, unit))
         self.alarms = alarms = await alarm_engine(
-            *(plant, origin, store, recorder.put, clock, self._listen, vector_rows(plant)),
+            *(plant, origin, store, recorder.put, clock, self._listen),
             *(self.health, self._part, {unit: memory.alarms for unit, memory in memories.items()}),
         )
         machines = {unit: monitor.unit for unit, monitor in monitors.items()}
@@ -214,7 +216,8 @@ class Analysis:
         `held` returns the units of this process, also `PLANT` if it reports alarms without a unit,
         `SHARED` if it runs the plant-wide tasks.
         """
-        name, store, clock = process_name(), self.process.store, self.process.clock
+        name = f"{socket.gethostname()}:{os.getpid()}:{uuid4().hex[:12]}"
+        store, clock = self.process.store, self.process.clock
         reporter = Reporter(name, held, self.snapshots, store.unit_states, clock)
         commands = CommandWorker(name, held, self.executor, store, clock)
         return {"report": reporter.run, "commands": commands.run}
@@ -419,7 +422,9 @@ async def run_service(
             require_protected(plant, access)
         live, beats = process.live, process.beats
         monitors = {unit: watched.monitor for unit, watched in units.items()}
-        analysis = Analysis(process, monitors, sources=timed_sources(units))
+        sources = {unit: watched.source for unit, watched in units.items()}
+        timed = {u: each for u, each in sources.items() if isinstance(each, TimedSource)}
+        analysis = Analysis(process, monitors, sources=timed)
         await analysis.start()
         parts = (analysis.analyser, analysis.recorder, analysis.bus, beats, clock)
         runner = Runner(units, live, *parts)

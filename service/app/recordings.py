@@ -113,17 +113,19 @@ class PlayedOut:
         recording.
         """
         async with AsyncExitStack() as stack:
+            blocks = None
             try:
                 blocks = await stack.enter_async_context(self._source.connect())
             except LinkError:
                 if not self._is_over:
                     raise
-                blocks = _no_blocks()
             yield await stack.enter_async_context(aclosing(self._until_over(blocks)))
 
     async def _until_over(
-        self, blocks: AsyncIterator[SampleBlock]
+        self, blocks: AsyncIterator[SampleBlock] | None
     ) -> AsyncGenerator[SampleBlock, None]:
+        if blocks is None:
+            return
         try:
             async for block in blocks:
                 yield replace(block, clock=None)  # the device reports the times of the recording
@@ -134,8 +136,3 @@ class PlayedOut:
     @property
     def _is_over(self) -> bool:
         return self._over.is_set() or (self._gone is not None and self._gone.is_set())
-
-
-async def _no_blocks() -> AsyncIterator[SampleBlock]:
-    return
-    yield

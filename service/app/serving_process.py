@@ -19,7 +19,7 @@ from service.app.storage import (
     built_configuration,
     evidence_folders,
     open_access,
-    open_store_to_serve,
+    open_store,
     recordings_folder,
 )
 from service.app.supervisor import Start, read_start
@@ -154,7 +154,7 @@ async def serve_beside(
     """Serve requests until the measuring process, connected by `reader` and `writer`, ends."""
     plant, stopped = start.plant, stop_on_signals()
     with (
-        closing(open_store_to_serve(plant, start.origin)) as store,
+        closing(open_store(plant, start.origin, only_reads=True)) as store,
         closing(open_access(plant, start.origin)) as access,
     ):
         live = LiveClient(plant, store.films, clock, lambda *question: exchange.ask(*question))

@@ -143,37 +143,32 @@ def modbus_device(unit: UnitSettings, source: ModbusSettings, feed: SampleFeed) 
     LookupError
         If the unit of a rack has no speed channel.
     """
-    ids = [channel.id for channel in unit.channel]
+    ids, calibration = [channel.id for channel in unit.channel], calibration_of(unit)
     match source:
         case ModbusRingSettings():
-            return RingDevice(feed, unit.id, _ring_shape(unit, source))
+            base, n_samples = source.base_address, unit.block_samples  # one block per slot
+            shape = RingDeviceSettings(base_address=base, samples_per_slot=n_samples)
+            if (own := unit.simulation) is not None:
+                n_samples = own.samples_per_slot
+                shape = replace(shape, samples_per_slot=n_samples, n_slots=own.n_slots)
+            return RingDevice(feed, unit.id, shape)
         case ModbusFifoSettings():
             return FifoDevice(feed, source.fifo_layout(len(ids)), unit.id)
         case ModbusPolledSettings():
-            return MapDevice(feed, source.registers, ids, calibration_of(unit), unit.id)
+            return MapDevice(feed, source.registers, ids, calibration, unit.id)
         case ModbusVectorSettings():
-            return _rack(unit, source, feed, ids)
-
-
-def _rack(
-    unit: UnitSettings, source: ModbusVectorSettings, feed: SampleFeed, ids: list[str]
-) -> VectorDevice:
-    """Return a rack that computes vectors from the samples of a feed at each poll."""
-    if unit.speed_channel is None:
-        raise LookupError(f"unit {unit.id}: a simulated rack requires speed_channel; set it")
-    calibration = calibration_of(unit)
-    step_samples = max(1, round(min(source.poll_period_s, 1.0) * calibration.rate_hz))
-    return VectorDevice(
-        feed,
-        source.registers,
-        source.rows,
-        calibration,
-        channels=ids,
-        speed_channel=unit.speed_channel,
-        unit=unit.id,
-        step_samples=step_samples,
-        window_samples=max(round(VECTOR_WINDOW_S * calibration.rate_hz), step_samples),
-    )
+            if unit.speed_channel is None:
+                words = f"unit {unit.id}: a simulated rack requires speed_channel; set it"
+                raise LookupError(words)
+            step_samples = max(1, round(min(source.poll_period_s, 1.0) * calibration.rate_hz))
+            return VectorDevice(
+                *(feed, source.registers, source.rows, calibration),
+                channels=ids,
+                speed_channel=unit.speed_channel,
+                unit=unit.id,
+                step_samples=step_samples,
+                window_samples=max(round(VECTOR_WINDOW_S * calibration.rate_hz), step_samples),
+            )
 
 
 def modbus_server(
@@ -216,16 +211,6 @@ def daq_of(
             if isinstance(device, RingDevice):
                 device.patient = recorded
             return modbus_server(device, source, clock, patient=recorded)
-
-
-def _ring_shape(unit: UnitSettings, source: ModbusRingSettings) -> RingDeviceSettings:
-    """Return the ring settings of the unit's simulation; default: one block per slot."""
-    shape = RingDeviceSettings(
-        base_address=source.base_address, samples_per_slot=unit.block_samples
-    )
-    if (own := unit.simulation) is None:
-        return shape
-    return replace(shape, samples_per_slot=own.samples_per_slot, n_slots=own.n_slots)
 
 
 _LOOPBACK = "127.0.0.1"

@@ -22,72 +22,51 @@ if TYPE_CHECKING:
 DATABASE, ACCESS_DATABASE = "padwatch.sqlite3", "access.sqlite3"
 
 
-def database_path(plant: PlantFile) -> Path:
-    """Return the path of the plant's database file; the file need not exist."""
-    return Path(plant.service.data_folder) / DATABASE
+def database_path(plant: PlantFile, name: str = DATABASE) -> Path:
+    """Return the path of a database file of the plant; the file need not exist."""
+    return Path(plant.service.data_folder) / name
 
 
 def access_path(plant: PlantFile) -> Path:
     """Return the path of the file of accounts, sessions and keys; the file need not exist."""
-    return Path(plant.service.data_folder) / ACCESS_DATABASE
+    return database_path(plant, ACCESS_DATABASE)
 
 
-def has_store(plant: PlantFile) -> bool:
-    """Return whether the plant's database exists; always True for PostgreSQL."""
-    return plant.store.postgresql is not None or database_path(plant).exists()
+def has_store(plant: PlantFile, name: str = DATABASE) -> bool:
+    """Return whether a database of the plant exists; always True for PostgreSQL."""
+    return plant.store.postgresql is not None or database_path(plant, name).exists()
 
 
-def store_name(plant: PlantFile) -> str:
-    """Return the name of the plant's database for messages."""
+def store_name(plant: PlantFile, name: str = DATABASE) -> str:
+    """Return the name of a database of the plant for messages."""
     if plant.store.postgresql is not None:
-        return _postgres_address(plant, plant.store.postgresql).name
-    return str(database_path(plant).absolute())
-
-
-def has_access(plant: PlantFile) -> bool:
-    """Return whether the database of accounts exists; always True for PostgreSQL."""
-    return plant.store.postgresql is not None or access_path(plant).exists()
-
-
-def access_name(plant: PlantFile) -> str:
-    """Return the name of the database of accounts for messages."""
-    is_file = plant.store.postgresql is None
-    return str(access_path(plant).absolute()) if is_file else store_name(plant)
-
-
-def head_file(plant: PlantFile) -> Path:
-    """Return the path of the head file, a local file with the newest entry of the audit trail."""
-    if plant.store.postgresql is not None:
-        return head_path(Path(plant.service.data_folder) / "postgresql")
-    return head_path(database_path(plant))
+        return _server(plant, plant.store.postgresql)[0].name
+    return str(database_path(plant, name).absolute())
 
 
 def open_store(
-    plant: PlantFile, origin: Origin = Origin.LIVE, address: Address = no_recipients
+    plant: PlantFile,
+    origin: Origin = Origin.LIVE,
+    address: Address = no_recipients,
+    *,
+    only_reads: bool = False,
 ) -> Store:
     """Open the plant's database: a SQLite file, created if missing, or PostgreSQL.
 
-    `address` returns the recipients of the notification of an alarm event. Raises `StoreError` if
-    the database cannot be used, or contains results of another origin (live, replay).
+    `address` returns the recipients of the notification of an alarm event. With `only_reads`, a
+    SQLite file is opened read-only; with PostgreSQL operators' commands can be written. Raises
+    `StoreError` if the database cannot be used, or contains results of another origin (live,
+    replay).
     """
     if plant.store.postgresql is None:
-        return SqliteStore(database_path(plant), origin, address, plant.spectra)
+        path = database_path(plant)
+        return (
+            SqliteReader(path) if only_reads else SqliteStore(path, origin, address, plant.spectra)
+        )
     from service.store.postgres import PostgresStore  # slow import
 
-    where = _postgres_address(plant, plant.store.postgresql)
-    return PostgresStore(where, head_file(plant), origin, address, plant.spectra)
-
-
-def open_store_to_serve(plant: PlantFile, origin: Origin = Origin.LIVE) -> Store:
-    """Open the plant's database for a process that only serves requests.
-
-    A SQLite file is opened read-only; with PostgreSQL operators' commands can be written.
-
-    Raises `StoreError` if the database cannot be used.
-    """
-    if plant.store.postgresql is None:
-        return SqliteReader(database_path(plant))
-    return open_store(plant, origin)
+    server = _server(plant, plant.store.postgresql)
+    return PostgresStore(*server, origin, address, plant.spectra)
 
 
 def open_access(plant: PlantFile, origin: Origin = Origin.LIVE) -> AccessStore:
@@ -99,9 +78,7 @@ def open_access(plant: PlantFile, origin: Origin = Origin.LIVE) -> AccessStore:
         return open_access_file(access_path(plant))
     from service.store.postgres.store import open_server_access
 
-    return open_server_access(
-        _postgres_address(plant, plant.store.postgresql), head_file(plant), origin
-    )
+    return open_server_access(*_server(plant, plant.store.postgresql), origin)
 
 
 def open_trails(plant: PlantFile) -> list[Trail]:
@@ -110,13 +87,15 @@ def open_trails(plant: PlantFile) -> list[Trail]:
         return [file_trail(database_path(plant)), file_trail(access_path(plant))]
     from service.store.postgres.store import server_trail
 
-    return [server_trail(_postgres_address(plant, plant.store.postgresql), head_file(plant))]
+    return [server_trail(*_server(plant, plant.store.postgresql))]
 
 
-def _postgres_address(plant: PlantFile, conninfo: str) -> "PostgresAddress":
+def _server(plant: PlantFile, conninfo: str) -> "tuple[PostgresAddress, Path]":
+    """Return the address of the PostgreSQL database, and the local head file of its audit trail."""
     from service.store.postgres.connection import PostgresAddress
 
-    return PostgresAddress(conninfo, plant.store.password_path)
+    head = head_path(Path(plant.service.data_folder) / "postgresql")
+    return PostgresAddress(conninfo, plant.store.password_path), head
 
 
 CAPTURES, RECORDINGS = "captures", "recordings"

@@ -155,9 +155,9 @@ def plant_store(plant: "PlantFile", creates: bool = False) -> Iterator["Store"]:
 @contextmanager
 def plant_access(plant: "PlantFile", creates: bool = False) -> Iterator["AccessStore"]:
     """Open the database of accounts and keys (`creates`: also create it); yield its store."""
-    from service.app.storage import access_name, has_access, open_access
+    from service.app.storage import ACCESS_DATABASE, has_store, open_access, store_name
 
-    _require(has_access(plant), access_name(plant), creates)
+    _require(has_store(plant, ACCESS_DATABASE), store_name(plant, ACCESS_DATABASE), creates)
     with closing(open_access(plant)) as store:
         yield store
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from acquisition.clock import SystemClock
-from service.app.storage import access_path, database_path, has_access, store_name
+from service.app.storage import access_path, database_path, store_name
 from service.cli.accounts import access_of
 from service.cli.offline.backtest import time_ns_of
 from service.cli.offline.backtest_files import SUFFIXES, readings_file, stored_histories, table_of
@@ -52,7 +52,7 @@ def backup(
     """
     plant, now_ns = load_plant_file(plant_file), SystemClock().now_ns()
     copies = [back_up(_file(plant), folder, now_ns, keep)]
-    if has_access(plant):
+    if access_path(plant).exists():
         copies.append(back_up(access_path(plant), folder, now_ns, keep, None))
     found = [
         {

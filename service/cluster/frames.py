@@ -7,10 +7,10 @@ import math
 import struct
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import lru_cache
-from typing import Annotated, Any, Literal, NamedTuple, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
@@ -18,7 +18,6 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from core.quality import Reading
 from core.samples.blocks import DeviceClock, Rejection, SampleBlock, SideValues, StampFault
 from core.samples.calibration import UnitCalibration
-from service.live.status import LinkState
 from service.measuring.acquirer import LinkNews
 
 SENDER = "check which program writes to the stream"
@@ -100,15 +99,6 @@ class Kind(IntEnum):
     LINK = 2
 
 
-@dataclass(frozen=True)
-class Frame:
-    """Parts of a stream message: kind, encoded JSON head and encoded samples."""
-
-    kind: Kind
-    head: bytes
-    samples: memoryview
-
-
 def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b"") -> bytes:
     """Return a stream message; raise `ValueError` if its JSON head or its samples are too large."""
     if len(head) > MAX_HEAD_BYTES or len(samples) > MAX_SAMPLE_BYTES:
@@ -123,8 +113,8 @@ def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b""
     return body + _CRC.pack(zlib.crc32(body))
 
 
-def _unframed(message: bytes, identity: UnitIdentity) -> Frame:
-    """Check the header and checksum of a stream message of the unit `identity`; return its parts.
+def _unframed(message: bytes, identity: UnitIdentity) -> tuple[Kind, bytes, memoryview]:
+    """Check a stream message of the unit `identity`; return its kind, head and samples.
 
     Raises `WireError` if the bytes are not a message, are damaged, or are of another version, plant
     or configuration. Invalid bytes raise no other exception.
@@ -135,7 +125,10 @@ def _unframed(message: bytes, identity: UnitIdentity) -> Frame:
         )
     _, version, kind, plant, make, n_head, n_samples = _START.unpack_from(message)
     if version not in READABLE:
-        raise WireError("other_version", _other_version(version))
+        known = " and ".join(str(each) for each in READABLE)
+        newer = "upgrade `padwatch analyse`" if version > VERSION else "upgrade `padwatch acquire`"
+        words = f"a message of format version {version}, but this program supports {known}; {newer}"
+        raise WireError("other_version", words)
     whole = _START.size + n_head + n_samples + _CRC.size
     if n_head > MAX_HEAD_BYTES or n_samples > MAX_SAMPLE_BYTES or whole != len(message):
         why = f"a message of {len(message)} bytes, expected {whole}; {SENDER}"
@@ -156,13 +149,7 @@ def _unframed(message: bytes, identity: UnitIdentity) -> Frame:
         raise WireError("unknown_kind", f"a message of unknown kind {kind}; {SENDER}")
     head = bytes(body[_START.size : _START.size + n_head])
     samples = body[_START.size + n_head : whole - _CRC.size]
-    return Frame(Kind(kind), head, samples)
-
-
-def _other_version(version: int) -> str:
-    known = " and ".join(str(each) for each in READABLE)
-    newer = "upgrade `padwatch analyse`" if version > VERSION else "upgrade `padwatch acquire`"
-    return f"a message of format version {version}, but this program supports {known}; {newer}"
+    return Kind(kind), head, samples
 
 
 SAMPLE: Mapping[str, np.dtype[Any]] = {"int16": np.dtype("<i2"), "float32": np.dtype("<f4")}
@@ -174,8 +161,6 @@ Index = Annotated[int, Field(ge=0, lt=2**53)]
 
 Ns = Annotated[int, Field(ge=-(2**62), lt=2**62)]
 """Time in ns, from 1823 to 2116, so that sums and differences fit 64-bit database columns."""
-
-T = TypeVar("T")
 
 STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="constants")
 
@@ -211,18 +196,7 @@ class _BlockHead:
     taken_ns: Ns
 
 
-@dataclass(frozen=True)
-class _LinkHead:
-    """JSON head of a link message: the link state of a unit."""
-
-    __pydantic_config__ = STRICT
-
-    unit: str
-    state: LinkState
-    reason: str | None
-
-
-_BLOCK, _LINK = TypeAdapter(_BlockHead), TypeAdapter(_LinkHead)
+_BLOCK, _LINK = TypeAdapter(_BlockHead), TypeAdapter(LinkNews)
 
 
 @dataclass(frozen=True)
@@ -269,7 +243,7 @@ def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> 
 
 def encoded_link(news: LinkNews, identity: UnitIdentity) -> bytes:
     """Encode a link state as a stream message; its reason is cut to 1000 characters."""
-    head = _LinkHead(news.unit, news.state, None if news.reason is None else news.reason[:1000])
+    head = replace(news, reason=None if news.reason is None else news.reason[:1000])
     return framed(Kind.LINK, identity, _LINK.dump_json(head))
 
 
@@ -278,25 +252,28 @@ def decoded(message: bytes, identity: UnitIdentity) -> Taken | LinkNews:
 
     Raises `WireError` if the message cannot be used. Invalid bytes raise no other exception.
     """
-    frame = _unframed(message, identity)
-    if frame.kind is Kind.LINK:
-        link = _read(_LINK, frame.head)
-        _require_own(link.unit, identity)
-        return LinkNews(link.unit, link.state, link.reason)
-    return _block(frame, identity)
-
-
-def _block(frame: Frame, identity: UnitIdentity) -> Taken:
-    head = _read(_BLOCK, frame.head)
-    _require_own(head.calibration.unit, identity)
+    kind, content, samples = _unframed(message, identity)
+    try:
+        head = (_LINK if kind is Kind.LINK else _BLOCK).validate_json(content)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        words = f"{where}: {first['msg']}" if where else first["msg"]
+        why = f"a message with an invalid head: {words}; {SENDER}"
+        raise WireError("not_understood", why) from None
+    unit = head.unit if isinstance(head, LinkNews) else head.calibration.unit
+    if unit != identity.unit:
+        why = f"a message of unit {unit} on the subject of unit {identity.unit}; {SENDER}"
+        raise WireError("other_unit", why)
+    if isinstance(head, LinkNews):
+        return head
     n_channels, type_ = len(head.calibration.channels), SAMPLE[head.sample_type]
-    if n_channels * head.n_samples * type_.itemsize != len(frame.samples):
+    if n_channels * head.n_samples * type_.itemsize != len(samples):
         raise WireError(
             "wrong_length",
-            f"{len(frame.samples)} bytes for {n_channels} channels of {head.n_samples} samples;"
-            f" {SENDER}",
+            f"{len(samples)} bytes for {n_channels} channels of {head.n_samples} samples; {SENDER}",
         )
-    counts = np.frombuffer(frame.samples, dtype=type_).reshape(n_channels, head.n_samples)
+    counts = np.frombuffer(samples, dtype=type_).reshape(n_channels, head.n_samples)
     block = SampleBlock(
         calibration=_shared(head.calibration),
         epoch=head.epoch,
@@ -334,22 +311,3 @@ def _side_values(head: _BlockHead) -> SideValues:
         ok=np.array([[bool(c.ok >> row & 1) for c in head.cells] for row in range(n_channels)]),
         slow=slow.reshape(len(starts), n_slow).T,
     )
-
-
-def _read(adapter: TypeAdapter[T], head: bytes) -> T:
-    try:
-        return adapter.validate_json(head)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        words = f"{where}: {first['msg']}" if where else first["msg"]
-        message = f"a message with an invalid head: {words}; {SENDER}"
-        raise WireError("not_understood", message) from None
-
-
-def _require_own(unit: str, identity: UnitIdentity) -> None:
-    if unit != identity.unit:
-        raise WireError(
-            "other_unit",
-            f"a message of unit {unit} on the subject of unit {identity.unit}; {SENDER}",
-        )

@@ -1,10 +1,7 @@
 """Measuring side of a cluster: writes reports to the database, and executes its commands."""
 
 import asyncio
-import os
-import socket
 from collections.abc import Callable, Collection, Iterable
-from uuid import uuid4
 
 from acquisition.clock import Clock
 from service.live.commands import BaselineCommand, UnreadableCommandError, decoded
@@ -81,11 +78,6 @@ class Reporter:
         )
 
 
-def process_name() -> str:
-    """Return a unique name of this process: host name, process id and random hex digits."""
-    return f"{socket.gethostname()}:{os.getpid()}:{uuid4().hex[:12]}"
-
-
 COMMANDS_EVERY_S = 0.25
 
 TOO_LATE = Answer(CommandState.WITHDRAWN, "no process accepted the command in time")
@@ -135,23 +127,21 @@ class CommandWorker:
 
     async def _take_up(self, found: OpenCommand) -> None:
         command, commands = found.command, self._store.commands
-        answer = self._why_not(found)
+        answer: Answer | None = None
+        if self._clock.now_ns() > command.expires_ns:
+            answer = TOO_LATE
+        else:
+            try:
+                task = decoded(command.kind, command.document)
+            except UnreadableCommandError as error:
+                answer = Answer(CommandState.REFUSED, str(error))
+            else:
+                # baselines and answer are stored in separate transactions: the outcome is unknown
+                if isinstance(task, BaselineCommand) and found.taken_by is not None:
+                    answer = INTERRUPTED
         if answer is None:
             if not await asyncio.to_thread(commands.take, command.id, self._process):
                 return  # the sender has withdrawn the command
-            task = decoded(command.kind, command.document)
             who = Acting(Source.API, command.peer, command.actor, command.id)
             answer = await self._executor.execute(task, who)
         await asyncio.to_thread(commands.answer, command.id, answer, self._clock.now_ns())
-
-    def _why_not(self, found: OpenCommand) -> Answer | None:
-        """Return the answer to a command that must not be executed; None if it may be executed."""
-        if self._clock.now_ns() > found.command.expires_ns:
-            return TOO_LATE
-        try:
-            task = decoded(found.command.kind, found.command.document)
-        except UnreadableCommandError as error:
-            return Answer(CommandState.REFUSED, str(error))
-        # baselines and answer are stored in separate transactions: the outcome is unknown
-        is_in_doubt = isinstance(task, BaselineCommand) and found.taken_by is not None
-        return INTERRUPTED if is_in_doubt else None

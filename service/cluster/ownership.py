@@ -38,14 +38,16 @@ class Holds:
     async def take(self) -> None:
         """Acquire all locks; wait while another process holds any of them or the database fails."""
         while True:
-            refusal = await asyncio.to_thread(self._try)
-            if refusal is None:
-                break
-            if refusal != self.waits_for:
-                log.info("standing by until the locks of the units are free", reason=refusal)
-            self.waits_for = refusal
-            await self._clock.sleep(EVERY_S)
-        self.waits_for = None
+            try:
+                await asyncio.to_thread(self._try)
+            except StoreError as error:
+                if str(error) != self.waits_for:
+                    reason = self.waits_for = str(error)
+                    log.info("standing by until the locks of the units are free", reason=reason)
+                await self._clock.sleep(EVERY_S)
+            else:
+                self.waits_for = None
+                return
 
     def require(self) -> None:
         """Raise `HoldLostError` if a lock is no longer held."""
@@ -59,14 +61,10 @@ class Holds:
         """Release all locks."""
         self._stack.close()
 
-    def _try(self) -> str | None:
+    def _try(self) -> None:
         with ExitStack() as stack:
-            try:
-                self._holds = [stack.enter_context(self._store.hold(name)) for name in self._names]
-            except StoreError as error:
-                return str(error)
+            self._holds = [stack.enter_context(self._store.hold(name)) for name in self._names]
             self._stack = stack.pop_all()
-        return None
 
 
 SHARED_WORK = "shared work"

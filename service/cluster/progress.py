@@ -2,13 +2,13 @@
 
 from collections import Counter, deque
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 
 import structlog
 from pydantic import TypeAdapter, ValidationError
 
 from acquisition.clock import Clock
-from core.monitor.monitor import MonitorState
 from core.samples.blocks import BlockMisfitError, SampleBlock
 from core.samples.gaps import Reach
 from core.units import s_from_ns
@@ -20,32 +20,26 @@ from service.measuring.live_view import LiveView
 from service.measuring.recorder import Findings, Recorder
 from service.store.sharing import StreamPosition
 
+log = structlog.get_logger()
+
 _MEMORY = TypeAdapter(UnitMemory)
-
-
-def written(memory: UnitMemory) -> bytes:
-    """Serialize the analysis state of a unit to JSON without loss."""
-    return _MEMORY.dump_json(memory)
-
-
-def read(document: bytes) -> UnitMemory | None:
-    """Parse a serialized analysis state; return None if it is invalid or of another version."""
-    try:
-        memory = _MEMORY.validate_json(document)
-    except ValidationError:
-        return None
-    return memory if memory.version == VERSION else None
 
 
 def memories_of(stored: Iterable[StreamPosition]) -> dict[str, UnitMemory]:
     """Return the stored analysis states by unit id; log and omit states that are not readable."""
-    found = {position.unit: read(position.memory) for position in stored}
-    for unit, memory in found.items():
-        if memory is None:
+    memories = {}
+    for position in stored:
+        memory = None
+        with suppress(ValidationError):
+            memory = _MEMORY.validate_json(position.memory)
+        if memory is not None and memory.version == VERSION:
+            memories[position.unit] = memory
+        else:
             log.error(
-                "stored analysis state cannot be read; the analysis restarts without it", unit=unit
+                "stored analysis state cannot be read; the analysis restarts without it",
+                unit=position.unit,
             )
-    return {unit: memory for unit, memory in found.items() if memory is not None}
+    return memories
 
 
 def usable(stored: StreamPosition | None, stream: str, newest: int) -> StreamPosition | None:
@@ -66,41 +60,16 @@ def usable(stored: StreamPosition | None, stream: str, newest: int) -> StreamPos
     return stored
 
 
-@dataclass(frozen=True)
-class _Seen:
-    sequence: int
-    epoch: int | None
-    stop_index: int
-
-
-class Window:
-    """Window of the newest messages of a unit, which a replay after a restart begins with."""
-
-    def __init__(self) -> None:
-        self._seen: deque[_Seen] = deque()
-
-    def note(self, sequence: int, block: SampleBlock, state: MonitorState) -> None:
-        """Add the message of a block by its stream sequence number.
-
-        Messages that are no longer needed to restore `state` by replay are removed.
-        """
-        self._seen.append(_Seen(sequence, state.epoch, block.stop_index))
-        while len(self._seen) > 1 and not self._is_needed(self._seen[0], state):
-            self._seen.popleft()
-
-    def first(self, otherwise: int) -> int:
-        """Return the sequence number of the oldest message; ``otherwise`` if there are none."""
-        return self._seen[0].sequence if self._seen else otherwise
-
-    @staticmethod
-    def _is_needed(seen: _Seen, state: MonitorState) -> bool:
-        return seen.epoch == state.epoch and seen.stop_index > state.start
-
-
-log = structlog.get_logger()
-
 MAY_ARRIVE = (LinkState.CONNECTING, LinkState.CONNECTED)
 """Link states in which samples may arrive."""
+
+
+def take_news(news: LinkNews, live: LiveView, analyser: Analyser) -> None:
+    """Update the link state of a unit and its alarm; log a change."""
+    if live.set_link(news.unit, news.state, news.reason):
+        write = log.info if news.is_connected else log.warning
+        write(news.state.value.replace("_", " "), unit=news.unit, reason=news.reason)
+    analyser.note_link(news)
 
 
 class UnitProgress:
@@ -138,7 +107,7 @@ class UnitProgress:
         self._clock = clock
         self.unit, self._identity, self._stream = identity.unit, identity, stream
         self._analyser, self._live, self._recorder = analyser, live, recorder
-        self._window = Window()
+        self._window: deque[tuple[int, int | None, int]] = deque()
         self._stored = stored
         self._memory = None if stored is None else memory
         self._is_rewound = False
@@ -186,8 +155,9 @@ class UnitProgress:
         try:
             message = decoded(payload, self._identity)
             if isinstance(message, Taken):
-                self._require_fit(message)
-        except WireError as error:
+                require_possible(message.block)
+                self._analyser.require(message.block)
+        except (WireError, BlockMisfitError) as error:
             self._refuse(sequence, error)
             self.sequence = sequence
             return False
@@ -202,17 +172,10 @@ class UnitProgress:
             await self._process(sequence, message)
         return True
 
-    def _require_fit(self, message: Taken) -> None:
-        require_possible(message.block)
-        try:
-            self._analyser.require(message.block)
-        except BlockMisfitError as error:
-            raise WireError("misfit", str(error)) from None
-
     def position(self) -> StreamPosition:
         """Return the stream position of the unit, with its present analysis state."""
-        memory = written(self._analyser.memory(self.unit))
-        first = self._window.first(self.sequence + 1)
+        memory = _MEMORY.dump_json(self._analyser.memory(self.unit))
+        first = self._window[0][0] if self._window else self.sequence + 1
         return StreamPosition(self.unit, self._stream, self.sequence, first, memory)
 
     @property
@@ -231,7 +194,9 @@ class UnitProgress:
         if is_connected or self._live.status(self.unit).state in MAY_ARRIVE:
             silence = f"no block for {after_s:g} s; check that `padwatch acquire` is running"
             reason = trouble or self._why_refused or silence
-            self._take_news(LinkNews(self.unit, LinkState.NOT_CONNECTED, reason))
+            take_news(
+                LinkNews(self.unit, LinkState.NOT_CONNECTED, reason), self._live, self._analyser
+            )
 
     async def _replay(self, sequence: int, message: Taken | LinkNews) -> None:
         self.sequence = sequence
@@ -242,7 +207,7 @@ class UnitProgress:
         self._rewind(message.block)
         account = self._memory.monitor.account if self._memory else None
         await self._analyser.replay(message.block, self._sampled_s(message), account)
-        self._window.note(sequence, message.block, self._analyser.state(self.unit))
+        self._note(sequence, message.block)
 
     def _is_done(self, message: Taken | LinkNews) -> bool:
         """Return whether a message contains a block whose results are already stored.
@@ -282,35 +247,41 @@ class UnitProgress:
 
     async def _process(self, sequence: int, message: Taken | LinkNews) -> None:
         if isinstance(message, LinkNews):
-            self._take_news(message)
+            take_news(message, self._live, self._analyser)
             self.sequence = sequence
             return
         # the link state is not yet known from the replay or from a stored alarm
         is_known = self._analyser.alarms.is_connected(self.unit)
         if not is_known or self._live.status(self.unit).state is not LinkState.CONNECTED:
-            self._take_news(LinkNews(self.unit, LinkState.CONNECTED))
+            connected = LinkNews(self.unit, LinkState.CONNECTED)
+            take_news(connected, self._live, self._analyser)
         findings = await self._analyser.analyse(message.block, self._sampled_s(message))
         self.sequence = sequence
-        self._window.note(sequence, message.block, self._analyser.state(self.unit))
+        self._note(sequence, message.block)
         if findings != Findings():
             self._recorder.put(replace(findings, position=self.position()))
+
+    def _note(self, sequence: int, block: SampleBlock) -> None:
+        """Add a message to the window of the messages that restore the state by a replay."""
+        state = self._analyser.state(self.unit)
+        self._window.append((sequence, state.epoch, block.stop_index))
+        while len(self._window) > 1:
+            _, epoch, stop_index = self._window[0]
+            if epoch == state.epoch and stop_index > state.start:
+                return
+            self._window.popleft()
 
     def _sampled_s(self, message: Taken) -> float:
         """Return the monotonic time of the last sample, s; exact if both hosts' clocks agree."""
         self.behind_s = max(0.0, s_from_ns(self._clock.now_ns() - message.taken_ns))
         return self._clock.monotonic_s() - self.behind_s
 
-    def _take_news(self, news: LinkNews) -> None:
-        if self._live.set_link(news.unit, news.state, news.reason):
-            write = log.info if news.is_connected else log.warning
-            write(news.state.value.replace("_", " "), unit=news.unit, reason=news.reason)
-        self._analyser.note_link(news)
-
-    def _refuse(self, sequence: int, error: WireError) -> None:
+    def _refuse(self, sequence: int, error: WireError | BlockMisfitError) -> None:
         self._why_refused = str(error)
         # a message up to the stored position was already reported before the restart
         if self._stored is None or sequence > self._stored.sequence:
             self._analyser.alarms.refuse(self.unit, str(error))
-        if not self.refused[error.kind]:
+        kind = error.kind if isinstance(error, WireError) else "misfit"
+        if not self.refused[kind]:
             log.error("a message is rejected", unit=self.unit, reason=str(error))
-        self.refused[error.kind] += 1
+        self.refused[kind] += 1

@@ -158,15 +158,11 @@ class Publisher:
     async def publish(self, block: SampleBlock) -> None:
         """Queue a block; wait while the queue is full. Raises `ValueError` if it is too large."""
         identity = self._identities[block.unit]
-        message = encoded_block(block, identity, self._taken_ns(block))
-        outgoing = Outgoing(message_id(identity, block), message)
-        await self.waiting.put(block.unit, outgoing)
-
-    def _taken_ns(self, block: SampleBlock) -> int:
-        now_ns = self._clock.now_ns()
-        if block.sampled_s is None:
-            return now_ns
-        return now_ns - ns_from_s(self._clock.monotonic_s() - block.sampled_s)
+        taken_ns = self._clock.now_ns()
+        if block.sampled_s is not None:
+            taken_ns -= ns_from_s(self._clock.monotonic_s() - block.sampled_s)
+        message = encoded_block(block, identity, taken_ns)
+        await self.waiting.put(block.unit, Outgoing(message_id(identity, block), message))
 
     def publish_link(self, news: LinkNews) -> None:
         """Queue the link state of a unit if it has changed."""
@@ -186,16 +182,14 @@ class Publisher:
                     await ensure(stream, self._plant, self._settings)
                     if not self._n_unconfirmed:
                         self._state.note(None)
-                    await self._send_all(stream, pulse)
+                    async with asyncio.TaskGroup() as tasks:
+                        for unit in self._identities:
+                            sending = self._send_unit(stream, unit, pulse)
+                            tasks.create_task(sending, name=f"publish {unit}")
             except StreamError as error:
                 self._state.note(str(error))
                 is_misfit = isinstance(error, StreamMisfitError)
                 await self._clock.sleep(MISFIT_RETRY_S if is_misfit else RETRY_S)
-
-    async def _send_all(self, stream: JetStreamContext, pulse: Pulse) -> None:
-        async with asyncio.TaskGroup() as tasks:
-            for unit in self._identities:
-                tasks.create_task(self._send_unit(stream, unit, pulse), name=f"publish {unit}")
 
     async def _send_unit(self, stream: JetStreamContext, unit: str, pulse: Pulse) -> None:
         where = subject(self._plant, unit)
@@ -213,12 +207,13 @@ class Publisher:
 
     async def _sent(self, stream: JetStreamContext, where: str, message: Outgoing) -> bool:
         """Send a message and wait for its confirmation; return False if it must be sent again."""
+        name = stream_name(self._plant)
         try:
             answer = await stream.publish(
                 where,
                 message.payload,
                 timeout=self._settings.ack_timeout_s,
-                stream=stream_name(self._plant),
+                stream=name,
                 headers={Header.MSG_ID: message.id},
             )
         except (NatsTimeoutError, NoRespondersError, NoStreamResponseError):
@@ -234,21 +229,18 @@ class Publisher:
                 " max_payload in the configuration of NATS"
             ) from None
         except APIError as error:
-            self._state.note(_refusal(error, stream_name(self._plant)))
+            words = f"the NATS servers reject blocks for the stream '{name}': {error.description}"
+            if error.err_code in STREAM_FULL:
+                words = (
+                    f"the stream '{name}' is full: raise [stream] max_gb or lower max_age_h;"
+                    " meanwhile blocks wait at the devices"
+                )
+            self._state.note(words)
             return False
         self._n_unconfirmed = 0
         self.n_doubles += bool(answer.duplicate)
         self._state.note(None)
         return True
-
-
-def _refusal(error: APIError, name: str) -> str:
-    if error.err_code in STREAM_FULL:
-        return (
-            f"the stream '{name}' is full: raise [stream] max_gb or lower max_age_h; meanwhile"
-            " blocks wait at the devices"
-        )
-    return f"the NATS servers reject blocks for the stream '{name}': {error.description}"
 
 
 PUBLISHER = {

@@ -5,6 +5,7 @@ import re
 import ssl
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
+from operator import attrgetter
 from pathlib import Path
 
 import nats.errors
@@ -88,13 +89,8 @@ def stream_name(plant: PlantFile) -> str:
     return "-".join(part for part in (ROOT, legible, _plant_mark(plant).hex()[:8]) if part)
 
 
-def subjects(plant: PlantFile) -> str:
-    """Return the wildcard subject of the stream, which matches the subjects of all units."""
-    return f"{ROOT}.{stream_name(plant)}.*"
-
-
 def subject(plant: PlantFile, unit: str) -> str:
-    """Return the subject of a unit; dots in its id are replaced, since they separate tokens."""
+    """Return the subject of a unit, `*` for all; dots in its id are replaced, as they separate."""
     return f"{ROOT}.{stream_name(plant)}.{unit.replace('.', '=')}"
 
 
@@ -178,7 +174,12 @@ async def _connected(settings: StreamSettings, name: str, lost: asyncio.Future[N
             user_credentials=settings.credentials_file,
         )
         let_stop_through(n_before)
-        _require_version(client)
+        version = client.connected_server_version
+        if (version.major, version.minor) < OLDEST_SERVER:
+            oldest = ".".join(str(part) for part in OLDEST_SERVER)
+            raise StreamMisfitError(
+                f"the NATS server has version {version}; padwatch requires {oldest} or newer"
+            )
     except (Error, OSError, TimeoutError) as error:
         await _closed(client)
         let_stop_through(n_before)
@@ -205,15 +206,6 @@ async def _closed(client: Client) -> None:
     transport = client._transport  # noqa: SLF001
     if transport is not None:
         transport.close()  # type: ignore[no-untyped-call]
-
-
-def _require_version(client: Client) -> None:
-    version = client.connected_server_version
-    if (version.major, version.minor) < OLDEST_SERVER:
-        oldest = ".".join(str(part) for part in OLDEST_SERVER)
-        raise StreamMisfitError(
-            f"the NATS server has version {version}; padwatch requires {oldest} or newer"
-        )
 
 
 def _renamed(error: BaseException, settings: StreamSettings) -> StreamError:
@@ -286,7 +278,7 @@ def wanted(plant: PlantFile, settings: StreamSettings) -> StreamConfig:
     return StreamConfig(
         name=stream_name(plant),
         description=f"blocks of {plant.plant.name}, by padwatch",
-        subjects=[subjects(plant)],
+        subjects=[subject(plant, "*")],
         retention=RetentionPolicy.LIMITS,
         storage=StorageType.FILE,
         discard=DiscardPolicy.NEW,
@@ -366,12 +358,7 @@ async def _made(stream: JetStreamContext, config: StreamConfig, *, update: bool 
         ) from None
 
 
-def _limits(config: StreamConfig) -> tuple[object, ...]:
-    return (
-        config.max_bytes,
-        config.max_age,
-        config.num_replicas,
-        config.discard,
-        config.duplicate_window,
-        tuple(config.subjects or ()),
-    )
+_limits = attrgetter(
+    "max_bytes", "max_age", "num_replicas", "discard", "duplicate_window", "subjects"
+)
+"""Function that returns the part of a stream configuration that the plant file determines."""

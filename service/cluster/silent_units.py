@@ -7,19 +7,21 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import Alarm
-from service.cluster.progress import UnitProgress
+from core.alarms.kinds import Watch
+from core.limits import WITHIN, AlarmLevel, Judgement
+from service.cluster.progress import UnitProgress, take_news
 from service.live.alarm_list import is_shared
 from service.live.status import LinkState
 from service.measuring.acquirer import LinkNews
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.analyser import Analyser
 from service.measuring.live_view import LiveView
-from service.measuring.reported_alarms import ReportedAlarms, gone_alarms, report_silence
+from service.measuring.reported_alarms import ReportedAlarms, identity_of
+from service.measuring.service_alarms import AT_ONCE
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import periodic
 from service.settings.units import UnitSettings
 from service.store.port import StoreError
-from service.store.sharing import UnitBeat
 from service.store.store import Store
 
 SILENT_AFTER_S = 30.0
@@ -65,12 +67,21 @@ class SilentUnits:
         except StoreError:
             self._since_s = self._clock.monotonic_s()
             return
-        self._note(beats)
         now_s = self._clock.monotonic_s()
+        for beat in beats:
+            is_new = self._beats.get(beat.unit) != (beat.process, beat.n_beats)
+            # the age of the first report read from a unit is unknown
+            if is_new and beat.unit in self._beats and beat.unit in self._units:
+                self._seen_s[beat.unit] = now_s
+            self._beats[beat.unit] = (beat.process, beat.n_beats)
         waits_s = {u: now_s - max(self._seen_s.get(u, 0.0), self._since_s) for u in self._units}
-        silent = [unit for unit, wait_s in waits_s.items() if wait_s > SILENT_AFTER_S]
-        alive = [unit for unit in self._seen_s if unit not in silent]
-        report_silence(self._board, silent, alive, SILENT_AFTER_S)
+        reason = f"no report for {SILENT_AFTER_S:g} s; check that `padwatch analyse` is running"
+        for unit, wait_s in waits_s.items():
+            if wait_s > SILENT_AFTER_S:
+                gone = Judgement(AlarmLevel.DANGER, reason=reason)
+                self._board.report(identity_of(unit).id, gone)
+            elif unit in self._seen_s:
+                self._board.report(identity_of(unit).id, WITHIN)
 
     def leave(self) -> None:
         """Remove the alarms about silent units; the next leader becomes responsible for them."""
@@ -85,20 +96,12 @@ class SilentUnits:
 
     def _kept(self, stored: Iterable[Alarm]) -> ReportedAlarms:
         """Restore the stored alarms about silent units; reset the ages of all reports."""
-        board = gone_alarms(self._units)
+        board = ReportedAlarms(Watch(identity_of(u), AT_ONCE, u) for u in self._units)
         self._alarms.add_alarms(board, [alarm for alarm in stored if is_shared(alarm)])
         self._beats.clear()
         self._seen_s.clear()
         self._since_s = self._clock.monotonic_s()
         return board
-
-    def _note(self, beats: Sequence[UnitBeat]) -> None:
-        for beat in beats:
-            is_new = self._beats.get(beat.unit) != (beat.process, beat.n_beats)
-            # the age of the first report read from a unit is unknown
-            if is_new and beat.unit in self._beats and beat.unit in self._units:
-                self._seen_s[beat.unit] = self._clock.monotonic_s()
-            self._beats[beat.unit] = (beat.process, beat.n_beats)
 
 
 log = structlog.get_logger()
@@ -158,11 +161,7 @@ class SilenceWatch:
             if unit in begun:
                 begun[unit].fall_silent(after_s, trouble)
             elif self._clock.monotonic_s() - self._since_s > after_s:
-                self._lose(unit, trouble or "the stream has not been reached yet")
-
-    def _lose(self, unit: str, reason: str) -> None:
-        if self._live.status(unit).state is LinkState.NOT_CONNECTED:
-            return
-        self._live.set_link(unit, LinkState.NOT_CONNECTED, reason)
-        log.warning("not connected", unit=unit, reason=reason)
-        self._analyser.note_link(LinkNews(unit, LinkState.NOT_CONNECTED, reason))
+                reason = trouble or "the stream has not been reached yet"
+                news = LinkNews(unit, LinkState.NOT_CONNECTED, reason)
+                if self._live.status(unit).state is not LinkState.NOT_CONNECTED:
+                    take_news(news, self._live, self._analyser)

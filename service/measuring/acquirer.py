@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import structlog
+from pydantic import ConfigDict
 
 from acquisition.clock import Clock
 from acquisition.errors import AcquisitionError, ConfigError
@@ -26,6 +27,8 @@ class LinkNews:
 
     `reason` is the reason why no samples arrive; None while connected.
     """
+
+    __pydantic_config__ = ConfigDict(extra="forbid")  # messages of the stream contain it
 
     unit: str
     state: LinkState
@@ -162,7 +165,10 @@ class Acquirer:
                 if self._live.set_link(unit, LinkState.NOT_CONNECTED, str(error)):
                     log.warning("not connected", unit=unit, reason=str(error))
                 self._report(LinkNews(unit, LinkState.NOT_CONNECTED, str(error)))
-                wait_s = _retry_s(error, watched.retry_s)
+                # devices that were lost together must not be reconnected at the same moment
+                wait_s = watched.retry_s * random.uniform(0.5, 1.0)  # noqa: S311  not a secret
+                if isinstance(error, ConfigError):
+                    wait_s = CONFIG_RETRY_S
                 pulse.beat(wait_s)
                 await self._clock.sleep(wait_s)
             else:
@@ -185,10 +191,3 @@ class Acquirer:
                 pulse.rest()  # waiting for a full queue is not a fault of the source
                 await self._publish(block)
                 resume()
-
-
-def _retry_s(error: AcquisitionError, retry_s: float) -> float:
-    if isinstance(error, ConfigError):
-        return CONFIG_RETRY_S
-    # devices that were lost together must not be reconnected at the same moment
-    return retry_s * random.uniform(0.5, 1.0)  # noqa: S311  not a secret

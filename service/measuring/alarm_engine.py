@@ -22,7 +22,7 @@ from core.monitor.assessment import Assessment
 from core.samples.blocks import SampleBlock
 from service.live.alarm_list import AlarmCount, count_of, is_shared, reporting_unit
 from service.measuring.recorder import Findings
-from service.measuring.reported_alarms import ReportedAlarms, report_refused, stream_alarms
+from service.measuring.reported_alarms import RefusedMessages, ReportedAlarms
 from service.measuring.service_alarms import HealthProbe, HostTime, ServiceAlarms, service_rules_of
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.alarm_kinds import MESSAGES_REFUSED
@@ -34,6 +34,7 @@ from service.settings.core_values import (
     rules_of,
 )
 from service.settings.plant import PlantFile
+from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.storage import Origin
 from service.settings.units import UnitSettings
 from service.store.access.audit_entries import ActedNews, acting
@@ -80,7 +81,7 @@ class AlarmEngine:
         listener: Listener | None = None,
         service: ServiceAlarms | None = None,
         chatter: ChatterRule | None = None,
-        stream: ReportedAlarms | None = None,
+        stream: RefusedMessages | None = None,
     ) -> None:
         self._units, self._put, self._clock, self._listener = units, put, clock, listener
         self._service = service or ServiceAlarms()
@@ -128,7 +129,7 @@ class AlarmEngine:
     def refuse(self, unit: str, reason: str) -> None:
         """Raise a unit's alarm about a refused stream message; no effect without a stream."""
         if self._stream is not None:
-            report_refused(self._stream, unit, reason)
+            self._stream.refuse(unit, reason)
 
     def is_connected(self, unit: str) -> bool:
         """Return whether samples of a unit arrive, by the newest report on its link."""
@@ -249,8 +250,12 @@ class AlarmEngine:
     def _announce(self, news: list[AlarmNews]) -> None:
         now_ns = self._clock.now_ns()
         for event in (event for each in news for event in each.events):
-            _log(event)
             self._chatter.note(event, now_ns)
+            if event.change in LOGGED:
+                level = event.level.name.lower() if event.level else None
+                write = log.info if event.change is AlarmChange.RETURNED else log.warning
+                identity, reason = event.identity.id, str(event.reason)
+                write(f"alarm {event.change}", alarm=identity, level=level, reason=reason)
         if news and self._observer is not None:
             self._observer(news)
 
@@ -263,14 +268,6 @@ class AlarmEngine:
             if id_ in board:
                 return board
         return self._units.get(id_.partition(":")[0], self._service)
-
-
-def _log(event: AlarmEvent) -> None:
-    if event.change in LOGGED:
-        level = event.level.name.lower() if event.level else None
-        write = log.info if event.change is AlarmChange.RETURNED else log.warning
-        identity, reason = event.identity.id, str(event.reason)
-        write(f"alarm {event.change}", alarm=identity, level=level, reason=reason)
 
 
 @dataclass(frozen=True)
@@ -311,7 +308,6 @@ async def alarm_engine(
     put: Callable[[Findings], None],
     clock: Clock,
     listener: Listener | None = None,
-    rows: Mapping[str, Sequence[str]] = MappingProxyType({}),
     look: HealthProbe | None = None,
     part: PlantPart = WHOLE,
     memories: Mapping[str, AlarmMemory] = MappingProxyType({}),
@@ -326,8 +322,6 @@ async def alarm_engine(
         Plant file, origin of the data (live or replay), store of the alarms, and host clock.
     put, listener
         Functions that queue findings for the store, and receive each block with its changes.
-    rows
-        Channel of each row of a block, by unit; only for units whose rows are not their channels.
     look
         Function that returns the health of the service; not called during a replay.
     part
@@ -340,7 +334,10 @@ async def alarm_engine(
         unit.id: UnitAlarms(
             machine_of(unit),
             _rules(plant, unit, origin),
-            rows.get(unit.id),
+            # the rows of a block of vectors are not the channels
+            [row.channel for row in unit.source.rows]
+            if isinstance(unit.source, ModbusVectorSettings)
+            else None,
             references_of(unit),
         )
         for unit in plant.unit
@@ -349,7 +346,7 @@ async def alarm_engine(
     probe = look if origin is Origin.LIVE else None
     service = ServiceAlarms(units, service_rules_of(plant.alarms), probe, leads=part.leads)
     chatter, is_alone = chatter_rule_of(plant.alarms), part == WHOLE
-    stream = None if is_alone else stream_alarms(units)
+    stream = None if is_alone else RefusedMessages(units)
     engine = AlarmEngine(units, put, clock, listener, service, chatter, stream)
     own = [
         alarm

@@ -217,12 +217,10 @@ class Runner:
         pulse.rest()
         async for block in self._bus.blocks():
             pulse.beat()
-            await self._analyser.take(block, self._sampled_s(block))
+            sampled_s = block.sampled_s
+            if sampled_s is None:
+                sampled_s = self._clock.monotonic_s() - self._bus.oldest_wait_s
+            await self._analyser.take(block, sampled_s)
             self._bus.done()
             await asyncio.sleep(0)  # let other tasks run while blocks wait
             pulse.rest()
-
-    def _sampled_s(self, block: SampleBlock) -> float:
-        if block.sampled_s is not None:
-            return block.sampled_s
-        return self._clock.monotonic_s() - self._bus.oldest_wait_s

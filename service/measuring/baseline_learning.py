@@ -99,7 +99,7 @@ def _newest_ns(store: FilmStore, place: FilmPlace) -> int:
 def _recent(found: Mapping[str, FilmHistory], watch: FilmWatch) -> list[FloatArray]:
     """Return the newest settled readings at times common to all bearings, (9, n_films) each.
 
-    Rows are those of `UnitReadings.of`.
+    Rows are those of `UnitReadings.of`; rises are d ln(stiffness) / d ln(eccentricity ratio).
     """
     common, columns = common_rows(found), []
     settled = np.logical_and.reduce([film.is_settled[common[b]] for b, film in found.items()])
@@ -108,21 +108,16 @@ def _recent(found: Mapping[str, FilmHistory], watch: FilmWatch) -> list[FloatArr
         shaft = np.where(history.shaft_um_pk > 0.0, history.shaft_um_pk, np.nan)
         attitude = np.stack([history.attitude_deg] * 2)
         deviation = film.deviation[: len(DIRECTIONS), common[bearing]]
-        rises = _rises(history, watch.judge.baseline(bearing))
+        baseline = watch.judge.baseline(bearing)
+        rises = np.full((len(DIRECTIONS), len(history)), np.nan)  # without a baseline
+        for row, direction in enumerate(DIRECTIONS):
+            learned = baseline.of(f"k_{direction}") if baseline else None
+            if learned is not None:
+                rises[row] = learned.eccentricity_rise(history.conditions)
         motion = [part for each in history.motion_um for part in (each.real, each.imag)]
         columns.append(np.stack([history.ln_k, np.log(shaft), deviation, rises, attitude, *motion]))
     whole = np.concatenate(columns, axis=1)[:, :, settled]
     return [whole[:, :, i] for i in range(max(0, whole.shape[2] - MAX_RECENT), whole.shape[2])]
-
-
-def _rises(history: StiffnessHistory, baseline: BearingBaseline | None) -> FloatArray:
-    """Return d ln(stiffness) / d ln(eccentricity ratio), (2, n); NaN without a baseline."""
-    rises = np.full((len(DIRECTIONS), len(history)), np.nan)
-    for row, direction in enumerate(DIRECTIONS):
-        learned = baseline.of(f"k_{direction}") if baseline else None
-        if learned is not None:
-            rises[row] = learned.eccentricity_rise(history.conditions)
-    return rises
 
 
 PADWATCH = "padwatch"
@@ -182,10 +177,15 @@ class Learner:
         if not len(found):
             return None
         is_healthy = healthy(found)
+        entries = self._store.baselines(place.unit, place.bearing)
+        version = 1 + max((entry.version for entry in entries), default=0)
+        origin = Origin(
+            *(place.unit, place.bearing, place.estimator.value, version, author, now_ns, reason)
+        )
         baseline = learn(
             found.history,
             is_healthy,
-            self._origin(place, now_ns, author, reason),
+            origin,
             self._settings.baseline.settings(self._settings.reading_h),
         )
         if not baseline.quantities:
@@ -193,7 +193,13 @@ class Learner:
         doubt = drifted(found.history, is_healthy, baseline, self._settings.alert_change)
         doubt = doubt or self._disagreement(baseline, versions)
         far = far_readings(found.history, is_healthy, baseline)
-        self._store.add_baseline(baseline, self._steps(baseline, doubt, far))
+        whose = (place.unit, place.bearing, version)
+        noticed = "; ".join(filter(None, (doubt, far))) or reason
+        steps = [StoredStep(*whose, BaselineStep.LEARNED, now_ns, author, noticed)]
+        if self._settings.acceptance == "automatic" and doubt is None:
+            why = "no objection found"
+            steps.append(StoredStep(*whose, BaselineStep.ACCEPTED, now_ns, author, why))
+        self._store.add_baseline(baseline, steps)
         return baseline
 
     def learn_response(self, unit: str, rules: FilmRules, now_ns: int) -> ShaftResponse | None:
@@ -228,22 +234,6 @@ class Learner:
         return self._store.history(
             FilmQuery(place.unit, place.bearing, place.estimator, since_ns, until_ns + 1)
         )
-
-    def _origin(self, place: FilmPlace, now_ns: int, author: str, reason: str) -> Origin:
-        entries = self._store.baselines(place.unit, place.bearing)
-        version = 1 + max((entry.version for entry in entries), default=0)
-        return Origin(
-            place.unit, place.bearing, place.estimator.value, version, author, now_ns, reason
-        )
-
-    def _steps(
-        self, baseline: BearingBaseline, doubt: str | None, far: str | None
-    ) -> list[StoredStep]:
-        noticed = "; ".join(filter(None, (doubt, far))) or baseline.origin.event
-        steps = [_step(baseline, BaselineStep.LEARNED, noticed)]
-        if self._settings.acceptance == "automatic" and doubt is None:
-            steps.append(_step(baseline, BaselineStep.ACCEPTED, "no objection found"))
-        return steps
 
     def _disagreement(self, baseline: BearingBaseline, versions: Versions) -> str | None:
         """Describe the difference from the first accepted baseline; None if it is small.
@@ -286,19 +276,6 @@ def drifted(
                 f" {abs(change):.1f} ± {200 * found.std:.1f} % under like conditions while learning"
             )
     return None
-
-
-def _step(baseline: BearingBaseline, step: BaselineStep, reason: str) -> StoredStep:
-    origin = baseline.origin
-    return StoredStep(
-        origin.unit,
-        origin.bearing,
-        origin.version,
-        step,
-        origin.created_ns,
-        origin.author,
-        reason,
-    )
 
 
 def healthy(film: FilmHistory) -> npt.NDArray[np.bool_]:

@@ -4,7 +4,7 @@ from core.alarms.judgements import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Bearing
 from core.monitor.assessment import Assessment
-from core.quality import Level, Reading, Reason
+from core.quality import Level, Reason
 from core.stiffness.order_line import AMPLITUDES
 from core.units import s_from_ns
 from service.live.commands import ReferenceRefusedError
@@ -55,7 +55,13 @@ def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) 
     """
     if newest is None:
         raise ReferenceRefusedError("no result is stored yet; wait for one or give the gaps")
-    _check_age(newest.time_ns, now_ns)
+    age_s = s_from_ns(now_ns - newest.time_ns)
+    if abs(age_s) > MAX_AGE_S:
+        side = "ago" if age_s > 0.0 else "ahead of this computer's clock"
+        raise ReferenceRefusedError(
+            f"the newest result is from {rfc3339(newest.time_ns)}, {abs(age_s) / 60:.0f} min"
+            f" {side}; the maximum age is {MAX_AGE_S / 60:.0f} min"
+        )
     near = (_usable(newest, NEAR_GAPS[0]), _usable(newest, NEAR_GAPS[1]))
     x, y = (
         _usable(newest, name) if is_there else None
@@ -81,16 +87,6 @@ def _across(bearing: Bearing, near: MicrometrePair, found: GivenPair) -> Microme
     unused = bearing.opposite_reference_um or near
     x, y = (old if new is None else new for new, old in zip(found, unused, strict=True))
     return x, y
-
-
-def _check_age(time_ns: int, now_ns: int) -> None:
-    age_s = s_from_ns(now_ns - time_ns)
-    if abs(age_s) > MAX_AGE_S:
-        side = "ago" if age_s > 0.0 else "ahead of this computer's clock"
-        raise ReferenceRefusedError(
-            f"the newest result is from {rfc3339(time_ns)}, {abs(age_s) / 60:.0f} min {side};"
-            f" the maximum age is {MAX_AGE_S / 60:.0f} min"
-        )
 
 
 def _usable(newest: StoredReadings, name: str) -> float:
@@ -127,15 +123,11 @@ def measured_vectors(assessment: Assessment | None) -> VectorReference:
 
 
 def _vector(assessment: Assessment, place: str) -> OrderVector:
-    amplitude = _steady(f"order1_{place}_um_pk", assessment.readings[f"order1_{place}_um_pk"])
-    phase = assessment.readings[f"order1_{place}_phase_deg"]
-    return OrderVector(amplitude, phase.value)
-
-
-def _steady(name: str, reading: Reading) -> float:
-    reason = reading.quality.reason
-    if reading.value is None:
+    name, phase = f"order1_{place}_um_pk", assessment.readings[f"order1_{place}_phase_deg"]
+    amplitude = assessment.readings[name]
+    reason = amplitude.quality.reason
+    if amplitude.value is None:
         raise ReferenceRefusedError(f"{name} has no value: {reason}")
-    if reading.quality.level is not Level.GOOD and reason in NOT_STEADY:
+    if amplitude.quality.level is not Level.GOOD and reason in NOT_STEADY:
         raise ReferenceRefusedError(f"{name} is uncertain: {reason}")
-    return reading.value
+    return OrderVector(amplitude.value, phase.value)

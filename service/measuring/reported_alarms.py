@@ -1,6 +1,6 @@
 """Alarms about units that no process analyses, and about refused stream messages."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from core.alarms.alarm import PLANT, AlarmIdentity, AlarmNews
 from core.alarms.board import AlarmBoard
@@ -38,25 +38,6 @@ class ReportedAlarms(AlarmBoard):
         return super().tick(host_ns)
 
 
-def gone_alarms(units: Iterable[str]) -> ReportedAlarms:
-    """Return the alarms about units that no process analyses, one for each unit."""
-    return ReportedAlarms(Watch(identity_of(unit), rule_of(0.0, 0.0), unit) for unit in units)
-
-
-def report_silence(
-    alarms: ReportedAlarms, silent: Sequence[str], alive: Sequence[str], after_s: float
-) -> None:
-    """Raise the alarms about ``silent`` units and end those about ``alive`` units.
-
-    A unit is silent if no process has analysed it for ``after_s`` seconds.
-    """
-    reason = f"no report for {after_s:g} s; check that `padwatch analyse` is running"
-    gone = Judgement(AlarmLevel.DANGER, reason=reason)
-    for units, condition in ((silent, gone), (alive, WITHIN)):
-        for unit in units:
-            alarms.report(identity_of(unit).id, condition)
-
-
 def identity_of(unit: str) -> AlarmIdentity:
     """Return the identity of the alarm about a unit that no process analyses."""
     return AlarmIdentity(PLANT, unit, ANALYSIS_GONE)
@@ -69,21 +50,19 @@ MAX_REASON = 200
 """Maximum number of characters of a reason, which may contain text of a refused message."""
 
 
-def stream_alarms(units: Iterable[str]) -> ReportedAlarms:
-    """Return the alarms about refused stream messages, one for each unit."""
-    alarms = ReportedAlarms(
-        Watch(_refused(unit), rule_of(0.0, REFUSED_FOR_S), STREAM) for unit in units
-    )
-    for alarm in alarms.alarms:
-        alarms.report(alarm.identity.id, WITHIN)
-    return alarms
+class RefusedMessages(ReportedAlarms):
+    """Alarms about refused stream messages, one for each unit."""
 
+    def __init__(self, units: Iterable[str]) -> None:
+        rule = rule_of(0.0, REFUSED_FOR_S)
+        super().__init__(Watch(self._identity(unit), rule, STREAM) for unit in units)
+        self._found = dict.fromkeys(self._watches, WITHIN)
 
-def report_refused(alarms: ReportedAlarms, unit: str, reason: str) -> None:
-    """Raise the alarm about a refused stream message of a unit, with the reason."""
-    words = "".join(c if c.isprintable() else "?" for c in reason[:MAX_REASON])
-    alarms.report_event(_refused(unit).id, Judgement(AlarmLevel.ALERT, reason=words))
+    def refuse(self, unit: str, reason: str) -> None:
+        """Raise the alarm about a refused message of a unit, with the reason."""
+        words = "".join(c if c.isprintable() else "?" for c in reason[:MAX_REASON])
+        judgement = Judgement(AlarmLevel.ALERT, reason=words)
+        self.report_event(self._identity(unit).id, judgement)
 
-
-def _refused(unit: str) -> AlarmIdentity:
-    return AlarmIdentity(unit, STREAM, MESSAGES_REFUSED)
+    def _identity(self, unit: str) -> AlarmIdentity:
+        return AlarmIdentity(unit, STREAM, MESSAGES_REFUSED)

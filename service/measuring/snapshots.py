@@ -75,35 +75,28 @@ class SnapshotBuilder:
         bearings, alarms = self._bearings.get(unit, []), self._alarms_of(unit)
         is_unit = unit in self._bearings
         own = (self._live.revision(unit), self._alarms.is_connected(unit)) if is_unit else ()
-        films = [self._films.newest(unit, bearing) for bearing in bearings]
+        newest = {bearing: self._films.newest(unit, bearing) for bearing in bearings}
+        films = {bearing: news for bearing, news in newest.items() if news}
+        in_force = {bearing: self._films.baseline(unit, bearing) for bearing in bearings}
+        versions = {bearing: found.origin.version for bearing, found in in_force.items() if found}
         round_ = self._clock.monotonic_s() // REBUILT_EVERY_S
-        key = (own, alarms, films, self._versions(unit), round_)
+        key = (own, alarms, films, versions, round_)
         built = self._built.get(unit)
         if built is not None and built.key == key:
             return built
-        snapshot = self._snapshot(unit, alarms)
+        found = {bearing: self._live.assessment(unit, bearing) for bearing in bearings}
+        snapshot = UnitSnapshot(
+            bearings={b: bearing_snapshot(result) for b, result in found.items() if result},
+            alarms=tuple(alarms),
+            judged=frozenset(a.identity.id for a in alarms if self._alarms.is_judged(a)),
+            chattering=frozenset(a.identity.id for a in alarms if self._alarms.is_chattering(a)),
+            films=films,
+            baselines=versions,
+        )
         if built is None or built.snapshot != snapshot:
             built = _Built(key, 1 if built is None else built.revision + 1, snapshot)
         self._built[unit] = built = replace(built, key=key)
         return built
-
-    def _snapshot(self, unit: str, own: Sequence[Alarm]) -> UnitSnapshot:
-        bearings = self._bearings.get(unit, [])
-        found = {bearing: self._live.assessment(unit, bearing) for bearing in bearings}
-        seen = {bearing: self._films.newest(unit, bearing) for bearing in bearings}
-        return UnitSnapshot(
-            bearings={b: bearing_snapshot(result) for b, result in found.items() if result},
-            alarms=tuple(own),
-            judged=frozenset(a.identity.id for a in own if self._alarms.is_judged(a)),
-            chattering=frozenset(a.identity.id for a in own if self._alarms.is_chattering(a)),
-            films={b: news for b, news in seen.items() if news},
-            baselines=self._versions(unit),
-        )
-
-    def _versions(self, unit: str) -> dict[str, int]:
-        bearings = self._bearings.get(unit, [])
-        in_force = {bearing: self._films.baseline(unit, bearing) for bearing in bearings}
-        return {bearing: found.origin.version for bearing, found in in_force.items() if found}
 
     def _alarms_of(self, unit: str) -> list[Alarm]:
         """Return the alarms that a report on a unit contains."""
@@ -111,16 +104,13 @@ class SnapshotBuilder:
         if self._common[0] != common:
             owned: dict[str, list[Alarm]] = defaultdict(list)
             for alarm in common:
-                owned[self._owner(alarm)].append(alarm)
+                owner = reporting_unit(alarm.identity)
+                if owner not in self._bearings:
+                    owner = SHARED if is_shared(alarm) else PLANT
+                owned[owner].append(alarm)
             self._common = common, owned
         of_unit = self._alarms.alarms_of(unit) if unit in self._bearings else []
         return [*of_unit, *self._common[1].get(unit, ())]
-
-    def _owner(self, alarm: Alarm) -> str:
-        unit = reporting_unit(alarm.identity)
-        if unit in self._bearings:
-            return unit
-        return SHARED if is_shared(alarm) else PLANT
 
     def _link(self, unit: str) -> UnitLink:
         """Return a unit's link state and data ages, if measured here, and the process's faults."""

@@ -1,6 +1,6 @@
 """Sources and monitors of the units of a plant file."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -71,6 +71,10 @@ def monitor_for(source: SourceSettings, unit: Unit, settings: AnalysisSettings) 
             return UnitMonitor(unit, settings)
 
 
+DEFAULT_RETRY_S = 0.5
+"""Retry period of sources that are not polled, s."""
+
+
 @dataclass(frozen=True)
 class WatchedUnit:
     """Sample source of a unit, and the monitor of its blocks.
@@ -81,11 +85,8 @@ class WatchedUnit:
 
     source: SampleSource
     monitor: UnitMonitor
-    retry_s: float = 0.5
+    retry_s: float = DEFAULT_RETRY_S
 
-
-DEFAULT_RETRY_S = 0.5
-"""Retry period of sources that are not polled, s."""
 
 QUEUE_RETRY_S = 0.25
 """Retry period of FIFO sources, s; they are polled 200 times per second."""
@@ -109,15 +110,6 @@ def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> UnitMonitor:
 def live_units(plant: PlantFile, clock: Clock) -> dict[str, WatchedUnit]:
     """Return the sources, with measured poll durations, and the monitors by unit id."""
     return watched_units(plant, lambda unit: TimedSource(partial(source_of, unit), clock))
-
-
-def vector_rows(plant: PlantFile) -> dict[str, list[str]]:
-    """Return the channel of each row of a block by unit, for units whose devices send vectors."""
-    return {
-        unit.id: [row.channel for row in unit.source.rows]
-        for unit in plant.unit
-        if isinstance(unit.source, ModbusVectorSettings)
-    }
 
 
 def retry_s(unit: UnitSettings) -> float:
@@ -155,9 +147,3 @@ def _main_source(unit: UnitSettings, calibration: UnitCalibration, clock: Clock)
             return SimulatedSource(simulated_feed(unit, clock), calibration, clock)
         case source:
             return modbus_source(source, machine_of(unit), calibration, clock)
-
-
-def timed_sources(units: Mapping[str, WatchedUnit]) -> dict[str, TimedSource]:
-    """Return the sources that measure the durations of their polls, by unit id."""
-    sources = {unit: watched.source for unit, watched in units.items()}
-    return {unit: each for unit, each in sources.items() if isinstance(each, TimedSource)}
