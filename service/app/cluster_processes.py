@@ -9,8 +9,8 @@ from functools import partial
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from core.monitor.monitor import UnitMonitor
+from service.app.analysis import Analysis, ProcessContext, process_context
 from service.app.health_page import HealthServer
-from service.app.measuring_process import Analysis, ProcessContext, process_context
 from service.app.process import Supervision
 from service.app.storage import database_path
 from service.cluster.consumer import Consumer, add_consumer

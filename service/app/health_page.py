@@ -74,27 +74,27 @@ class HealthServer:
         Takes over the listening socket and closes it at the end; call it once.
         """
         pulse.rest()
-        loop = asyncio.get_running_loop()
+        health, loop = self, asyncio.get_running_loop()
 
         class Handler(BaseHTTPRequestHandler):
             timeout = ANSWERS_WITHIN_S
             server_version, sys_version = "padwatch", ""
 
-            def do_GET(handler) -> None:  # noqa: N805
-                path = handler.path.partition("?")[0]
-                making = asyncio.run_coroutine_threadsafe(self.page(path), loop)
+            def do_GET(self) -> None:
+                path = self.path.partition("?")[0]
+                making = asyncio.run_coroutine_threadsafe(health.page(path), loop)
                 try:
                     status, kind, content = making.result(ANSWERS_WITHIN_S)
                 except TimeoutError:
                     status, kind = 503, "text/plain"
                     content = b"the event loop does not answer\n"
-                handler.send_response(HTTPStatus(status))
-                handler.send_header("content-type", kind)
-                handler.send_header("content-length", str(len(content)))
-                handler.end_headers()
-                handler.wfile.write(content)
+                self.send_response(HTTPStatus(status))
+                self.send_header("content-type", kind)
+                self.send_header("content-length", str(len(content)))
+                self.end_headers()
+                self.wfile.write(content)
 
-            def log_message(handler, format: str, *args: object) -> None:  # noqa: A002, N805
+            def log_message(self, format: str, *args: object) -> None:  # noqa: A002
                 """Log nothing: probes ask every few seconds."""
 
         with ThreadingHTTPServer((HOST, 0), Handler, bind_and_activate=False) as server:

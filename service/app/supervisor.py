@@ -1,7 +1,6 @@
 """Start, supervision and restart of the serving process, a child of the measuring process."""
 
 import asyncio
-import json
 import pickle
 import socket
 import subprocess
@@ -55,9 +54,6 @@ class ServingChild:
         that requests wait instead of being refused.
     report, answer
         Functions that make the reports to the serving process and answer its questions.
-    on_ready
-        Function that is called with URL and set-up token (None if an account exists) when requests
-        are served for the first time.
     child
         Serving process that was started before; with None one is started.
     """
@@ -68,14 +64,12 @@ class ServingChild:
         listener: socket.socket,
         report: Callable[[bool], object | None],
         answer: Callable[[Question], Awaitable[object]],
-        on_ready: Callable[[str, str | None], None],
         clock: Clock,
         child: Child | None = None,
     ) -> None:
         self._start, self._listener, self._clock, self._next = start, listener, clock, child
-        self._end = MeasuringEnd(report, self._answer, REPORT_EVERY_S)
-        self._answer_others, self._on_ready = answer, on_ready
-        self._is_announced = self._is_stopping = False
+        self._end = MeasuringEnd(report, answer, REPORT_EVERY_S)
+        self._is_stopping = False
         self.process: subprocess.Popen[bytes] | None = None
         self.n_restarts = 0
 
@@ -114,14 +108,6 @@ class ServingChild:
         finally:
             writer.close()
         return await asyncio.to_thread(_end_of, child.process)
-
-    async def _answer(self, question: Question) -> object:
-        if question.kind != "ready":
-            return await self._answer_others(question)
-        if not self._is_announced:
-            self._is_announced = True
-            self._on_ready(*json.loads(question.document))
-        return None
 
 
 def _end_of(process: subprocess.Popen[bytes]) -> int:

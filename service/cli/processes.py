@@ -12,7 +12,7 @@ import typer
 from acquisition.clock import SystemClock
 from service.app.health_page import HOST
 from service.app.listener import listener_of
-from service.app.measuring_process import ServiceRun, run_service
+from service.app.measuring_process import run_service
 from service.app.storage import open_store
 from service.cli.options import (
     DEMO,
@@ -51,8 +51,8 @@ def run_plant(
         Serving process that was started before; with None one is started.
     """
     clock, manager = SystemClock(), ServiceManager(os.environ)
-    service_run = ServiceRun(plant, live_units(plant, clock), is_demo=is_demo, child=child)
-    run_to_its_end(run_service(service_run, listener, clock, announce, manager))
+    parts = (plant, live_units(plant, clock), listener, clock, announce, manager)
+    run_to_its_end(run_service(*parts, is_demo=is_demo, child=child))
 
 
 def announce(url: str) -> None:

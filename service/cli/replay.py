@@ -1,11 +1,9 @@
 """`padwatch replay`: play recordings through the whole service, directly or over a real link."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Awaitable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from socket import socket
 from typing import Annotated
 
 import typer
@@ -13,7 +11,7 @@ import typer
 from acquisition.clock import SystemClock
 from acquisition.errors import LinkError
 from service.app.listener import listener_of
-from service.app.measuring_process import ServiceRun, run_service
+from service.app.measuring_process import run_service
 from service.app.recordings import (
     PlayedOut,
     recordings_by_unit,
@@ -28,7 +26,7 @@ from service.cli.offline.reanalysis import stiffness_lines
 from service.cli.options import JsonOutput, PlantOption, fail, option, print_result
 from service.cli.processes import announce
 from service.measuring.live_view import LiveView
-from service.measuring.sources import source_of, watched_units
+from service.measuring.sources import WatchedUnit, source_of, watched_units
 from service.runtime.process import run_to_its_end
 from service.settings.plant import PlantFile, load_plant_file
 from service.settings.storage import Origin
@@ -58,29 +56,33 @@ def replay(
     if database.exists():  # its alarms would be resumed
         fail(f"{database} contains results already; use a new folder for each replay")
     with (
-        _service_run(played, plant, units, through, speed, serve) as (service_run, daq),
-        listener_of(service_run.plant, port) as listener,
+        _watched(played, plant, units, through, speed, serve) as (attached, watched, daq),
+        listener_of(attached, port) as listener,
     ):
-        if not json_output:
-            service_run = replace(service_run, at_end=partial(_print_stiffness, played))
-        run_to_its_end(_play(service_run, listener, daq, database, json_output))
+        service = run_service(
+            *(attached, watched, listener, SystemClock(), announce),
+            origin=Origin.REPLAY,
+            ends=not serve,
+            at_end=None if json_output else partial(_print_stiffness, played),
+        )
+        run_to_its_end(_play(service, daq, database, json_output))
 
 
 @contextmanager
-def _service_run(
+def _watched(
     plant: PlantFile,
     plant_path: Path,
     units: Mapping[str, Path],
     through: Wire | None,
     speed: float,
     serve: bool,
-) -> Iterator[tuple[ServiceRun, RunningDaq | None]]:
+) -> Iterator[tuple[PlantFile, Mapping[str, WatchedUnit], RunningDaq | None]]:
     clock = SystemClock()
     if through is None:
         watched = watched_units(
             plant, lambda unit: replay_source(units[unit.id], unit, clock, speed or None)
         )
-        yield ServiceRun(plant, watched, Origin.REPLAY, ends=not serve), None
+        yield plant, watched, None
         return
     arguments = [str(plant_path), "--through", through.value, "--speed", str(speed)]
     for folder in units.values():
@@ -91,7 +93,7 @@ def _service_run(
         watched = watched_units(
             attached, lambda unit: PlayedOut(source_of(unit, clock), daq.over[unit.id], gone)
         )
-        yield ServiceRun(attached, watched, Origin.REPLAY, ends=not serve), daq
+        yield attached, watched, daq
 
 
 def _print_stiffness(plant: PlantFile, live: LiveView) -> None:
@@ -108,13 +110,12 @@ def _print_stiffness(plant: PlantFile, live: LiveView) -> None:
 
 
 async def _play(
-    service_run: ServiceRun,
-    listener: socket,
+    service: Awaitable[None],
     daq: RunningDaq | None,
     database: Path,
     json_output: bool,
 ) -> None:
-    await run_service(service_run, listener, SystemClock(), announce)
+    await service
     if daq is not None and daq.has_failed:
         raise LinkError("results are incomplete: the simulated DAQ ended early; repeat the replay")
     results = {"database": str(database)}

@@ -14,16 +14,12 @@ from nats.js.errors import NotFoundError
 from acquisition.clock import Clock
 from service.cluster.progress import UnitProgress
 from service.cluster.session import (
-    MISFIT_RETRY_S,
     NOT_REACHED,
-    RETRY_S,
     StreamAnewError,
-    StreamError,
-    StreamMisfitError,
     consumer_name,
+    keep_session,
     let_stop_through,
     require,
-    session,
     stream_name,
     subject,
 )
@@ -93,16 +89,16 @@ class Consumer:
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Fetch and process messages, and reconnect, until cancelled; `pulse` gets heartbeats."""
         async with asyncio.TaskGroup() as tasks:
-            while True:
-                pulse.rest()
-                try:
-                    async with session(self._settings, "padwatch analyse") as stream:
-                        await self._find(stream, tasks)
-                        await self._fetch_all(stream)
-                except StreamError as error:
-                    self._state.note(str(error))
-                    is_misfit = isinstance(error, StreamMisfitError)
-                    await self._clock.sleep(MISFIT_RETRY_S if is_misfit else RETRY_S)
+
+            async def fetch_all(stream: JetStreamContext) -> None:
+                await self._find(stream, tasks)
+                async with asyncio.TaskGroup() as fetching:
+                    for unit in self.units:
+                        fetching.create_task(self._fetch_unit(stream, unit), name=f"fetch {unit}")
+                    self._state.note(None)
+
+            whose = (self._settings, "padwatch analyse")
+            await keep_session(*whose, fetch_all, self._state, self._clock, pulse)
 
     async def _find(self, stream: JetStreamContext, tasks: asyncio.TaskGroup) -> None:
         """Check the identity of the stream; at the first call, start each unit at its position."""
@@ -125,12 +121,6 @@ class Consumer:
                 tasks.create_task(self._take_all(unit), name=f"analyse {unit}")
         for progress in self.units.values():
             progress.reaches_back(state.first_seq)
-
-    async def _fetch_all(self, stream: JetStreamContext) -> None:
-        async with asyncio.TaskGroup() as tasks:
-            for unit in self.units:
-                tasks.create_task(self._fetch_unit(stream, unit), name=f"fetch {unit}")
-            self._state.note(None)
 
     async def _fetch_unit(self, stream: JetStreamContext, unit: str) -> None:
         name, durable = stream_name(self._plant), consumer_name(unit)
@@ -158,9 +148,8 @@ class Consumer:
     async def _offer(self, unit: str, message: Msg) -> None:
         sequence = message.metadata.sequence.stream
         self.n_pending[unit] = message.metadata.num_pending
-        if (
-            sequence <= self._fetched[unit]
-        ):  # redelivered: still queued here, or its acknowledgement was lost
+        if sequence <= self._fetched[unit]:
+            # redelivered: still queued here, or its acknowledgement was lost
             if sequence <= self._settled.get(unit, 0):
                 with suppress(Error):
                     await message.ack()
@@ -175,20 +164,17 @@ class Consumer:
             batch = [await queue.get()]
             while len(batch) < BATCH and not queue.empty():
                 batch.append(queue.get_nowait())
-            refused = [m for m in batch if not await progress.take(_sequence(m), m.data)]
-            await self._stored(progress)
+            numbers = [message.metadata.sequence.stream for message in batch]
+            pairs = zip(numbers, batch, strict=True)
+            refused = [m for number, m in pairs if not await progress.take(number, m.data)]
+            if not progress.is_replaying:
+                position = progress.position()
+                self._recorder.put(Findings(position=position))
+                await self._recorder.reached(position)
             for message in batch:
                 with suppress(Error):  # stored; an unacknowledged message is redelivered
                     await (message.term() if message in refused else message.ack())
-            self._settled[unit] = _sequence(batch[-1])
-
-    async def _stored(self, progress: UnitProgress) -> None:
-        """Queue the position of a unit, and wait until its results and its position are stored."""
-        if progress.is_replaying:
-            return
-        position = progress.position()
-        self._recorder.put(Findings(position=position))
-        await self._recorder.reached(position)
+            self._settled[unit] = numbers[-1]
 
 
 async def _fetched(puller: JetStreamContext.PullSubscription) -> Iterable[Msg]:
@@ -202,10 +188,6 @@ async def _fetched(puller: JetStreamContext.PullSubscription) -> Iterable[Msg]:
     except NatsTimeoutError:
         return []
     return messages
-
-
-def _sequence(message: Msg) -> int:
-    return message.metadata.sequence.stream
 
 
 CONSUMER = {

@@ -82,9 +82,6 @@ def fingerprint(*words: object) -> bytes:
 MAGIC = b"PWSM"
 
 VERSION = 2
-READABLE = (2,)
-"""Format versions that a reader accepts."""
-
 MAX_HEAD_BYTES = 1 << 18
 MAX_SAMPLE_BYTES = 1 << 26
 
@@ -124,10 +121,11 @@ def _unframed(message: bytes, identity: UnitIdentity) -> tuple[Kind, bytes, memo
             "not_a_message", f"{len(message)} bytes that are not a padwatch message; {SENDER}"
         )
     _, version, kind, plant, make, n_head, n_samples = _START.unpack_from(message)
-    if version not in READABLE:
-        known = " and ".join(str(each) for each in READABLE)
+    if version != VERSION:
         newer = "upgrade `padwatch analyse`" if version > VERSION else "upgrade `padwatch acquire`"
-        words = f"a message of format version {version}, but this program supports {known}; {newer}"
+        words = (
+            f"a message of format version {version}, but this program supports {VERSION}; {newer}"
+        )
         raise WireError("other_version", words)
     whole = _START.size + n_head + n_samples + _CRC.size
     if n_head > MAX_HEAD_BYTES or n_samples > MAX_SAMPLE_BYTES or whole != len(message):

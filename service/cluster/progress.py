@@ -107,6 +107,8 @@ class UnitProgress:
         self._clock = clock
         self.unit, self._identity, self._stream = identity.unit, identity, stream
         self._analyser, self._live, self._recorder = analyser, live, recorder
+        self._monitor = analyser.monitors[identity.unit]
+        # sequence number, epoch and stop index of the messages with which a replay begins
         self._window: deque[tuple[int, int | None, int]] = deque()
         self._stored = stored
         self._memory = None if stored is None else memory
@@ -156,7 +158,7 @@ class UnitProgress:
             message = decoded(payload, self._identity)
             if isinstance(message, Taken):
                 require_possible(message.block)
-                self._analyser.require(message.block)
+                self._monitor.require(message.block)
         except (WireError, BlockMisfitError) as error:
             self._refuse(sequence, error)
             self.sequence = sequence
@@ -242,7 +244,7 @@ class UnitProgress:
     def _commit(self) -> None:
         """End the replay; if no block was replayed, the monitor starts without a restored state."""
         if self._memory is not None and self._is_rewound:
-            self._analyser.settle(self.unit, self._memory)
+            self._monitor.settle(self._memory.monitor)
         self._stored = self._memory = None
 
     async def _process(self, sequence: int, message: Taken | LinkNews) -> None:
@@ -263,7 +265,7 @@ class UnitProgress:
 
     def _note(self, sequence: int, block: SampleBlock) -> None:
         """Add a message to the window of the messages that restore the state by a replay."""
-        state = self._analyser.state(self.unit)
+        state = self._monitor.state
         self._window.append((sequence, state.epoch, block.stop_index))
         while len(self._window) > 1:
             _, epoch, stop_index = self._window[0]

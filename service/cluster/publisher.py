@@ -16,15 +16,13 @@ from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
 from service.cluster.frames import UnitIdentity, encoded_block, encoded_link
 from service.cluster.session import (
-    MISFIT_RETRY_S,
     NOT_REACHED,
-    RETRY_S,
     StreamError,
     StreamMisfitError,
     ensure,
+    keep_session,
     let_stop_through,
     message_id,
-    session,
     stream_name,
     subject,
 )
@@ -175,21 +173,18 @@ class Publisher:
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Publish queued messages, and reconnect, until cancelled; `pulse` gets heartbeats."""
-        while True:
-            pulse.rest()
-            try:
-                async with session(self._settings, "padwatch acquire") as stream:
-                    await ensure(stream, self._plant, self._settings)
-                    if not self._n_unconfirmed:
-                        self._state.note(None)
-                    async with asyncio.TaskGroup() as tasks:
-                        for unit in self._identities:
-                            sending = self._send_unit(stream, unit, pulse)
-                            tasks.create_task(sending, name=f"publish {unit}")
-            except StreamError as error:
-                self._state.note(str(error))
-                is_misfit = isinstance(error, StreamMisfitError)
-                await self._clock.sleep(MISFIT_RETRY_S if is_misfit else RETRY_S)
+
+        async def send_all(stream: JetStreamContext) -> None:
+            await ensure(stream, self._plant, self._settings)
+            if not self._n_unconfirmed:
+                self._state.note(None)
+            async with asyncio.TaskGroup() as tasks:
+                for unit in self._identities:
+                    sending = self._send_unit(stream, unit, pulse)
+                    tasks.create_task(sending, name=f"publish {unit}")
+
+        whose = (self._settings, "padwatch acquire")
+        await keep_session(*whose, send_all, self._state, self._clock, pulse)
 
     async def _send_unit(self, stream: JetStreamContext, unit: str, pulse: Pulse) -> None:
         where = subject(self._plant, unit)

@@ -165,22 +165,18 @@ class DatabaseOperators(Operators):
 
 
 def replica_receivers(receivers: Sequence[Receiver], outbox: Outbox) -> list[ReceiverView]:
-    """Return the state of the notification receivers in a replica, which reads the outbox only.
+    """Return the state of the notification receivers from their oldest messages in the outbox.
 
     Raises `StoreError` if the outbox cannot be read.
     """
-    statuses = [
-        ReceiverStatus(r.name, r.settings.kind, r.channel.address, _status(outbox, r.name))
-        for r in receivers
-    ]
+    statuses = []
+    for receiver in receivers:
+        status = SenderStatus()
+        for first in outbox.waiting(receiver.name, 1):
+            failing = (first.n_attempts, first.queued_ns, first.answer)
+            status = SenderStatus(SenderState.SENDING)
+            if first.n_attempts:
+                status = SenderStatus(SenderState.RETRYING, *failing)
+        what = (receiver.name, receiver.settings.kind, receiver.channel.address)
+        statuses.append(ReceiverStatus(*what, status))
     return receiver_views(statuses, outbox)
-
-
-def _status(outbox: Outbox, name: str) -> SenderStatus:
-    """Return the sender status of a receiver, from its oldest waiting message."""
-    for first in outbox.waiting(name, 1):
-        if not first.n_attempts:
-            return SenderStatus(SenderState.SENDING)
-        n_attempts, since_ns = first.n_attempts, first.queued_ns
-        return SenderStatus(SenderState.RETRYING, n_attempts, since_ns, first.answer)
-    return SenderStatus()

@@ -3,10 +3,11 @@
 import asyncio
 import re
 import ssl
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
 import nats.errors
 from nats.aio.client import Client
@@ -21,8 +22,11 @@ from nats.js.errors import (
     ServiceUnavailableError,
 )
 
+from acquisition.clock import Clock
 from core.samples.blocks import SampleBlock
 from service.cluster.frames import UnitIdentity, fingerprint
+from service.runtime.heartbeats import Pulse
+from service.runtime.periodic import TroubleLog
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
 from service.settings.storage import BYTES_PER_GB
@@ -140,9 +144,35 @@ async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStrea
             yield client.jetstream(timeout=settings.ack_timeout_s)
             watching.cancel()
     except* (StreamError, Error, OSError) as group:  # with two clauses, a group would be raised
-        raise _most_specific(group, settings) from None
+        # a lost connection causes several errors; the most specific one is raised
+        found = sorted(_leaves(group), key=lambda error: not isinstance(error, StreamMisfitError))
+        own = [error for error in found if isinstance(error, StreamError)]
+        raise (own[0] if own else _renamed(found[0], settings)) from None
     finally:
         await _closed(client)
+
+
+async def keep_session(
+    settings: StreamSettings,
+    name: str,
+    work: Callable[[JetStreamContext], Awaitable[None]],
+    state: TroubleLog,
+    clock: Clock,
+    pulse: Pulse,
+) -> None:
+    """Run `work` in a session, and in a new one after each failure, until cancelled.
+
+    Failures are recorded in `state`; the caller records success. `pulse` gets heartbeats.
+    """
+    while True:
+        pulse.rest()
+        try:
+            async with session(settings, name) as stream:
+                await work(stream)
+        except StreamError as error:
+            state.note(str(error))
+            is_misfit = isinstance(error, StreamMisfitError)
+            await clock.sleep(MISFIT_RETRY_S if is_misfit else RETRY_S)
 
 
 async def _connected(settings: StreamSettings, name: str, lost: asyncio.Future[None]) -> Client:
@@ -169,9 +199,7 @@ async def _connected(settings: StreamSettings, name: str, lost: asyncio.Future[N
             connect_timeout=CONNECT_S,
             ping_interval=PING_S,
             max_outstanding_pings=2,
-            tls=_tls(settings),
-            token=_token(settings),
-            user_credentials=settings.credentials_file,
+            **_login(settings),
         )
         let_stop_through(n_before)
         version = client.connected_server_version
@@ -223,15 +251,6 @@ def _renamed(error: BaseException, settings: StreamSettings) -> StreamError:
     return StreamError(f"NATS at {_places(settings)} cannot be used: {words}; check its log")
 
 
-def _most_specific(
-    group: BaseExceptionGroup[BaseException], settings: StreamSettings
-) -> StreamError:
-    """Return the most specific error of a group; a lost connection causes several errors."""
-    found = sorted(_leaves(group), key=lambda error: not isinstance(error, StreamMisfitError))
-    own = [error for error in found if isinstance(error, StreamError)]
-    return own[0] if own else _renamed(found[0], settings)
-
-
 def _places(settings: StreamSettings) -> str:
     return ", ".join(settings.servers)
 
@@ -242,25 +261,18 @@ def _leaves(error: BaseException) -> list[BaseException]:
     return [error]
 
 
-def _tls(settings: StreamSettings) -> ssl.SSLContext | None:
-    wants = any(server.startswith("tls:") for server in settings.servers)
-    if not wants and settings.ca_file is None:
-        return None
+def _login(settings: StreamSettings) -> dict[str, Any]:
+    """Return the options of the NATS client for TLS and login; raise for unreadable files."""
+    key, path, tls, token = "ca_file", settings.ca_file, None, None
     try:
-        return ssl.create_default_context(cafile=settings.ca_file)
-    except (OSError, ssl.SSLError) as error:
-        words = f"cannot read [stream] ca_file {settings.ca_file}: {error}"
-        raise StreamMisfitError(words) from None
-
-
-def _token(settings: StreamSettings) -> str | None:
-    if settings.token_file is None:
-        return None
-    try:
-        return Path(settings.token_file).read_text("utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        words = f"cannot read [stream] token_file {settings.token_file}: {error}"
-        raise StreamMisfitError(words) from None
+        if path is not None or any(server.startswith("tls:") for server in settings.servers):
+            tls = ssl.create_default_context(cafile=path)
+        key, path = "token_file", settings.token_file
+        if path is not None:
+            token = Path(path).read_text("utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:  # an SSLError is an OSError
+        raise StreamMisfitError(f"cannot read [stream] {key} {path}: {error}") from None
+    return {"tls": tls, "token": token, "user_credentials": settings.credentials_file}
 
 
 S_PER_H = 3600.0

@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 import structlog
 
 from acquisition.clock import Clock
-from core.alarms.alarm import Alarm
 from core.alarms.kinds import Watch
 from core.limits import WITHIN, AlarmLevel, Judgement
 from service.cluster.progress import UnitProgress, take_news
@@ -62,7 +61,12 @@ class SilentUnits:
         """Read the reports of all units once, and update the alarms about silent units."""
         try:
             if self._board is None:
-                self._board = self._kept(await asyncio.to_thread(self._store.alarms))
+                stored = await asyncio.to_thread(self._store.alarms)
+                board = ReportedAlarms(Watch(identity_of(u), AT_ONCE, u) for u in self._units)
+                self._alarms.add_alarms(board, [alarm for alarm in stored if is_shared(alarm)])
+                self._beats.clear()
+                self._seen_s.clear()
+                self._since_s, self._board = self._clock.monotonic_s(), board
             beats = await asyncio.to_thread(self._store.unit_states.beats)
         except StoreError:
             self._since_s = self._clock.monotonic_s()
@@ -93,15 +97,6 @@ class SilentUnits:
     def is_watching(self) -> bool:
         """Whether this process has read the stored alarms about silent units and updates them."""
         return self._board is not None
-
-    def _kept(self, stored: Iterable[Alarm]) -> ReportedAlarms:
-        """Restore the stored alarms about silent units; reset the ages of all reports."""
-        board = ReportedAlarms(Watch(identity_of(u), AT_ONCE, u) for u in self._units)
-        self._alarms.add_alarms(board, [alarm for alarm in stored if is_shared(alarm)])
-        self._beats.clear()
-        self._seen_s.clear()
-        self._since_s = self._clock.monotonic_s()
-        return board
 
 
 log = structlog.get_logger()

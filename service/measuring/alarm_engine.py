@@ -13,7 +13,7 @@ from core.alarms.board import AlarmBoard, AlarmMemory
 from core.alarms.judgements import VectorReference
 from core.alarms.kinds import LINK_LOST
 from core.alarms.operation import Action
-from core.alarms.rules import UnitRules, rule_of
+from core.alarms.rules import rule_of
 from core.alarms.statistics import SHOWN_NS, ChatterRule, ChatterWatch
 from core.alarms.unit_alarms import UnitAlarms
 from core.change.settings import FilmRules
@@ -36,7 +36,6 @@ from service.settings.core_values import (
 from service.settings.plant import PlantFile
 from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.storage import Origin
-from service.settings.units import UnitSettings
 from service.store.access.audit_entries import ActedNews, acting
 from service.store.port import AlarmQuery
 from service.store.store import Store
@@ -330,10 +329,15 @@ async def alarm_engine(
         States of the alarms, by unit; given only for units without missing samples since these
         states were saved.
     """
+    film_rule = rule_of(0.0, 0.0, is_latching=plant.films.latching)
+    watched = {u.id for u in plant.unit if isinstance(film_rules_of(u, plant.films), FilmRules)}
     units = {
         unit.id: UnitAlarms(
             machine_of(unit),
-            _rules(plant, unit, origin),
+            replace(
+                rules_of(unit, plant.alarms, origin),
+                films=film_rule if unit.id in watched else None,
+            ),
             # the rows of a block of vectors are not the channels
             [row.channel for row in unit.source.rows]
             if isinstance(unit.source, ModbusVectorSettings)
@@ -360,10 +364,3 @@ async def alarm_engine(
     events = await asyncio.to_thread(store.alarm_events, recent)
     engine.recall(found.event for found in reversed(events))
     return engine
-
-
-def _rules(plant: PlantFile, unit: UnitSettings, origin: Origin) -> UnitRules:
-    """Return the alarm rules of a unit, with a rule for its films if they are monitored."""
-    is_watched = isinstance(film_rules_of(unit, plant.films), FilmRules)
-    films = rule_of(0.0, 0.0, is_latching=plant.films.latching) if is_watched else None
-    return replace(rules_of(unit, plant.alarms, origin), films=films)

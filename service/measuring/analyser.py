@@ -4,7 +4,6 @@ import asyncio
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from time import perf_counter
-from types import MappingProxyType
 
 from prometheus_client import Histogram
 
@@ -47,9 +46,6 @@ class UnitMemory:
     films: FilmMemory | None
     count: Count | None = None
     version: int = VERSION
-
-
-NO_MEMORIES: Mapping[str, UnitMemory] = MappingProxyType({})
 
 
 NOTHING = Findings()
@@ -95,15 +91,11 @@ class Analyser:
         alarms: AlarmEngine,
         films: FilmMonitor,
     ) -> None:
-        self._monitors, self._live, self._recorder = monitors, live, recorder
+        self.monitors, self._live, self._recorder = monitors, live, recorder
         self.alarms, self._films = alarms, films
         self._counts = {unit: Counts() for unit in monitors}
         for unit in monitors:
             ASSESSMENTS.labels(unit)  # a unit without results has a count of zero
-
-    def require(self, block: SampleBlock) -> None:
-        """Raise `BlockMisfitError` if a block does not fit its unit."""
-        self._monitors[block.unit].require(block)
 
     async def take(self, block: SampleBlock, sampled_s: float) -> None:
         """Analyse a block and queue its findings for the store.
@@ -116,7 +108,7 @@ class Analyser:
 
     async def analyse(self, block: SampleBlock, sampled_s: float) -> Findings:
         """Analyse a block, last sampled at the monotonic time ``sampled_s``; return findings."""
-        monitor = self._monitors[block.unit]
+        monitor = self.monitors[block.unit]
         block = self._counts[block.unit].placed(block)
         found = []
         for assessment in timed(monitor.steps(block), block.unit):
@@ -140,21 +132,17 @@ class Analyser:
         `account` are the stored sample counts, shown instead of the counts of the monitor, which
         would count replayed samples twice.
         """
-        monitor = self._monitors[block.unit]
+        monitor = self.monitors[block.unit]
         block = self._counts[block.unit].replayed(block)
         for _ in monitor.steps(block):
             await _yield()
         monitor.drain_gaps()
         self._live.set_received(block, account or monitor.account, sampled_s)
 
-    def state(self, unit: str) -> MonitorState:
-        """Return the state of a unit's monitor, except the samples that it still needs."""
-        return self._monitors[unit].state
-
     def memory(self, unit: str) -> UnitMemory:
         """Return the analysis state of a unit, from which another process continues."""
         return UnitMemory(
-            self.state(unit),
+            self.monitors[unit].state,
             self.alarms.memory(unit),
             self._films.memory(unit),
             self._counts[unit].count,
@@ -162,13 +150,9 @@ class Analyser:
 
     def rewind(self, unit: str, memory: UnitMemory) -> None:
         """Prepare the monitor of a unit for a replay of its newest samples, from a stored state."""
-        self._monitors[unit].go_on(None)
-        self._monitors[unit].rewind(memory.monitor)
+        self.monitors[unit].go_on(None)
+        self.monitors[unit].rewind(memory.monitor)
         self._counts[unit].count = memory.count
-
-    def settle(self, unit: str, memory: UnitMemory) -> None:
-        """Restore a stored state of a unit's monitor after the replay of its newest samples."""
-        self._monitors[unit].settle(memory.monitor)
 
     def note_link(self, news: LinkNews) -> None:
         """Update the link alarm of a unit."""

@@ -44,23 +44,17 @@ def in_force(
     if baseline is None or baseline.origin.estimator != place.estimator:
         return None, ()
     stored = [
-        found.decision
-        for found in store.decisions(place.unit, place.bearing)
-        if (found.baseline_version, found.estimator) == (version, place.estimator)
+        each.decision
+        for each in store.decisions(place.unit, place.bearing)
+        if (each.baseline_version, each.estimator) == (version, place.estimator)
     ]
     if len(stored) == len(QUANTITIES):
         return baseline, tuple(stored)
-    return baseline, _decisions(store, place, rules, baseline)
-
-
-def _decisions(
-    store: FilmStore, place: FilmPlace, rules: FilmRules, baseline: BearingBaseline
-) -> tuple[Decision, ...]:
-    """Return the decisions computed from the newest readings with a new baseline."""
+    # computed from the newest readings with a new baseline
     start_ns = _newest_ns(store, place) - round(CATCH_UP_NS / rules.time_lapse)
     found = store.history(FilmQuery(place.unit, place.bearing, place.estimator, start_ns))
     learned = (baseline.of(name) for name in QUANTITIES)
-    return tuple(
+    return baseline, tuple(
         last_decision(found.history, found.is_settled, quantity, rules)
         if quantity
         else INITIAL_DECISION

@@ -53,7 +53,21 @@ class CommandExecutor:
         """Execute a command of the actor `who`; return the answer once the result is stored."""
         try:
             with acting_as(who):
-                return await self._execute(command)
+                match command:
+                    case AlarmCommand():
+                        self._alarms.alarm(command.alarm)  # before the store is tried
+                        async with asyncio.timeout(WITHIN_S):
+                            await self._recorder.require_store()
+                        self._alarms.operate(command.alarm, command.action)
+                        return await self._stored()
+                    case BaselineCommand(place, action, actor, reason):
+                        await self._films.act(place, action, actor, reason)
+                    case TakeReference():
+                        await self._take_reference(command)
+                    case Note():
+                        added = note_action(command, self._clock.now_ns())
+                        await asyncio.to_thread(self._store.audit.record, [added])
+                return DONE
         except LookupError:
             return Answer(CommandState.UNKNOWN, "the alarm does not exist")
         except (ActionRefusedError, BaselineRefusedError, ReferenceRefusedError) as error:
@@ -66,23 +80,6 @@ class CommandExecutor:
             return Answer(
                 CommandState.WITHDRAWN, f"{words}: {error or 'the store does not respond'}"
             )
-
-    async def _execute(self, command: OperatorCommand) -> Answer:
-        match command:
-            case AlarmCommand():
-                self._alarms.alarm(command.alarm)  # before the store is tried
-                async with asyncio.timeout(WITHIN_S):
-                    await self._recorder.require_store()
-                self._alarms.operate(command.alarm, command.action)
-                return await self._stored()
-            case BaselineCommand():
-                await self._films.act(command.place, command.action, command.actor, command.reason)
-            case TakeReference():
-                await self._take_reference(command)
-            case Note():
-                added = note_action(command, self._clock.now_ns())
-                await asyncio.to_thread(self._store.audit.record, [added])
-        return DONE
 
     async def _stored(self) -> Answer:
         try:
@@ -105,7 +102,8 @@ class Questions:
     """Handler of the questions that the serving process asks the measuring process.
 
     Faults of the database of accounts are reported to `integrity`. `metrics` returns the metrics of
-    the measuring process in the Prometheus text format.
+    the measuring process in the Prometheus text format. `on_ready` is called with URL and set-up
+    token (None if an account exists) when requests are served for the first time.
     """
 
     def __init__(
@@ -114,9 +112,10 @@ class Questions:
         live: LiveView,
         integrity: IntegrityMonitor,
         metrics: Callable[[], Awaitable[bytes]],
+        on_ready: Callable[[str, str | None], None] = lambda *_: None,
     ) -> None:
         self._executor, self._live, self._metrics = executor, live, metrics
-        self._integrity = integrity
+        self._integrity, self._on_ready, self._is_ready = integrity, on_ready, False
 
     async def answer(self, question: Question) -> object:
         """Return the answer to a question: an `Answer` to a command, None to a reported fault."""
@@ -132,6 +131,11 @@ class Questions:
                 return None
             case "metrics":
                 return await self._metrics()
+            case "ready":
+                if not self._is_ready:
+                    self._is_ready = True
+                    self._on_ready(*json.loads(question.document))
+                return None
         try:
             command = decoded(question.kind, question.document)
         except UnreadableCommandError as error:

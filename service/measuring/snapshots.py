@@ -63,14 +63,6 @@ class SnapshotBuilder:
         built = self._newest(unit)
         return UnitReport(unit, self._link(unit), built.revision, built.snapshot)
 
-    def state(self, unit: str) -> tuple[int, object]:
-        """Return the revision of a unit's snapshot, and its link, newest sample and store state."""
-        live, link = self._live, None
-        if unit in self._bearings:
-            status = live.status(unit)
-            link = (status.state, status.reason, status.last_sample_ns, live.stored(unit))
-        return self._newest(unit).revision, (link, live.store_error)
-
     def _newest(self, unit: str) -> _Built:
         bearings, alarms = self._bearings.get(unit, []), self._alarms_of(unit)
         is_unit = unit in self._bearings
@@ -158,11 +150,12 @@ class SocketReports:
         return Report("measuring", self._n_reports, tuple(found), plant if is_new else None)
 
     def _unit(self, unit: str, now_s: float) -> UnitReport | None:
-        revision, link = self._builder.state(unit)
-        sent_revision, sent_link, sent_s = self._sent.get(unit, (0, None, 0.0))
-        is_new = revision != sent_revision
-        if not is_new and link == sent_link and now_s - sent_s < LINK_EVERY_S:
-            return None
-        self._sent[unit] = (revision, link, now_s)
         newest = self._builder.report(unit)
+        status, link = newest.link.status, newest.link
+        state = (status.state, status.reason, status.last_sample_ns, link.stored, link.store_error)
+        sent_revision, sent_state, sent_s = self._sent.get(unit, (0, None, 0.0))
+        is_new = newest.revision != sent_revision
+        if not is_new and state == sent_state and now_s - sent_s < LINK_EVERY_S:
+            return None
+        self._sent[unit] = (newest.revision, state, now_s)
         return newest if is_new else replace(newest, snapshot=None)

@@ -7,6 +7,7 @@ import pytest
 
 MEASURING = [
     "service.app.measuring_process",
+    "service.app.analysis",
     "service.app.cluster_processes",
 ]
 SERVING = ["service.app.serving_process", "service.app.replica_process"]

@@ -19,8 +19,8 @@ from core.condition.operating_state import STEADY, OperatingState
 from core.limits import Limits
 from core.machine.unit import Bearing
 from core.monitor.catalogue import CATALOGUE
+from service.app.analysis import Analysis
 from service.app.kept_files import captures_of
-from service.app.measuring_process import Analysis
 from service.measuring.service_alarms import ServiceRules
 from service.settings.alarm_kinds import ALARM_KINDS, SERVICE_KINDS
 from service.settings.core_values import chatter_rule_of, references_of, rules_of

@@ -10,7 +10,7 @@ import numpy as np
 
 from acquisition.clock import Clock, SystemClock
 from harness.stream_rig import ground_of
-from service.app.measuring_process import Analysis
+from service.app.analysis import Analysis
 from service.cluster.progress import UnitProgress, memories_of, usable
 from service.cluster.session import identity_of
 from service.measuring.recorder import Findings

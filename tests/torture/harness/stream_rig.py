@@ -19,8 +19,8 @@ from core.units import NS_PER_S
 from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer
 from harness.waiting import at_work
+from service.app.analysis import Analysis, ProcessContext
 from service.app.cluster_processes import Analysing
-from service.app.measuring_process import Analysis, ProcessContext
 from service.app.storage import open_store
 from service.cluster.frames import Taken, decoded
 from service.cluster.ownership import Partition

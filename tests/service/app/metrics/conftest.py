@@ -21,7 +21,7 @@ from core.monitor.assessment import Assessment
 from core.quality import Level, Quality, Reading, Reason, bad, missing
 from core.samples.blocks import DeviceClock, Rejection, SampleBlock
 from core.samples.gaps import SampleAccount
-from service.app.measuring_process import ServiceRun, run_service
+from service.app.measuring_process import run_service
 from service.live.status import LinkState
 from service.measuring.analyser import ASSESSMENTS
 from service.measuring.live_view import LiveView
@@ -163,8 +163,8 @@ async def told_by_a_service(folder: Path) -> Told:
     said: asyncio.Queue[str] = asyncio.Queue()
     url = asyncio.create_task(said.get())
     with listen("127.0.0.1", 0) as listener:
-        performance = ServiceRun(plant, units, ends=True)
-        serving = asyncio.create_task(run_service(performance, listener, clock, said.put_nowait))
+        service = run_service(plant, units, listener, clock, said.put_nowait, ends=True)
+        serving = asyncio.create_task(service)
         await asyncio.wait([serving, url], return_when=asyncio.FIRST_COMPLETED)
         if serving.done():
             serving.result()

@@ -10,7 +10,7 @@ import pytest
 import structlog
 
 from acquisition.clock import SystemClock
-from service.app.measuring_process import ServiceRun, run_service
+from service.app.measuring_process import run_service
 from service.app.process import Supervision
 from service.live.status import LinkState
 from service.measuring.live_view import LiveView
@@ -193,10 +193,8 @@ async def test_every_task_of_the_program_has_a_pulse(tmp_path, plant_text, monke
     stopped = asyncio.Event()
     monkeypatch.setattr("service.app.process.stop_on_signals", lambda: stopped)
     listener = socket.create_server(("127.0.0.1", 0))
-    performance = ServiceRun(settings, live_units(settings, clock))
-    service = asyncio.create_task(
-        run_service(performance, listener, clock, said.put_nowait), name="the service"
-    )
+    parts = (settings, live_units(settings, clock), listener, clock, said.put_nowait)
+    service = asyncio.create_task(run_service(*parts), name="the service")
     url = await asyncio.wait_for(said.get(), 60)
     async with httpx2.AsyncClient(base_url=url, trust_env=False, timeout=60.0) as client:
         answer = await client.get("/readyz")

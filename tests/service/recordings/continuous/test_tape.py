@@ -5,8 +5,8 @@ from rigs.capturing import counted_block, numbers, samples
 from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.reader import open_recording, summary_of
-from service.app import measuring_process as pressure
-from service.app.measuring_process import Pressure
+from service.app import analysis as pressure
+from service.app.analysis import Pressure
 from service.measuring.acquirer import Bus
 from service.recordings import continuous_recorder as tape
 from service.recordings import continuous_recorder as unit_tape

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from service.app.measuring_process import Analysis
+from service.app.analysis import Analysis
 from service.recordings.library import RecordingLibrary
 from service.runtime.disk import DiskSpace
 from service.store.port import StoreError
