@@ -230,10 +230,18 @@ class Wire(StrEnum):
 
 def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
     """Return a copy of the plant with a source of kind `wire` for each unit, without addresses."""
-    # fast polls do not limit the speed of a replay
-    source: SourceSettings
+    units = tuple(
+        # the recording of a polled source has the rate of its polls
+        unit.model_copy(update={"source": _source(wire), "rate_hz": unit.sampling_hz})
+        for unit in plant.unit
+    )
+    return plant.model_copy(update={"unit": units})
+
+
+def _source(wire: Wire) -> SourceSettings:
+    """Return source settings for a wire; fast polls do not limit the speed of a replay."""
     if wire in (Wire.CAN, Wire.CAN_FD):
-        source = CanSettings(
+        return CanSettings(
             kind="can",
             interface="slcan",
             channel=f"socket://{_LOOPBACK}:0",
@@ -242,14 +250,7 @@ def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
             stale_after_s=STALE_AFTER_S,
             when_full="wait",
         )
-    else:
-        tcp = {"host": _LOOPBACK, "port": 0}
-        link = tcp if wire is Wire.MODBUS_TCP else {"device": "pty"}
-        timing = {"poll_period_s": 0.02, "timeout_s": 2.0, "stale_after_s": STALE_AFTER_S}
-        source = ModbusRingSettings(kind="modbus_ring", **link, **timing)
-    units = tuple(
-        # the recording of a polled source has the rate of its polls
-        unit.model_copy(update={"source": source, "rate_hz": unit.sampling_hz})
-        for unit in plant.unit
+    where = {"host": _LOOPBACK, "port": 0} if wire is Wire.MODBUS_TCP else {"device": "pty"}
+    return ModbusRingSettings(
+        kind="modbus_ring", **where, poll_period_s=0.02, timeout_s=2.0, stale_after_s=STALE_AFTER_S
     )
-    return plant.model_copy(update={"unit": units})
