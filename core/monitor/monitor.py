@@ -4,6 +4,8 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from core.condition.probe_axes import Growth
 from core.machine.unit import Unit, bearings_with_new_references, require_same_machine
 from core.monitor.assessment import AnalysisSettings, Assessment
@@ -240,6 +242,15 @@ class UnitMonitor:
 
 
 def _pieces(block: SampleBlock, n_most: int) -> Iterator[SampleBlock]:
-    """Yield a block in pieces of at most `n_most` samples; the ring buffer holds twice as many."""
-    for start in range(0, block.n_samples, n_most):
-        yield block.from_sample(start, start + n_most)
+    """Yield a block in pieces of at most `n_most` samples; the ring buffer holds twice as many.
+
+    Pieces end with a cell if possible: the time of the rest of a cell is rounded twice.
+    """
+    starts, start = block.side.starts, 0
+    while start < block.n_samples:
+        stop = start + n_most
+        if stop < block.n_samples:
+            cell = int(starts[np.searchsorted(starts, stop, side="right") - 1])
+            stop = cell if cell > start else stop
+        yield block.from_sample(start, stop)
+        start = min(stop, block.n_samples)

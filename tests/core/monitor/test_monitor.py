@@ -13,7 +13,7 @@ from core.machine.unit import Unit
 from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
 from core.quality import Level, Reason, bad, missing, uncertain
-from core.samples.blocks import UNCOUNTED_LOSS, Rejection, SampleBlock
+from core.samples.blocks import UNCOUNTED_LOSS, Rejection, SampleBlock, joined
 from core.samples.gaps import Gap
 from core.spectra.speed import SpeedSource
 
@@ -46,6 +46,15 @@ def test_results_come_with_each_hop_however_the_samples_are_cut(monitor, blocks,
         assert [a.readings for a in other] == [a.readings for a in single]
         # block times are whole nanoseconds, so the cut moves a time by one at the most
         assert [a.time_ns for a in other] == pytest.approx([a.time_ns for a in single], abs=1)
+
+
+def test_late_blocks_of_whole_cells_change_no_time(unit, blocks, signals):
+    cells = list(blocks(signals(51.0), n_each=7750))
+    times_ns = [
+        [found.time_ns for found in watch(UnitMonitor(unit, AnalysisSettings()), stream)]
+        for stream in (cells, [joined(cells)])
+    ]
+    assert times_ns[0] == times_ns[1]
 
 
 def test_the_machine_reads_its_stiffness_its_position_and_its_orbit(results, signals):
