@@ -1,4 +1,4 @@
-"""Base of the models of answers and documents, which are built from the attributes of values."""
+"""Base of the models of answers and documents, and configuration of served dataclasses."""
 
 import math
 from enum import Enum
@@ -12,6 +12,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    PlainSerializer,
 )
 
 from service.runtime.times import rfc3339
@@ -41,6 +42,18 @@ class ValueModel(BaseModel):
         return cls.model_validate(_Merged(SimpleNamespace(**values), *sources))
 
 
+SERVED = ConfigDict(
+    **{
+        **ValueModel.model_config,
+        "alias_generator": AliasGenerator(serialization_alias=lambda n: n.removesuffix("_ns")),
+    }
+)
+"""Configuration, as ``__pydantic_config__``, of dataclasses that answers of the API contain.
+
+The names of times in JSON lack the suffix ``_ns``. The docstrings of the fields are descriptions in
+the JSON schema."""
+
+
 class _Merged:
     """Object with the attributes of several objects; the first object with an attribute decides."""
 
@@ -68,6 +81,16 @@ def _finite(value: object) -> object:
 
 Time = Annotated[str, BeforeValidator(_time), Field(examples=["2026-11-21T09:03:12.400Z"])]
 """Type of a time in RFC 3339; nanoseconds since 1970 UTC are converted."""
+
+TimeNs = Annotated[
+    int,
+    PlainSerializer(rfc3339, return_type=str),
+    Field(examples=["2026-11-21T09:03:12.400Z"]),
+]
+"""Type of a time in nanoseconds since 1970 UTC, which JSON contains in RFC 3339."""
+
+NotServed = Field(exclude=True)
+"""Annotation of a field of a served dataclass that JSON does not contain."""
 
 ByName = BeforeValidator(_name)
 """Validator that converts a member of an enumeration to its name in lower case."""

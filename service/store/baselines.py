@@ -3,10 +3,14 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
 from enum import StrEnum
+from typing import Annotated
+
+from pydantic import Field
 
 from core.baseline.baseline import BearingBaseline
 from core.change.shaft_response import ShaftResponse
 from core.machine.unit import Estimator
+from service.runtime.models import SERVED, NotServed, TimeNs
 from service.store.access.audit_entries import AuditAction, acting
 from service.store.audit import AuditedTables
 from service.store.database import Connection, insert, upsert
@@ -34,24 +38,30 @@ class BaselineStep(StrEnum):
 
 @dataclass(frozen=True)
 class StoredStep:
-    """Stored step in the life cycle of the baselines of a bearing.
+    """Stored step in the life cycle of the baselines of a bearing."""
 
-    Parameters
-    ----------
-    version
-        Version of the baseline; None for `RENEWED`.
-    from_ns
-        Time from which readings are used for learning, for `RENEWED`; None for other steps.
-    """
+    __pydantic_config__ = SERVED
 
-    unit: str
-    bearing: str
+    unit: Annotated[str, NotServed]
+    bearing: Annotated[str, NotServed]
+
     version: int | None
+    """Version of the baseline; null for "renewed"."""
+
     step: BaselineStep
-    time_ns: int
+    """Kind of step."""
+
+    time_ns: TimeNs
+    """Time of the step."""
+
     actor: str
+    """Person, API key or program that acted; empty if unknown."""
+
     reason: str
-    from_ns: int | None = None
+    """Reason given by the person or program that acted; may be empty."""
+
+    from_ns: Annotated[TimeNs | None, Field(serialization_alias="event_time")] = None
+    """For "renewed", time of the machine event; earlier readings are not used."""
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,9 @@
 
 import json
 from dataclasses import dataclass
+from typing import Annotated
 
+from service.runtime.models import SERVED, NotServed, TimeNs
 from service.store.access.audit_entries import AuditAction, acting
 from service.store.audit import AuditQuery, AuditStore
 
@@ -15,23 +17,23 @@ MAX_NOTES = 1000
 
 @dataclass(frozen=True)
 class Note:
-    """Note about a unit or a bearing, such as "shims changed"; notes are never changed.
+    """Note about a unit or a bearing, such as "shims changed"; notes are never changed."""
 
-    Parameters
-    ----------
-    bearing
-        Identifier of the bearing; None for a note about the whole unit.
-    time_ns
-        Time to which the note refers, ns since 1970 UTC.
-    author
-        Person or API key that added the note.
-    """
+    __pydantic_config__ = SERVED
 
-    unit: str
+    unit: Annotated[str, NotServed]
+
     bearing: str | None
-    time_ns: int
+    """Identifier of the bearing; null for a note about the whole unit."""
+
+    time_ns: TimeNs
+    """Time to which the note refers."""
+
     text: str
+    """Text of the note."""
+
     author: str
+    """Person or API key that added the note."""
 
 
 def note_action(note: Note, now_ns: int) -> AuditAction:

@@ -22,7 +22,7 @@ from service.api.values import (
 from service.live.commands import FilmPlace
 from service.live.models import BaselineOriginModel
 from service.settings.films import FilmAlarmSettings
-from service.store.baselines import BaselineEntry, BaselineStep, Versions
+from service.store.baselines import BaselineEntry, StoredStep, Versions
 from service.store.film_readings import FilmHistory, FilmQuery
 from service.store.films import FilmStore
 
@@ -170,23 +170,6 @@ class BaselineVersionModel(BaselineOriginModel, ApiModel):
     """Whether this version is in force and an engineer has frozen learning."""
 
 
-class BaselineStepModel(ApiModel):
-    """Step in the history of the baselines of a bearing."""
-
-    actor: str
-    reason: str
-    time: Time
-
-    step: BaselineStep
-    """Kind of step."""
-
-    version: int | None
-    """Version of the baseline; null for "renewed"."""
-
-    event_time: Time | None
-    """For "renewed", time of the machine event; earlier readings are not used."""
-
-
 class BaselinesModel(BearingAnswer):
     """All baseline versions of a bearing, and their history."""
 
@@ -211,7 +194,7 @@ class BaselinesModel(BearingAnswer):
     versions: list[BaselineVersionModel]
     """Versions of the baseline, newest first."""
 
-    steps: list[BaselineStepModel]
+    steps: list[StoredStep]
     """Steps in the history of the baselines, newest first."""
 
 

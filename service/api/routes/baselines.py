@@ -24,7 +24,6 @@ from service.api.routes.baseline_models import (
     BaselineModel,
     BaselinesModel,
     BaselineStatusName,
-    BaselineStepModel,
     BaselineVersionModel,
     RenewModel,
     learning_model,
@@ -236,7 +235,7 @@ def _baselines(context: Context, unit: str, bearing: str) -> BaselinesModel:
         acceptance=settings.acceptance,
         learning=place and learning_model(store, place, versions, entries, settings, now_ns),
         versions=[version_model(entry, versions, steps) for entry in entries],
-        steps=[BaselineStepModel.of(s, event_time=s.from_ns) for s in reversed(steps)],
+        steps=steps[::-1],
     )
 
 

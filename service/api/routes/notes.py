@@ -11,20 +11,9 @@ from service.api.auth.gate import actor_or
 from service.api.context import Context, UnitId
 from service.api.parameters import Moment, OptionalTimeRange, ns_from_datetime
 from service.api.routes.alarms import COMMENT_LIMIT, Allowances
-from service.api.values import ActorModel, ApiModel, ReasonText, Time
+from service.api.values import ActorModel, ReasonText
 from service.store.access.identities import Permission
 from service.store.notes import Note, notes_between
-
-
-class NoteModel(ApiModel):
-    """Note about a unit or a bearing at a time."""
-
-    bearing: str | None
-    author: str
-    time: Time
-
-    text: str
-    """Text of the note."""
 
 
 class AddNoteModel(ActorModel):
@@ -45,18 +34,17 @@ def note_router(context: Context) -> APIRouter:
     allowances = Allowances()
 
     @router.get("")
-    async def notes(unit: UnitId, times: OptionalTimeRange) -> list[NoteModel]:
+    async def notes(unit: UnitId, times: OptionalTimeRange) -> list[Note]:
         """List the notes about a unit and its bearings that refer to a time range.
 
         Of a unit, the 1000 notes that were added last are listed, the newest first.
         """
         context.unit(unit)
         audit = context.store.audit
-        found = await in_thread(lambda: notes_between(audit, unit, *times))
-        return [NoteModel.of(note) for note in found]
+        return await in_thread(lambda: notes_between(audit, unit, *times))
 
     @router.post("", responses=COMMENT_LIMIT, dependencies=[needs(Permission.ACT_ON_ALARMS)])
-    async def add_note(request: Request, unit: UnitId, asked: AddNoteModel) -> NoteModel:
+    async def add_note(request: Request, unit: UnitId, asked: AddNoteModel) -> Note:
         """Add a note; the audit trail records it, and it is never changed or deleted."""
         context.unit(unit)
         if asked.bearing is not None:
@@ -65,6 +53,6 @@ def note_router(context: Context) -> APIRouter:
         allowances.take(request, context.clock.monotonic_s())
         note = Note(unit, asked.bearing, time_ns, asked.text, actor_or(asked.actor))
         await context.operators.add_note(note)
-        return NoteModel.of(note)
+        return note
 
     return router
