@@ -28,7 +28,7 @@ from service.dashboard.assets import compress_all
 from service.live.client import LiveClient, SocketOperators
 from service.live.commands import Operators
 from service.live.exchange import MeasuringGoneError, ServingEnd, VersionError
-from service.live.receivers import receiver_views
+from service.live.receivers import with_backlogs
 from service.live.references import ReferencesInForce
 from service.live.snapshot import Report
 from service.reports.archive import EvidenceArchive
@@ -186,7 +186,7 @@ async def serve_beside(
             access=access_desk(plant, access, clock, start.is_demo),
             origin=start.origin,
             configuration=built_configuration(plant),
-            receivers=lambda: asyncio.to_thread(receiver_views, live.plant.receivers, store.outbox),
+            receivers=lambda: asyncio.to_thread(with_backlogs, live.plant.receivers, store.outbox),
             metrics=metrics,
             recordings=(evidence_folders(plant).captures, recordings_folder(plant)),
         )

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Sequence
+from typing import Any
 from uuid import uuid4
 
 import structlog
@@ -12,11 +13,9 @@ from service.live.alarm_list import LiveAlarms
 from service.live.client import LiveClient
 from service.live.commands import OperatorCommand, Operators, encoded
 from service.live.receivers import (
-    ReceiverStatus,
     ReceiverView,
     SenderState,
-    SenderStatus,
-    receiver_views,
+    with_backlogs,
 )
 from service.live.snapshot import (
     Report,
@@ -169,14 +168,18 @@ def replica_receivers(receivers: Sequence[Receiver], outbox: Outbox) -> list[Rec
 
     Raises `StoreError` if the outbox cannot be read.
     """
-    statuses = []
-    for receiver in receivers:
-        status = SenderStatus()
-        for first in outbox.waiting(receiver.name, 1):
-            failing = (first.n_attempts, first.queued_ns, first.answer)
-            status = SenderStatus(SenderState.SENDING)
-            if first.n_attempts:
-                status = SenderStatus(SenderState.RETRYING, *failing)
-        what = (receiver.name, receiver.settings.kind, receiver.channel.address)
-        statuses.append(ReceiverStatus(*what, status))
-    return receiver_views(statuses, outbox)
+    return with_backlogs([each.view(**_status(outbox, each.name)) for each in receivers], outbox)
+
+
+def _status(outbox: Outbox, name: str) -> dict[str, Any]:
+    """Return the sender status of a receiver, from its oldest waiting message."""
+    for first in outbox.waiting(name, 1):
+        if not first.n_attempts:
+            return {"state": SenderState.SENDING}
+        return {
+            "state": SenderState.RETRYING,
+            "n_failures": first.n_attempts,
+            "failing_since_ns": first.queued_ns,
+            "reason": first.answer,
+        }
+    return {}

@@ -19,7 +19,7 @@ from core.spectra.runout import RunoutVerdict
 from core.spectra.segments import Evidence
 from core.spectra.speed import SpeedSource
 from core.uncertainty import Budget
-from service.live.receivers import ReceiverStatus
+from service.live.receivers import ReceiverView
 from service.live.status import StoredResults, UnitStatus
 
 OWN_VERSION = version("padwatch").encode() + b"\n"
@@ -258,7 +258,7 @@ class PlantSnapshot:
     continuous: tuple[str, ...] = ()
     continuous_trouble: str | None = None
     faults: Mapping[str, str] = field(default_factory=dict)
-    receivers: tuple[ReceiverStatus, ...] = ()
+    receivers: tuple[ReceiverView, ...] = ()
     sources: Mapping[str, SourceCounts] = field(default_factory=dict)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from core.units import NS_PER_S
-from service.live.receivers import ReceiverView
+from service.live.receivers import ReceiverView, SenderState
 from service.runtime.metrics import Families
 
 DELIVERY = {
@@ -25,16 +25,14 @@ def add_deliveries(families: Families, views: Sequence[ReceiverView] | None, now
     families.add("outbox_readable", views is not None)
     by_name: dict[str, list[ReceiverView]] = {}
     for view in views or ():
-        if view.receiver is not None:
-            by_name.setdefault(view.name.partition(":")[0], []).append(view)
+        if view.state is not SenderState.REMOVED:
+            by_name.setdefault(view.id.partition(":")[0], []).append(view)
     for name, its in by_name.items():
-        backlogs = [view.backlog for view in its if view.backlog]
-        waits_ns = [now_ns - each.oldest_ns for each in backlogs if each.oldest_ns is not None]
-        n_failed = sum(view.receiver.status.n_failures for view in its if view.receiver)
+        since_ns = [view.waiting_since_ns for view in its if view.waiting_since_ns is not None]
         for measure, value in (
-            ("waiting_messages", sum(backlog.n_waiting for backlog in backlogs)),
-            ("dead_messages", sum(backlog.n_dead for backlog in backlogs)),
-            ("failed_attempts", n_failed),
-            ("wait_seconds", max((0, *waits_ns)) / NS_PER_S),
+            ("waiting_messages", sum(view.n_waiting for view in its)),
+            ("dead_messages", sum(view.n_dead for view in its)),
+            ("failed_attempts", sum(view.n_failures for view in its)),
+            ("wait_seconds", max(0, now_ns - min(since_ns, default=now_ns)) / NS_PER_S),
         ):
             families.add(f"delivery_{measure}", value, receiver=name)

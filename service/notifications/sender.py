@@ -4,7 +4,7 @@ import asyncio
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import structlog
 
@@ -12,11 +12,9 @@ from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival
 from core.units import ns_from_s
 from service.live.receivers import (
-    ReceiverStatus,
     ReceiverView,
     SenderState,
-    SenderStatus,
-    receiver_views,
+    with_backlogs,
 )
 from service.notifications.channel import Channel, Delivered, Failed, Outcome
 from service.notifications.message import loads
@@ -83,12 +81,16 @@ class Receiver:
     settings: AnyReceiver
     channel: Channel
 
+    def view(self, **status: Any) -> ReceiverView:
+        """Return the receiver with the status of its sender, given as fields of the view."""
+        return ReceiverView(self.name, self.settings.kind, self.channel.address, **status)
+
 
 class Sender:
     """Background loop that delivers the waiting outbox messages of one receiver."""
 
     def __init__(self, receiver: Receiver, outbox: Outbox, clock: Clock) -> None:
-        self.receiver, self.status = receiver, SenderStatus()
+        self.receiver, self.status = receiver, receiver.view()
         self._outbox, self._clock = outbox, clock
         self._begun = Arrival.now(clock)
         self._news = asyncio.Event()
@@ -151,7 +153,7 @@ class Sender:
             outcome_words = "delivered after failures" if is_delivered else "permanently rejected"
             event = f"message {outcome_words}"
             write(event, receiver=self.receiver.name, id=letter.event_id, answer=outcome.answer)
-        self.status = SenderStatus(SenderState.SENDING)
+        self.status = self.receiver.view(state=SenderState.SENDING)
 
     async def _wait_after(self, letter: StoredMessage, failed: Failed) -> None:
         now_ns, before = self._clock.now_ns(), self.status
@@ -162,7 +164,7 @@ class Sender:
         await self._expire(failed.answer)
         n_failures = before.n_failures + 1
         pause_s = wait_s(n_failures, failed.retry_after_s, self.receiver.settings.max_retry_s)
-        self.status = SenderStatus(
+        self.status = self.receiver.view(
             state=SenderState.RETRYING,
             n_failures=n_failures,
             failing_since_ns=before.failing_since_ns or now_ns,
@@ -265,18 +267,13 @@ class Deliveries:
             sender.wake()
 
     @property
-    def statuses(self) -> tuple[ReceiverStatus, ...]:
+    def statuses(self) -> tuple[ReceiverView, ...]:
         """Receivers of the plant file with the status of their senders."""
-        return tuple(
-            ReceiverStatus(
-                name, each.receiver.settings.kind, each.receiver.channel.address, each.status
-            )
-            for name, each in self._senders.items()
-        )
+        return tuple(each.status for each in self._senders.values())
 
     async def look(self) -> list[ReceiverView]:
         """Return the delivery statistics and the status of the sender of each receiver.
 
         Raises `StoreError` if the outbox cannot be read.
         """
-        return await asyncio.to_thread(receiver_views, self.statuses, self._outbox)
+        return await asyncio.to_thread(with_backlogs, self.statuses, self._outbox)

@@ -3,9 +3,12 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
 
 from core.alarms.alarm import Alarm, AlarmEvent
+from service.runtime.models import SERVED, TimeNs
 from service.store.database import Connection, Tables
 
 
@@ -18,7 +21,9 @@ class MessageState(StrEnum):
     EXPIRED = "expired"
 
 
-DEAD = (MessageState.REFUSED, MessageState.EXPIRED)
+DeadState = Literal[MessageState.REFUSED, MessageState.EXPIRED]
+
+DEAD: tuple[DeadState, ...] = (MessageState.REFUSED, MessageState.EXPIRED)
 """Final states of undelivered messages."""
 
 
@@ -95,27 +100,45 @@ class StoredMessage:
 
 
 @dataclass(frozen=True)
+class DeadLetter:
+    """Alarm message that will never be delivered."""
+
+    __pydantic_config__ = SERVED
+
+    event_id: Annotated[str, Field(examples=["0b9a6f0e-6a55-4a1e-9a53-0c4b8b3c7b1e"])]
+    """Identifier of the message for the receiver."""
+
+    outcome: DeadState
+    """Reason for giving up: rejected by the receiver ("refused"), or too old ("expired")."""
+
+    reason: Annotated[str, Field(examples=["410 Gone"])]
+    """Answer of the receiver to the last attempt, or reason why it was not reached."""
+
+    time_ns: TimeNs
+    """Time when the delivery was abandoned."""
+
+
+@dataclass(frozen=True)
 class Backlog:
     """Delivery statistics of one receiver.
 
     Parameters
     ----------
-    oldest_ns
+    waiting_since_ns
         Queueing time of the oldest waiting message; None if no message waits.
     n_dead
         Total number of refused and expired messages.
     last_dead
         Newest refused or expired message; None if no message was refused or expired.
-    delivered_ns
+    last_delivered_ns
         Time of the last delivery; None if no message was delivered.
     """
 
-    receiver: str
     n_waiting: int
-    oldest_ns: int | None
+    waiting_since_ns: int | None
     n_dead: int
-    last_dead: StoredMessage | None
-    delivered_ns: int | None
+    last_dead: DeadLetter | None
+    last_delivered_ns: int | None
 
 
 MAX_ANSWER = 500
@@ -223,25 +246,28 @@ class Outbox(Tables):
         with self._writing() as writer:
             return writer.execute(REVIVE, (now_ns, receiver)).rowcount
 
-    def backlogs(self) -> list[Backlog]:
-        """Return the delivery statistics of all receivers with messages, ordered by name."""
+    def backlogs(self) -> dict[str, Backlog]:
+        """Return the delivery statistics of all receivers with messages, in the order of names."""
         with self._reading() as reader:
             names = reader.execute("SELECT DISTINCT receiver FROM outbox ORDER BY receiver")
-            return [_backlog(reader, str(name)) for (name,) in names.fetchall()]
+            return {name: _backlog(reader, name) for (name,) in names.fetchall()}
 
 
 def _backlog(reader: Connection, receiver: str) -> Backlog:
     n_waiting, oldest_ns = reader.execute(COUNT, (receiver, MessageState.WAITING.value)).fetchone()
     dead = [reader.execute(COUNT, (receiver, state.value)).fetchone()[0] for state in DEAD]
-    ends = [_last(reader, receiver, state) for state in DEAD]
+    ends = [
+        DeadLetter(end.event_id, state, end.answer, end.done_ns or 0)
+        for state in DEAD
+        if (end := _last(reader, receiver, state))
+    ]
     delivered = _last(reader, receiver, MessageState.DELIVERED)
     return Backlog(
-        receiver=receiver,
         n_waiting=int(n_waiting),
-        oldest_ns=oldest_ns,
+        waiting_since_ns=oldest_ns,
         n_dead=sum(dead),
-        last_dead=max((end for end in ends if end), key=lambda end: end.done_ns or 0, default=None),
-        delivered_ns=delivered.done_ns if delivered else None,
+        last_dead=max(ends, key=lambda end: end.time_ns, default=None),
+        last_delivered_ns=delivered.done_ns if delivered else None,
     )
 
 

@@ -118,12 +118,12 @@ async def test_what_is_refused_for_ever_is_kept_as_such_and_holds_up_nothing(sta
 
     await room.delivered(server, store)
 
-    (backlog,) = store.outbox.backlogs()
+    (backlog,) = store.outbox.backlogs().values()
     assert [r.id for r in server.requests] == ["id-0", "id-1"]
     assert (backlog.n_waiting, backlog.n_dead) == (0, 1)
     assert backlog.last_dead is not None
-    assert backlog.last_dead.answer == f"{status[:3]} no such plant"
-    assert backlog.last_dead.state is MessageState.REFUSED
+    assert backlog.last_dead.reason == f"{status[:3]} no such plant"
+    assert backlog.last_dead.outcome is MessageState.REFUSED
 
 
 @pytest.mark.parametrize("n_events", first_fast(1, [100, 1000]))
@@ -160,10 +160,10 @@ async def test_what_grew_too_old_is_given_up_at_once_when_an_attempt_fails(room)
     await room.delivered(server, store, max_age_h=1.0)
 
     assert [r.id for r in server.requests] == ["id-0", "id-5"]
-    (backlog,) = store.outbox.backlogs()
+    (backlog,) = store.outbox.backlogs().values()
     assert backlog.n_dead == 5
     assert backlog.last_dead is not None
-    assert backlog.last_dead.answer == "expired after the last failure: 503"
+    assert backlog.last_dead.reason == "expired after the last failure: 503"
 
 
 YEAR_NS = 365 * 86_400 * 10**9

@@ -20,18 +20,16 @@ from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Estimator, Unit
 from core.samples.blocks import SampleBlock
 from service.live.metrics import add_alarms, add_films, add_units
-from service.live.receivers import ReceiverStatus
+from service.live.receivers import ReceiverView, SenderState
 from service.live.status import LinkState
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.analyser import ASSESSMENTS, timed
 from service.measuring.live_view import LiveView
 from service.measuring.metrics import MAX_REASONS, bounded
 from service.notifications.metrics import add_deliveries
-from service.notifications.sender import ReceiverView, SenderStatus
 from service.runtime.heartbeats import Pulse
 from service.runtime.metrics import Families
 from service.runtime.polls import PollClock, TimedSource
-from service.store.outbox import Backlog
 
 
 def counted(histogram: Collector) -> dict[str, float]:
@@ -244,13 +242,11 @@ def test_recipients_of_one_mail_are_added_up_and_never_named():
 
     def view(name: str, n_waiting: int, hours: int | None, n_dead: int) -> ReceiverView:
         oldest_ns = None if hours is None else NOW_NS - hours * HOUR_NS
-        return ReceiverView(
-            name,
-            ReceiverStatus(name, "mail", "", SenderStatus(n_failures=n_waiting)),
-            Backlog(name, n_waiting, oldest_ns, n_dead, None, None),
-        )
+        backlog = {"n_waiting": n_waiting, "waiting_since_ns": oldest_ns, "n_dead": n_dead}
+        return ReceiverView(name, "mail", n_failures=n_waiting, **backlog)
 
-    gone = ReceiverView("old-hook", None, Backlog("old-hook", 9, 0, 9, None, None))
+    state = SenderState.REMOVED
+    gone = ReceiverView("old-hook", state=state, n_waiting=9, waiting_since_ns=0, n_dead=9)
     views = [
         view("shift:a@plant.example", 2, 3, 1),
         view("shift:b@plant.example", 0, None, 4),
