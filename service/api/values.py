@@ -16,6 +16,7 @@ from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from service.api.meanings import describe_fields
 from service.runtime.models import ByName as ByName
 from service.runtime.models import Time as Time
+from service.runtime.models import TimeNs as TimeNs
 from service.runtime.models import ValueModel
 
 

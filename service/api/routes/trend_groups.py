@@ -1,15 +1,21 @@
 """Trends grouped by operating state, or by intervals of eccentricity or oil temperature."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
 
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingState
+from core.monitor.catalogue import Quantity, quantity_named
+from core.units import NS_PER_S
 from service.api.problems import ProblemError
-from service.api.values import STATE_NAMES, bounds
-from service.store.port import Trend, TrendQuery, ValueRange
+from service.api.values import STATE_NAMES, ApiModel, LevelName, TimeNs, bounds, level_names
+from service.runtime.models import SERVED
+from service.store.port import Trend, TrendQuery, TrendSeries, ValueRange
+from service.store.series import U_RANDOM, U_SYSTEMATIC
 from service.store.store import Store
 
 GroupName = Literal["state", "eccentricity", "oil_temperature"]
@@ -23,17 +29,83 @@ BIN_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
-class TrendGroup:
-    """Trend of the readings in one operating state, or one interval of the grouping quantity.
+class QuantityTrend:
+    """Values of one quantity over time; every list has one value per time."""
 
-    `name` is the operating state, or the bounds of the interval such as "0.35 to 0.4"; `low` and
-    `high` are these bounds, in eccentricity ratio or °C, and None for operating states.
-    """
+    __pydantic_config__ = SERVED
 
-    name: str
+    unit: str
+    """Unit of the values; for an amplitude, also the detector."""
+
+    minimum: Sequence[float | None]
+    """Minimum of the usable readings; null without usable readings."""
+
+    maximum: Sequence[float | None]
+    """Maximum of the usable readings; null without usable readings."""
+
+    mean: Sequence[float | None]
+    """Mean of the usable readings; null without usable readings."""
+
+    count: Sequence[int]
+    """Number of usable readings."""
+
+    worst_level: Sequence[LevelName | None]
+    """Worst quality level of the readings; null without readings."""
+
+    u_random: Sequence[float | None] | None
+    """Mean of the random standard uncertainties; null for a quantity without uncertainty."""
+
+    u_systematic: Sequence[float | None] | None
+    """Mean of the systematic standard uncertainties; null for a quantity without uncertainty."""
+
+
+class TrendColumns(ApiModel):
+    """Trends of several quantities at common times."""
+
+    bucket_s: float | None
+    """Width of the time intervals (buckets) that combine readings, s; null for single readings."""
+
+    time: list[TimeNs]
+    """Time of each reading or start of each bucket."""
+
+    series: dict[str, QuantityTrend]
+    """Values of the requested quantities, by name of the quantity."""
+
+
+class TrendGroupModel(TrendColumns):
+    """Trends of the readings in one operating state, or one interval of a grouping quantity."""
+
+    name: Annotated[str, Field(examples=["full_load"])]
+    """Name of the group: operating state, or bounds of the interval."""
+
     low: float | None
+    """Lower bound of eccentricity ratio, or oil temperature in °C; null for operating states."""
+
     high: float | None
-    trend: Trend
+    """Upper bound of eccentricity ratio, or oil temperature in °C; null for operating states."""
+
+
+def columns_of(trend: Trend) -> TrendColumns:
+    """Return the API model of the columns of a trend."""
+    return TrendColumns.of(
+        trend,
+        bucket_s=trend.bucket_ns and trend.bucket_ns / NS_PER_S,
+        series={each.name: _series(each, trend.series) for each in quantities_among(trend.series)},
+    )
+
+
+def quantities_among(names: Iterable[str]) -> Iterator[Quantity]:
+    """Yield the quantities among column names, which also name uncertainties."""
+    yield from filter(None, map(quantity_named, names))
+
+
+def _series(quantity: Quantity, columns: Mapping[str, TrendSeries]) -> QuantityTrend:
+    series, uncertainties = vars(columns[quantity.name]), {}
+    for suffix in (U_RANDOM, U_SYSTEMATIC):
+        found = columns.get(quantity.name + suffix)
+        uncertainties[suffix.lstrip(".")] = found and found.mean
+    levels = level_names(series["worst_level"])
+    return QuantityTrend(quantity.unit, **series | uncertainties | {"worst_level": levels})
 
 
 @dataclass(frozen=True)
@@ -64,7 +136,7 @@ class _Axis:
 
 def trend_groups(
     store: Store, query: TrendQuery, by: GroupName, grid: CellGrid
-) -> list[TrendGroup]:
+) -> list[TrendGroupModel]:
     """Return the trend of each group that contains readings, in the order of states or intervals.
 
     `by` is the quantity that determines the group of a reading; the grid of operating conditions
@@ -77,20 +149,20 @@ def trend_groups(
         found = _by_cell(store, query, _Axis("eccentricity_ratio", grid.eccentricity_width))
     else:
         found = _by_cell(store, query, _Axis("oil_temperature_c", grid.temperature_width_c))
-    return [group for group in found if group.trend.time_ns]
+    return [group for group in found if group.time]
 
 
-def _by_state(store: Store, query: TrendQuery) -> Iterator[TrendGroup]:
+def _by_state(store: Store, query: TrendQuery) -> Iterator[TrendGroupModel]:
     for state in query.states or tuple(OperatingState):
-        trend = store.trend(replace(query, states=(state,)))
-        yield TrendGroup(STATE_NAMES[state], None, None, trend)
+        trend = columns_of(store.trend(replace(query, states=(state,))))
+        yield TrendGroupModel.of(trend, name=STATE_NAMES[state], low=None, high=None)
 
 
-def _by_cell(store: Store, query: TrendQuery, axis: _Axis) -> Iterator[TrendGroup]:
+def _by_cell(store: Store, query: TrendQuery, axis: _Axis) -> Iterator[TrendGroupModel]:
     for number in _bins(store, query, axis):
         low, high = bounds(number, axis.width)
-        trend = store.trend(axis.narrowed(query, low, high))
-        yield TrendGroup(f"{low:g} to {high:g}", low, high, trend)
+        trend = columns_of(store.trend(axis.narrowed(query, low, high)))
+        yield TrendGroupModel.of(trend, name=f"{low:g} to {high:g}", low=low, high=high)
 
 
 def _bins(store: Store, query: TrendQuery, axis: _Axis) -> list[int]:
