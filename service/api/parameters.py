@@ -68,6 +68,11 @@ def duration(longest_s: float, description: str, **options: Any) -> Any:
     return Query(gt=0.0, le=longest_s, allow_inf_nan=False, description=description, **options)
 
 
+def at_most(maximum: int, words: str, minimum: int = 1) -> Any:
+    """Return the declaration of a query parameter for the maximum number of `words`."""
+    return Query(ge=minimum, le=maximum, description=f"Maximum number of {words}.")
+
+
 SECONDS = {"min": 60, "h": 3600, "d": 86_400}
 MINUTE_NS = 60 * NS_PER_S
 

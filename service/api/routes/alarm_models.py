@@ -1,6 +1,6 @@
 """API models of alarms and alarm events."""
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable
 from functools import lru_cache
 from typing import Annotated, Literal
 
@@ -19,6 +19,7 @@ from service.api.values import (
     FilmConditionModel,
     OperatingStateName,
     Time,
+    TimeNs,
     cell_of,
     condition_model,
 )
@@ -26,7 +27,7 @@ from service.live.alarm_list import AlarmCount, LiveAlarms
 from service.live.current_state import LiveFilms
 from service.settings.alarm_kinds import LEVEL_NAMES, AlarmKindName, AlarmLevelName, value_unit
 from service.settings.storage import Origin
-from service.store.port import StoredEvent, ValueRange
+from service.store.port import AlarmQuery, StoredEvent, ValueRange
 
 ConditionName = Literal["active", "within_limits", "unknown"]
 
@@ -182,7 +183,7 @@ class AlarmEventModel(AlarmFactsModel):
     state_after: AlarmState
     """State of the alarm after the event."""
 
-    time: Time
+    time: TimeNs
     """Time of the event: sample time if samples caused it, otherwise time of the host clock."""
 
     occurrence: int
@@ -204,11 +205,24 @@ class AlarmEventsModel(ApiModel):
     """Alarm events, newest first."""
 
 
-def alarm_list_model(alarms: LiveAlarms, films: LiveFilms, origin: Origin) -> AlarmListModel:
-    """Return the API model of the alarm list."""
-    shown = alarms.shown
-    listed = sorted((a for a in shown if a.state is not AlarmState.NORMAL), key=_urgency)
-    unjudged = (alarm for alarm in shown if alarm.state is AlarmState.NORMAL)
+def alarm_list_model(
+    alarms: LiveAlarms,
+    films: LiveFilms,
+    origin: Origin,
+    query: AlarmQuery,
+    acknowledged: bool | None = None,
+) -> AlarmListModel:
+    """Return the API model of the list of the alarms that match a query.
+
+    `acknowledged` is whether these alarms are acknowledged; None for both.
+    """
+    found = [
+        alarm
+        for alarm in alarms.shown
+        if acknowledged in (None, alarm.is_acknowledged) and _is_chosen(alarm, query)
+    ]
+    listed = sorted((a for a in found if a.state is not AlarmState.NORMAL), key=_urgency)
+    unjudged = (alarm for alarm in found if alarm.state is AlarmState.NORMAL)
     return AlarmListModel.of(
         origin=origin,
         count=alarms.count(),
@@ -268,16 +282,24 @@ def _awaited(alarm: Alarm, films: LiveFilms) -> str | None:
     return "normal" if after is None else LEVEL_NAMES[after]
 
 
-def is_raised_within(
-    alarm: AlarmModel,
-    states: Sequence[OperatingStateName] | None,
-    ranges: Mapping[str, ValueRange],
-) -> bool:
-    """Return whether an alarm was raised in one of `states` (None: any) and within all `ranges`."""
-    at = alarm.raised_at
-    return (not states or (at is not None and at.operating_state in states)) and all(
-        wanted == ValueRange() or (at is not None and wanted.includes(getattr(at, name)))
-        for name, wanted in ranges.items()
+RANGES = ("eccentricity_ratio", "oil_temperature_c", "attitude_deg")
+"""Quantities of the operating condition, by which queries select alarms."""
+
+
+def _is_chosen(alarm: Alarm, query: AlarmQuery) -> bool:
+    """Return whether an alarm has the subject, level and operating condition of a query."""
+    identity, at = alarm.identity, alarm.raised_at
+    ranges = {name: getattr(query, name) for name in RANGES}
+    return (
+        query.unit in (None, identity.unit)
+        and query.subject in (None, identity.subject)
+        and query.kind in (None, identity.kind)
+        and query.level in (None, alarm.level)
+        and (not query.states or (at is not None and at.state in query.states))
+        and all(
+            wanted == ValueRange() or (at is not None and wanted.includes(getattr(at, name)))
+            for name, wanted in ranges.items()
+        )
     )
 
 

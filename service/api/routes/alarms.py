@@ -1,14 +1,13 @@
 """Routes for the alarm list, alarm events, and operations on alarms."""
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Annotated
+from dataclasses import fields, replace
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from pydantic import Field
 
 from core.alarms import operation
-from core.condition.cells import CellGrid
 from core.limits import AlarmLevel
 from core.units import ns_from_s
 from service.api.answers import in_thread, rendered
@@ -23,6 +22,7 @@ from service.api.parameters import (
     OnlyUnit,
     OptionalTimeRange,
     States,
+    at_most,
     only,
 )
 from service.api.problems import ProblemError, problem_responses
@@ -37,13 +37,12 @@ from service.api.routes.alarm_models import (
     alarm_model,
     event_model,
     grid_of,
-    is_raised_within,
 )
 from service.api.tables import Column, Format, column_of, table_content, table_response
 from service.api.values import ActorModel, NoteText, ReasonText, states_named
 from service.settings.alarm_kinds import AlarmKindName, AlarmLevelName
 from service.store.access.identities import Permission
-from service.store.port import AlarmQuery, StoredEvent
+from service.store.port import AlarmQuery
 
 
 class AcknowledgeModel(ActorModel):
@@ -76,10 +75,9 @@ class ShelveModel(OutageModel):
     """Duration of the shelving, s; the plant file sets the maximum."""
 
 
-def event_table(events: Sequence[StoredEvent], grid: CellGrid) -> list[Column]:
+def event_table(rows: Sequence[AlarmEventModel]) -> list[Column]:
     """Return alarm events as table columns: ``time_utc``, and columns named as the JSON fields."""
-    rows = [event_model(stored, grid) for stored in events]
-    times = Column("time_utc", "time", [stored.event.time_ns for stored in events])
+    times = Column("time_utc", "time", [row.time for row in rows])
     flat = [name for name in AlarmEventModel.model_fields if name not in ("time", "raised_at")]
     points = [name for name in RaisedAtModel.model_fields if name != "cell"]
     at = [row.raised_at for row in rows]
@@ -107,8 +105,31 @@ AlarmId = Annotated[
     ),
 ]
 
-OnlySubject = Annotated[str | None, only("bearing or other subject", "LJB", 64)]
-OnlyLevel = Annotated[AlarmLevelName | None, only("level", "danger")]
+
+async def chosen_alarms(
+    eccentricity: Eccentricity,
+    oil_temperature: OilTemperature,
+    attitude: Attitude,
+    unit: OnlyUnit = None,
+    subject: Annotated[str | None, only("bearing or other subject", "LJB", 64)] = None,
+    kind: Annotated[AlarmKindName | None, only("kind", "film_stiffness")] = None,
+    level: Annotated[AlarmLevelName | None, only("level", "danger")] = None,
+    state: States = None,
+) -> AlarmQuery:
+    """Return the query for alarms from the checked query parameters."""
+    return AlarmQuery(
+        unit=unit,
+        subject=subject,
+        kind=kind,
+        level=None if level is None else AlarmLevel[level.upper()],
+        states=states_named(state),
+        eccentricity_ratio=eccentricity,
+        oil_temperature_c=oil_temperature,
+        attitude_deg=attitude,
+    )
+
+
+ChosenAlarms = Annotated[AlarmQuery, Depends(chosen_alarms)]
 
 OUTAGE = [needs(Permission.CHANGE_MEASURING)]
 """Permission to take an alarm out of service; the alarm then sends no messages."""
@@ -144,14 +165,7 @@ def alarm_router(context: Context) -> APIRouter:
     @router.get("", response_model=AlarmListModel)
     async def alarms(
         request: Request,
-        eccentricity: Eccentricity,
-        oil_temperature: OilTemperature,
-        attitude: Attitude,
-        unit: OnlyUnit = None,
-        subject: OnlySubject = None,
-        kind: Annotated[AlarmKindName | None, only("kind", "film_stiffness")] = None,
-        level: OnlyLevel = None,
-        state: States = None,
+        chosen: ChosenAlarms,
         acknowledged: Annotated[
             bool | None,
             Query(description="Only alarms that are acknowledged, or are not.", examples=[False]),
@@ -162,33 +176,9 @@ def alarm_router(context: Context) -> APIRouter:
         The parameters select alarms; operating state, eccentricity, attitude angle and oil
         temperature are those at which an alarm was raised. `count` is that of the whole plant.
         """
-        wanted = {
-            "unit": unit,
-            "subject": subject,
-            "kind": kind,
-            "level": level,
-            "is_acknowledged": acknowledged,
-        }
-        asked = {name: value for name, value in wanted.items() if value is not None}
-        ranges = {
-            "eccentricity_ratio": eccentricity,
-            "oil_temperature_c": oil_temperature,
-            "attitude_deg": attitude,
-        }
 
         def make() -> AlarmListModel:
-            found = alarm_list_model(engine, films, context.origin)
-            return found.model_copy(
-                update={
-                    name: [
-                        alarm
-                        for alarm in listed
-                        if asked.items() <= dict(alarm).items()
-                        and is_raised_within(alarm, state, ranges)
-                    ]
-                    for name, listed in (("alarms", found.alarms), ("unjudged", found.unjudged))
-                }
-            )
+            return alarm_list_model(engine, films, context.origin, chosen, acknowledged)
 
         return await context.answers.of(request, revision, make, lambda _: make)
 
@@ -208,21 +198,19 @@ def alarm_router(context: Context) -> APIRouter:
 
         As CSV or Parquet: one row per event.
         """
-        one_more = replace(query, limit=query.limit + 1)
-        grid = grid_of(films)
-        found = await in_thread(lambda: context.store.alarm_events(one_more))
-        page, is_more = list(found[: query.limit]), len(found) > query.limit
+
+        def read() -> AlarmEventsModel:
+            found = context.store.alarm_events(replace(query, limit=query.limit + 1))
+            page, grid = found[: query.limit], grid_of(films)
+            events = [event_model(stored, grid) for stored in page]
+            next_before = page[-1].id if len(found) > query.limit else None
+            return AlarmEventsModel.of(context, events=events, next_before=next_before)
+
         if wanted == "json":
-            next_before = page[-1].id if is_more else None
-            return await rendered(
-                lambda: AlarmEventsModel.of(
-                    context,
-                    events=[event_model(stored, grid) for stored in page],
-                    next_before=next_before,
-                )
-            )
-        columns = await in_thread(lambda: event_table(page, grid))
-        cursor = str(page[-1].id) if is_more else None
+            return await rendered(read)
+        found = await in_thread(read)
+        columns = await in_thread(lambda: event_table(found.events))
+        cursor = None if found.next_before is None else str(found.next_before)
         return table_response(wanted, columns, "alarm-events", cursor)
 
     @router.get("/{alarm}", responses=problem_responses(own=UNKNOWN))
@@ -241,12 +229,22 @@ def operation_router(context: Context) -> APIRouter:
     router = subject_router("/alarms/{alarm}", "alarms", Permission.ACT_ON_ALARMS)
     allowances = Allowances()
 
+    async def done(
+        id_: str, asked: ActorModel, kind: type[operation.Action], **more: object
+    ) -> AlarmModel:
+        """Execute an operation with the fields of a request; return the alarm once it is stored."""
+        given: dict[str, Any] = dict(asked) | {"actor": actor_or(asked.actor)} | more
+        action = kind(**{field.name: given[field.name] for field in fields(kind)})
+        try:
+            alarm = await context.operators.operate(id_, action)
+        except LookupError as error:
+            raise _unknown(id_) from error
+        return alarm_model(context.alarms, context.films, alarm)
+
     @router.post("/acknowledge", responses=ACTION_PROBLEMS)
     async def acknowledge(alarm: AlarmId, asked: AcknowledgeModel) -> AlarmModel:
         """Acknowledge an occurrence of an alarm; repeating the request changes nothing."""
-        return await _done(
-            context, alarm, operation.Acknowledge(**{**dict(asked), "actor": actor_or(asked.actor)})
-        )
+        return await done(alarm, asked, operation.Acknowledge)
 
     @router.post("/shelve", responses=ACTION_PROBLEMS)
     async def shelve(alarm: AlarmId, asked: ShelveModel) -> AlarmModel:
@@ -255,88 +253,58 @@ def operation_router(context: Context) -> APIRouter:
             detail = f"duration_s must be at most {context.max_shelf_s:g}, got {asked.duration_s:g}"
             raise ProblemError(422, "Wrong parameter", detail, "duration_s")
         until_ns = context.clock.now_ns() + ns_from_s(asked.duration_s)
-        return await _done(
-            context, alarm, operation.Shelve(actor_or(asked.actor), asked.reason, until_ns)
-        )
+        return await done(alarm, asked, operation.Shelve, until_ns=until_ns)
 
     @router.post("/unshelve", responses=ACTION_PROBLEMS)
     async def unshelve(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """End the shelving of an alarm early."""
-        return await _done(context, alarm, operation.Unshelve(actor_or(asked.actor)))
+        return await done(alarm, asked, operation.Unshelve)
 
     @router.post("/out-of-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
     async def take_out_of_service(alarm: AlarmId, asked: OutageModel) -> AlarmModel:
         """Hide an alarm until it is returned to service, for example for maintenance."""
-        return await _done(
-            context, alarm, operation.TakeOutOfService(actor_or(asked.actor), asked.reason)
-        )
+        return await done(alarm, asked, operation.TakeOutOfService)
 
     @router.post("/return-to-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
     async def return_to_service(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """Return an alarm to service; an active alarm is announced again."""
-        return await _done(context, alarm, operation.ReturnToService(actor_or(asked.actor)))
+        return await done(alarm, asked, operation.ReturnToService)
 
     @router.post("/reset", responses=ACTION_PROBLEMS)
     async def reset_latched_alarm(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """Release the latch of an acknowledged alarm whose condition has cleared."""
-        return await _done(context, alarm, operation.Reset(actor_or(asked.actor)))
+        return await done(alarm, asked, operation.Reset)
 
     @router.post("/comment", responses=ACTION_PROBLEMS | COMMENT_LIMIT)
     async def comment(request: Request, alarm: AlarmId, asked: CommentModel) -> AlarmModel:
         """Add a comment to the events of an alarm; the state of the alarm does not change."""
         allowances.take(request, context.clock.monotonic_s())
-        return await _done(context, alarm, operation.Comment(actor_or(asked.actor), asked.text))
+        return await done(alarm, asked, operation.Comment)
 
     return router
 
 
 async def event_query(
-    eccentricity: Eccentricity,
-    oil_temperature: OilTemperature,
-    attitude: Attitude,
+    chosen: ChosenAlarms,
     times: OptionalTimeRange,
-    unit: OnlyUnit = None,
     alarm: Annotated[str | None, only("alarm", "U1:ujb_shaft_x:channel_not_ok", 128)] = None,
-    subject: OnlySubject = None,
-    kind: Annotated[AlarmKindName | None, only("kind", "channel_not_ok")] = None,
-    level: OnlyLevel = None,
     before: Annotated[
         int | None,
         Query(
             ge=1, le=10**15, description="Return only events older than this id.", examples=[117]
         ),
     ] = None,
-    limit: Annotated[
-        int, Query(ge=1, le=MAX_EVENTS, description="Maximum number of events in the answer.")
-    ] = 100,
-    state: States = None,
+    limit: Annotated[int, at_most(MAX_EVENTS, "events in the answer")] = 100,
 ) -> AlarmQuery:
     """Return the query for alarm events from the checked query parameters."""
-    start_ns, end_ns = times
-    return AlarmQuery(
+    return replace(
+        chosen,
         before=AlarmQuery.before if before is None else before,
         limit=limit,
         alarm=alarm,
-        unit=unit,
-        subject=subject,
-        kind=kind,
-        level=None if level is None else AlarmLevel[level.upper()],
-        start_ns=max(start_ns, 0),
-        end_ns=min(max(end_ns, 0), AlarmQuery.end_ns),
-        states=states_named(state),
-        eccentricity_ratio=eccentricity,
-        oil_temperature_c=oil_temperature,
-        attitude_deg=attitude,
+        start_ns=max(times[0], 0),
+        end_ns=min(max(times[1], 0), AlarmQuery.end_ns),
     )
-
-
-async def _done(context: Context, id_: str, action: operation.Action) -> AlarmModel:
-    """Execute an operation on an alarm; return the alarm after the operation is stored."""
-    try:
-        alarm = await context.operators.operate(id_, action)
-    except LookupError as error:
-        raise _unknown(id_) from error
-    return alarm_model(context.alarms, context.films, alarm)
 
 
 def _unknown(alarm: str) -> ProblemError:

@@ -10,7 +10,7 @@ from pydantic import Field
 from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import Context
-from service.api.parameters import OptionalTimeRange, only
+from service.api.parameters import OptionalTimeRange, at_most, only
 from service.api.tables import Column, Format, table_content, table_response
 from service.api.values import ApiModel, Time
 from service.store.access.audit_entries import MAX_NAME, AuditEntry, Source
@@ -165,9 +165,7 @@ async def audit_query(
     object: Annotated[  # noqa: A002  the name that callers know
         str | None, only("object", "U1:ujb_shaft_x:channel_not_ok", MAX_NAME)
     ] = None,
-    limit: Annotated[
-        int, Query(ge=1, le=MAX_ENTRIES, description="Maximum number of entries in the answer.")
-    ] = 100,
+    limit: Annotated[int, at_most(MAX_ENTRIES, "entries in the answer")] = 100,
 ) -> AuditQuery:
     """Return the query for audit entries from the checked query parameters."""
     start_ns, end_ns = times

@@ -16,7 +16,7 @@ from core.machine.unit import Estimator
 from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
-from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange
+from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange, at_most
 from service.api.problems import problem_responses
 from service.api.routes.film_models import VerdictName
 from service.api.routes.films import watched_place
@@ -27,6 +27,7 @@ from service.api.values import (
     ByName,
     OperatingStateName,
     Time,
+    TimeNs,
     listed,
     states_named,
 )
@@ -102,12 +103,15 @@ class FilmReadingsModel(BearingHistory):
     next_end: Time | None
     """Without thinning, parameter ``end`` for the page of older readings; null if there is none."""
 
-    time: list[Time]
+    time: list[TimeNs]
     """Times of the readings."""
 
     provenance: list[ProvenanceName]
     """Origin of the readings: "measured" on the machine, or "simulated"."""
 
+
+NUMBERS = ("speed_rpm", "power_mw", "eccentricity_ratio", "attitude_deg", "oil_temperature_c")
+"""Names of the numbers of the operating condition, in the history and in the answer."""
 
 Rows = npt.NDArray[np.int64]
 
@@ -140,11 +144,7 @@ def film_readings_model(query: FilmQuery, found: FilmHistory, rows: Rows) -> Fil
         provenance=["simulated" if one else "measured" for one in found.is_simulated[rows]],
         operating_state=[OperatingState(code) for code in found.state[rows]],
         is_settled=found.is_settled[rows].tolist(),
-        speed_rpm=listed(history.speed_rpm[rows]),
-        power_mw=listed(history.power_mw[rows]),
-        eccentricity_ratio=listed(history.eccentricity_ratio[rows]),
-        attitude_deg=listed(history.attitude_deg[rows]),
-        oil_temperature_c=listed(history.oil_temperature_c[rows]),
+        **{name: listed(getattr(history, name)[rows]) for name in NUMBERS},
         baseline_version=[int(v) or None for v in found.baseline_version[rows]],
         x=x,
         y=y,
@@ -185,21 +185,14 @@ def _series(found: FilmHistory, direction: int, rows: Rows) -> FilmSeriesModel:
     )
 
 
-CONDITION = (
-    *("provenance", "operating_state", "is_settled", "speed_rpm", "power_mw"),
-    *("eccentricity_ratio", "attitude_deg", "oil_temperature_c", "baseline_version"),
-)
+CONDITION = ("provenance", "operating_state", "is_settled", *NUMBERS, "baseline_version")
 """Names of the table columns that do not depend on the direction."""
 
 
-def film_table(model: FilmReadingsModel, found: FilmHistory, rows: list[int]) -> list[Column]:
-    """Return the readings of a film as table columns.
-
-    `rows` are the indices of the rows of the history `found` that the model contains.
-    """
-    times = found.history.time_ns[rows].tolist()
+def film_table(model: FilmReadingsModel) -> list[Column]:
+    """Return the readings of a film as table columns."""
     return [
-        Column("time_utc", "time", times),
+        Column("time_utc", "time", model.time),
         *_columns(model, CONDITION),
         *_columns(model.x, FilmSeriesModel.model_fields, "x_"),
         *_columns(model.y, FilmSeriesModel.model_fields, "y_"),
@@ -238,9 +231,7 @@ def film_history_router(context: Context) -> APIRouter:
         eccentricity: Eccentricity,
         oil_temperature: OilTemperature,
         state: States = None,
-        max_points: Annotated[
-            int, Query(ge=2, le=MAX_POINTS, description="Maximum number of readings.")
-        ] = 2000,
+        max_points: Annotated[int, at_most(MAX_POINTS, "readings", minimum=2)] = 2000,
         thin: Annotated[
             bool,
             Query(
@@ -267,18 +258,17 @@ def film_history_router(context: Context) -> APIRouter:
             newest=MAX_READ + 1,
         )
 
-        def read() -> tuple[FilmReadingsModel, FilmHistory, list[int]]:
+        def read() -> FilmReadingsModel:
             found = context.store.films.history(query)
             if len(found) > MAX_READ:
                 detail = f"the range has more than {MAX_READ} readings; request a shorter range"
                 raise QueryTooLargeError(detail)
-            rows = rows_shown(len(found), max_points, thin)
-            return film_readings_model(query, found, rows), found, rows.tolist()
+            return film_readings_model(query, found, rows_shown(len(found), max_points, thin))
 
         if wanted == "json":
             revision = partial(context.past_revision, unit, times)
-            return await context.answers.of(request, revision, lambda: read()[0])
-        columns = await in_thread(lambda: film_table(*read()))
+            return await context.answers.of(request, revision, read)
+        columns = await in_thread(lambda: film_table(read()))
         return table_response(wanted, columns, f"film-{unit}-{bearing}")
 
     return router

@@ -4,7 +4,7 @@ from collections.abc import Callable, Generator
 from typing import Annotated, Literal
 
 import structlog
-from fastapi import APIRouter, Path, Query, Response
+from fastapi import APIRouter, Path, Response
 from fastapi.responses import StreamingResponse
 from pydantic import Field
 
@@ -14,7 +14,7 @@ from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import Context
 from service.api.downloads import attachment, file_content
-from service.api.parameters import only
+from service.api.parameters import at_most, only
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.alarm_models import AlarmIdText
 from service.api.routes.channels import ChannelUnit
@@ -184,9 +184,7 @@ def recording_router(context: Context) -> APIRouter:
     async def recordings(
         unit: Annotated[str | None, only("unit", "U1")] = None,
         kind: Annotated[WaveformKind | None, only("kind", "capture")] = None,
-        limit: Annotated[
-            int, Query(ge=1, le=500, description="Maximum number of recordings.")
-        ] = 100,
+        limit: Annotated[int, at_most(500, "recordings")] = 100,
     ) -> RecordingsModel:
         """List the newest finished recordings, and the recordings around alarms in progress."""
         if unit is not None:

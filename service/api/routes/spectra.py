@@ -15,7 +15,7 @@ from core.stiffness.order_line import marked_hz
 from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
-from service.api.parameters import TimeRange
+from service.api.parameters import TimeRange, at_most
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.bearings import no_result
 from service.api.values import (
@@ -225,12 +225,7 @@ def spectra_router(context: Context) -> APIRouter:
             ),
         ] = None,
         max_spectra: Annotated[
-            int,
-            Query(
-                ge=2,
-                le=MAX_SPECTRA,
-                description="Maximum number of spectra; more are thinned evenly.",
-            ),
+            int, at_most(MAX_SPECTRA, "spectra; more are thinned evenly", minimum=2)
         ] = 200,
         max_frequency_hz: Annotated[
             float | None,

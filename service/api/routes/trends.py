@@ -14,7 +14,7 @@ from core.units import ns_from_s
 from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
-from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange
+from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange, at_most
 from service.api.problems import ProblemError
 from service.api.routes.trend_groups import (
     GroupName,
@@ -77,14 +77,7 @@ def _columns(name: str, unit: str, parts: Sequence[QuantityTrend]) -> Iterator[C
         yield Column(f"{name}_{field.name}", kind, values, unit if kind == "number" else None)
 
 
-MaxPoints = Annotated[
-    int,
-    Query(
-        ge=2,
-        le=5000,
-        description="Maximum number of points; more readings are combined in buckets.",
-    ),
-]
+MAX_POINTS = 5000
 MAX_QUANTITIES = 40
 HOLE_HOPS = 2.5
 """Maximum time between successive results that a trend shows without a gap, in result periods."""
@@ -134,7 +127,9 @@ def trend_router(context: Context) -> APIRouter:
                 examples=["state"],
             ),
         ] = None,
-        max_points: MaxPoints = 1000,
+        max_points: Annotated[
+            int, at_most(MAX_POINTS, "points; more readings are combined in buckets", minimum=2)
+        ] = 1000,
         cursor: Cursor = None,
     ) -> Response:
         """Return trends as single readings, or as minimum, maximum and mean of time intervals.
