@@ -296,10 +296,7 @@ class Analysis:
 
 def counts_of(source: TimedSource) -> SourceCounts:
     """Return the counts of polls and refused frames of a sample source."""
-    found, refused = source.statistics, dict(source.refused_frames)
-    if found is None:
-        return SourceCounts(0, None, None, refused)
-    return SourceCounts(found.n, found.newest_s, found.mean_s, refused)
+    return SourceCounts(source.statistics, dict(source.refused_frames))
 
 
 EVIDENCE = {

@@ -21,6 +21,7 @@ from core.spectra.speed import SpeedSource
 from core.uncertainty import Budget
 from service.live.receivers import ReceiverView
 from service.live.status import StoredResults, UnitStatus
+from service.runtime.polls import PollStatistics
 
 OWN_VERSION = version("padwatch").encode() + b"\n"
 
@@ -177,20 +178,11 @@ class Report:
 class SourceCounts:
     """Counts of a unit's data source since the start.
 
-    Parameters
-    ----------
-    n_polls
-        Number of polls of the device; 0 if the source is not polled.
-    newest_s, mean_s
-        Newest and mean duration of a poll, s; None without polls.
-    refused_frames
-        Number of refused frames, by reason.
+    `polls` is None without polls; `refused_frames` are the numbers of refused frames, by reason.
     """
 
-    n_polls: int
-    newest_s: float | None
-    mean_s: float | None
-    refused_frames: Mapping[str, int]
+    polls: PollStatistics | None = None
+    refused_frames: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -4,15 +4,17 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 from weakref import WeakKeyDictionary
 
 from prometheus_client import Histogram
+from pydantic import Field
 
 from acquisition.clock import Clock
 from acquisition.source import SampleSource, refused_frames_of
 from core.samples.blocks import SampleBlock
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.models import SERVED
 
 POLL_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0)
 """Upper bounds of the histogram of poll durations, from milliseconds on the plant network up to a
@@ -21,11 +23,18 @@ time-out."""
 
 @dataclass(frozen=True)
 class PollStatistics:
-    """Number of polls of a device since the start, and their newest and mean duration, s."""
+    """Statistics of the duration of polls of a device, including decoding of the answers."""
+
+    __pydantic_config__ = SERVED
 
     n: int
-    newest_s: float
-    mean_s: float
+    """Number of answered polls since the service started."""
+
+    newest_s: Annotated[float, Field(examples=[0.012])]
+    """Duration of the newest poll, s."""
+
+    mean_s: Annotated[float, Field(examples=[0.011])]
+    """Mean duration of polls, s."""
 
 
 class PollClock:

@@ -29,7 +29,7 @@ from service.api.routes.baseline_models import (
     learning_model,
 )
 from service.api.routes.films import watched_place
-from service.api.values import bounds, listed
+from service.api.values import CellModel, cell_model, listed
 from service.live import commands
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
@@ -80,37 +80,25 @@ def _direction(learned: QuantityBaseline) -> BaselineDirectionModel:
     )
 
 
+ATTITUDE = ("attitude_low_deg", "attitude_high_deg")
+
 CELL_FIELDS = ("eccentricity_ratio", "oil_temperature_c", "n_readings", "n_days", "support")
 
 
 def _cells(cells: list[CellStatistics], grid: CellGrid) -> BaselineCellsModel:
-    low_e, high_e = _bounds(cells, 0, grid.eccentricity_width)
-    low_c, high_c = _bounds(cells, 1, grid.temperature_width_c)
-    attitude = (
-        None if grid.attitude_width_deg is None else _bounds(cells, 2, grid.attitude_width_deg)
-    )
+    limits = [cell_model(cell.cell, grid) for cell in cells]
+    columns = {name: [getattr(each, name) for each in limits] for name in CellModel.model_fields}
+    without = {} if grid.attitude_width_deg else dict.fromkeys(ATTITUDE, None)
     ln_k = np.array([cell.location for cell in cells])
     k, of_kb = absolute_and_ratio(np.exp(ln_k), ln_k)
     return BaselineCellsModel.of(
-        eccentricity_low=low_e,
-        eccentricity_high=high_e,
-        oil_temperature_low_c=low_c,
-        oil_temperature_high_c=high_c,
-        attitude_low_deg=attitude[0] if attitude else None,
-        attitude_high_deg=attitude[1] if attitude else None,
+        **columns | without,
         stiffness_n_per_m=listed(k),
         stiffness_of_kb=listed(of_kb),
         scatter_percent=[100.0 * cell.scatter for cell in cells],
         surface_std_percent=[100.0 * cell.surface_std for cell in cells],
         **{name: [getattr(cell, name) for cell in cells] for name in CELL_FIELDS},
     )
-
-
-def _bounds(
-    cells: list[CellStatistics], axis: int, width: float
-) -> tuple[list[float], list[float]]:
-    found = [bounds(cell.cell[axis], width) for cell in cells]
-    return [low for low, _ in found], [high for _, high in found]
 
 
 Version = Annotated[int, Path(ge=1, le=10**15, description="Version of a baseline.", examples=[3])]

@@ -18,7 +18,9 @@ from service.api.parameters import TimeRange
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, Time
 from service.live.current_state import LiveUnits
+from service.live.snapshot import SourceCounts
 from service.live.status import LinkState
+from service.runtime.polls import PollStatistics
 from service.settings.plant import plant_file_schema
 from service.settings.units import UnitSettings
 from service.store.access.identities import Permission
@@ -93,19 +95,6 @@ SourceKind = Literal[
 ]
 
 
-class PollsModel(ApiModel):
-    """Statistics of the duration of polls of a device, including decoding of the answers."""
-
-    n: int
-    """Number of answered polls since the service started."""
-
-    newest_s: Annotated[float, Field(examples=[0.012])]
-    """Duration of the newest poll, s."""
-
-    mean_s: Annotated[float, Field(examples=[0.011])]
-    """Mean duration of polls, s."""
-
-
 class SourceHealthModel(SourceModel):
     """Data source of a unit: kind, state, and counts of its samples."""
 
@@ -121,7 +110,7 @@ class SourceHealthModel(SourceModel):
     poll_period_s: float | None
     """Poll period, s; null for a device that is not polled."""
 
-    polls: PollsModel | None
+    polls: PollStatistics | None
     """Statistics of polls; null before the second poll, and for a device that is not polled."""
 
     refused_frames: Annotated[dict[str, int], Field(examples=[{"duplicate": 2}])]
@@ -292,18 +281,14 @@ def _unit(context: Context, unit: str) -> UnitModel:
 
 def _health(context: Context, settings: UnitSettings) -> SourceHealthModel:
     arriving = source_model(context.live, settings.id)
-    source = context.plant().sources.get(settings.id)
     return SourceHealthModel.of(
         arriving,
+        context.plant().sources.get(settings.id, SourceCounts()),
         unit=settings.id,
         kind=settings.source.kind,
         n_failed=context.live.status(settings.id).n_failed,
         rate_hz=settings.sampling_hz,
         poll_period_s=getattr(settings.source, "poll_period_s", None),
-        polls=None
-        if source is None or not source.n_polls
-        else PollsModel.of(source, n=source.n_polls),
-        refused_frames={} if source is None else source.refused_frames,
     )
 
 
