@@ -73,6 +73,12 @@ def at_most(maximum: int, words: str, minimum: int = 1) -> Any:
     return Query(ge=minimum, le=maximum, description=f"Maximum number of {words}.")
 
 
+def several(words: str, examples: list[str], max_length: int) -> Any:
+    """Return the declaration of a query parameter for at most `max_length` values, default all."""
+    description = f"{words}; default: all. May be repeated."
+    return Query(max_length=max_length, description=description, examples=[examples])
+
+
 SECONDS = {"min": 60, "h": 3600, "d": 86_400}
 MINUTE_NS = 60 * NS_PER_S
 

@@ -67,6 +67,12 @@ class ActorModel(RequestModel):
     """Name of the acting person, 1 to 80 printable characters; ignored with a login or key."""
 
 
+class ReasonModel(ActorModel):
+    """Request for an action, with its reason."""
+
+    reason: ReasonText
+
+
 LevelName = Literal["good", "uncertain", "bad"]
 
 

@@ -39,7 +39,7 @@ from service.api.routes.alarm_models import (
     grid_of,
 )
 from service.api.tables import Column, Format, column_of, table_content, table_response
-from service.api.values import ActorModel, NoteText, ReasonText, states_named
+from service.api.values import ActorModel, NoteText, ReasonModel, ReasonText, states_named
 from service.settings.alarm_kinds import AlarmKindName, AlarmLevelName
 from service.store.access.identities import Permission
 from service.store.port import AlarmQuery
@@ -62,13 +62,7 @@ class CommentModel(ActorModel):
     """Comment, 1 to 500 printable characters."""
 
 
-class OutageModel(ActorModel):
-    """Request to take an alarm out of service."""
-
-    reason: ReasonText
-
-
-class ShelveModel(OutageModel):
+class ShelveModel(ReasonModel):
     """Request to shelve an alarm for a limited time."""
 
     duration_s: Annotated[float, Field(ge=1.0, le=31_536_000.0, examples=[3600.0])]
@@ -261,7 +255,7 @@ def operation_router(context: Context) -> APIRouter:
         return await done(alarm, asked, operation.Unshelve)
 
     @router.post("/out-of-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
-    async def take_out_of_service(alarm: AlarmId, asked: OutageModel) -> AlarmModel:
+    async def take_out_of_service(alarm: AlarmId, asked: ReasonModel) -> AlarmModel:
         """Hide an alarm until it is returned to service, for example for maintenance."""
         return await done(alarm, asked, operation.TakeOutOfService)
 

@@ -13,10 +13,9 @@ from core.machine.unit import Estimator
 from core.units import DAY_NS
 from service.api.parameters import Moment
 from service.api.values import (
-    ActorModel,
     ApiModel,
     BearingAnswer,
-    ReasonText,
+    ReasonModel,
     Time,
 )
 from service.live.commands import FilmPlace
@@ -260,13 +259,7 @@ class BaselineModel(BearingAnswer):
     """Width of the cells in oil temperature, K; null if nothing was learned."""
 
 
-class BaselineActionModel(ActorModel):
-    """Request to change baselines, with a reason."""
-
-    reason: ReasonText
-
-
-class RenewModel(BaselineActionModel):
+class RenewModel(ReasonModel):
     """Request to renew the baseline after a machine event."""
 
     event_time: Annotated[Moment, Field(strict=False, examples=["2026-11-21T08:00:00Z"])]

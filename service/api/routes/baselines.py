@@ -18,7 +18,6 @@ from service.api.downloads import file_content
 from service.api.parameters import ns_from_datetime
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.baseline_models import (
-    BaselineActionModel,
     BaselineCellsModel,
     BaselineDirectionModel,
     BaselineModel,
@@ -29,7 +28,7 @@ from service.api.routes.baseline_models import (
     learning_model,
 )
 from service.api.routes.films import watched_place
-from service.api.values import CellModel, cell_model, listed
+from service.api.values import CellModel, ReasonModel, cell_model, listed
 from service.live import commands
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
@@ -154,31 +153,27 @@ def baseline_action_router(context: Context) -> APIRouter:
 
     @router.post("/{version}/accept", responses=ACTION_PROBLEMS)
     async def accept_baseline(
-        unit: UnitId, bearing: BearingId, version: Version, asked: BaselineActionModel
+        unit: UnitId, bearing: BearingId, version: Version, asked: ReasonModel
     ) -> BaselinesModel:
         """Accept a baseline version, which is in force from the next reading."""
-        await asyncio.to_thread(_require_version, context, unit, bearing, version)
         return await _done(context, unit, bearing, commands.Accept(version), asked)
 
     @router.post("/{version}/reject", responses=ACTION_PROBLEMS)
     async def reject_baseline(
-        unit: UnitId, bearing: BearingId, version: Version, asked: BaselineActionModel
+        unit: UnitId, bearing: BearingId, version: Version, asked: ReasonModel
     ) -> BaselinesModel:
         """Reject a version; if it was in force, none is in force until another is accepted."""
-        await asyncio.to_thread(_require_version, context, unit, bearing, version)
         return await _done(context, unit, bearing, commands.Reject(version), asked)
 
     @router.post("/freeze", responses=ACTION_PROBLEMS)
     async def freeze_baseline(
-        unit: UnitId, bearing: BearingId, asked: BaselineActionModel
+        unit: UnitId, bearing: BearingId, asked: ReasonModel
     ) -> BaselinesModel:
         """Suspend the learning of baselines; the version in force does not change."""
         return await _done(context, unit, bearing, commands.Freeze(), asked)
 
     @router.post("/thaw", responses=ACTION_PROBLEMS)
-    async def thaw_baseline(
-        unit: UnitId, bearing: BearingId, asked: BaselineActionModel
-    ) -> BaselinesModel:
+    async def thaw_baseline(unit: UnitId, bearing: BearingId, asked: ReasonModel) -> BaselinesModel:
         """Resume learning after a freeze, until the end of the learning period."""
         return await _done(context, unit, bearing, commands.Thaw(), asked)
 
@@ -202,9 +197,11 @@ async def _done(
     unit: str,
     bearing: str,
     action: commands.BaselineAction,
-    asked: BaselineActionModel,
+    asked: ReasonModel,
 ) -> BaselinesModel:
     """Execute an action on baselines; return the baselines after the action is stored."""
+    if isinstance(action, commands.Accept | commands.Reject):
+        await asyncio.to_thread(_require_version, context, unit, bearing, action.version)
     place = watched_place(context, unit, bearing)
     await context.operators.act(place, action, actor_or(asked.actor), asked.reason)
     return await asyncio.to_thread(_baselines, context, unit, bearing)

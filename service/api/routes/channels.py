@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Response
 from pydantic import Field
 
 from acquisition.delivery.units import UNIT_OF
@@ -14,7 +14,7 @@ from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
 from service.api.auth.declared import subject_router
 from service.api.context import Context, UnitId
-from service.api.parameters import duration
+from service.api.parameters import duration, several
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, QualityModel, SampleRange, Time, listed
 from service.live.current_state import LiveUnits
@@ -254,12 +254,7 @@ def channel_router(context: Context) -> APIRouter:
     async def newest_samples(
         unit: UnitId,
         channel: Annotated[
-            list[str] | None,
-            Query(
-                max_length=32,
-                description="Waveform channels; default: all. May be repeated.",
-                examples=[["ujb_shaft_x", "ujb_shaft_y"]],
-            ),
+            list[str] | None, several("Waveform channels", ["ujb_shaft_x", "ujb_shaft_y"], 32)
         ] = None,
         seconds: Annotated[float, duration(HELD_S, NEWEST)] = 2.0,
     ) -> Response:

@@ -15,7 +15,7 @@ from core.stiffness.order_line import marked_hz
 from service.api.answers import in_thread
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
-from service.api.parameters import TimeRange, at_most
+from service.api.parameters import TimeRange, at_most, several
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.bearings import no_result
 from service.api.values import (
@@ -216,14 +216,7 @@ def spectra_router(context: Context) -> APIRouter:
         unit: UnitId,
         bearing: BearingId,
         times: TimeRange,
-        channel: Annotated[
-            list[PlaceName] | None,
-            Query(
-                max_length=8,
-                description="Channels; default: all. May be repeated.",
-                examples=[["shaft_x"]],
-            ),
-        ] = None,
+        channel: Annotated[list[PlaceName] | None, several("Channels", ["shaft_x"], 8)] = None,
         max_spectra: Annotated[
             int, at_most(MAX_SPECTRA, "spectra; more are thinned evenly", minimum=2)
         ] = 200,
