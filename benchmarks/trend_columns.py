@@ -13,7 +13,7 @@ from collections.abc import Callable
 from core.monitor.catalogue import CATALOGUE
 from core.quality import Level
 from service.api.answers import json_of
-from service.api.routes.trends import trend_answer
+from service.api.routes.trends import trend_model
 from service.api.values import LEVEL_NAMES, ApiModel, LevelName
 from service.store.port import Trend, TrendQuery, TrendSeries
 
@@ -96,7 +96,7 @@ def main() -> None:
     query = TrendQuery("U1", "UJB", tuple(names), 0, N_POINTS * NS_PER_MINUTE, N_POINTS, 1)
 
     def by_column() -> bytes:
-        return json_of(trend_answer(query, trend))
+        return json_of(trend_model(query, trend))
 
     columns, points = json.loads(by_column()), json.loads(by_point(trend))
     for name in names:

@@ -21,7 +21,7 @@ from core.monitor.catalogue import CATALOGUE
 from core.units import NS_PER_S
 from service.api.answers import json_of
 from service.api.routes.trend_groups import trend_groups
-from service.api.routes.trends import trend_answer, trend_columns
+from service.api.routes.trends import trend_model
 from service.store.buckets import Summaries
 from service.store.port import TrendQuery, ValueRange
 from service.store.rollups.gathering import SET_MARK
@@ -136,7 +136,7 @@ def cpu_ms(do: Callable[[], object], n_times: int) -> float:
 
 
 def queries(end_ns: int, max_points: int) -> dict[str, TrendQuery]:
-    names = trend_columns([q.name for q in CATALOGUE][:12])
+    names = columns_of(CATALOGUE[:12])
 
     def asked(length_ns: int, **more: object) -> TrendQuery:
         arguments = ("U1", "UJB", names, end_ns - length_ns, end_ns, max_points, 3 * HOP_NS)
@@ -199,7 +199,7 @@ def print_times(store: SqliteStore, n_times: int) -> float:
         for words, query in queries(NOW_NS, max_points).items():
 
             def answer(query: TrendQuery = query) -> bytes:
-                return json_of(trend_answer(query, store.trend(query)))
+                return json_of(trend_model(query, store.trend(query)))
 
             spent_ms, n = cpu_ms(answer, n_times), len(store.trend(query).time_ns)
             print(f"{words:<40}{max_points:>8}{n:>9}{spent_ms:>8.0f}")

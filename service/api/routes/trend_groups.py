@@ -1,7 +1,7 @@
 """Trends grouped by operating state, or by intervals of eccentricity or oil temperature."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
@@ -37,25 +37,25 @@ class QuantityTrend:
     unit: str
     """Unit of the values; for an amplitude, also the detector."""
 
-    minimum: Sequence[float | None]
+    minimum: list[float | None]
     """Minimum of the usable readings; null without usable readings."""
 
-    maximum: Sequence[float | None]
+    maximum: list[float | None]
     """Maximum of the usable readings; null without usable readings."""
 
-    mean: Sequence[float | None]
+    mean: list[float | None]
     """Mean of the usable readings; null without usable readings."""
 
-    count: Sequence[int]
+    count: list[int]
     """Number of usable readings."""
 
-    worst_level: Sequence[LevelName | None]
+    worst_level: list[LevelName | None]
     """Worst quality level of the readings; null without readings."""
 
-    u_random: Sequence[float | None] | None
+    u_random: list[float | None] | None
     """Mean of the random standard uncertainties; null for a quantity without uncertainty."""
 
-    u_systematic: Sequence[float | None] | None
+    u_systematic: list[float | None] | None
     """Mean of the systematic standard uncertainties; null for a quantity without uncertainty."""
 
 

@@ -27,7 +27,7 @@ from service.api.routes.trend_groups import (
 )
 from service.api.tables import Column, ColumnKind, Format, table_content, table_response
 from service.api.values import BearingHistory, Time, TimeNs, states_named
-from service.store.port import TrendQuery
+from service.store.port import Trend, TrendQuery
 from service.store.series import columns_of as stored_columns
 
 
@@ -171,15 +171,29 @@ def _read(
     context: Context, query: TrendQuery, group_by: GroupName | None, grid: CellGrid
 ) -> TrendModel:
     past_end_ns = context.store.films.past_end_ns(query.unit, query.bearing)
-    is_past = past_end_ns is not None and past_end_ns >= query.start_ns
     whole = context.store.trend(query)
     groups = None if group_by is None else trend_groups(context.store, query, group_by, grid)
+    return trend_model(query, whole, groups, past_end_ns)
+
+
+def trend_model(
+    query: TrendQuery,
+    trend: Trend,
+    groups: list[TrendGroupModel] | None = None,
+    past_end_ns: int | None = None,
+) -> TrendModel:
+    """Return the API model of the trend that a query selects.
+
+    `groups` are None if not requested; `past_end_ns` is the end of the simulated readings, ns since
+    1970 UTC, None without simulated readings.
+    """
+    is_past = past_end_ns is not None and past_end_ns >= query.start_ns
     return TrendModel.of(
         query,
-        columns_of(whole),
-        whole,
+        columns_of(trend),
+        trend,
         simulated_until=past_end_ns if is_past else None,
-        next_cursor=None if whole.next_ns is None else str(whole.next_ns),
+        next_cursor=None if trend.next_ns is None else str(trend.next_ns),
         groups=groups,
     )
 
