@@ -22,7 +22,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from acquisition.clock import Clock
-from service.api.auth.authenticator import CALLER, Caller
+from service.api.auth.credentials import CALLER, Caller
 from service.api.problems import ProblemError
 from service.runtime.asker import ASKER, Asker
 from service.runtime.times import rfc3339

@@ -21,7 +21,7 @@ from service.api.answers import (
     Unrouted,
 )
 from service.api.auth.accounts import account_router, key_router
-from service.api.auth.authenticator import COOKIE
+from service.api.auth.credentials import COOKIE
 from service.api.auth.declared import Declared, declared
 from service.api.auth.gate import Gate, require_declared
 from service.api.auth.sessions import session_router

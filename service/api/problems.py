@@ -13,7 +13,7 @@ from starlette.exceptions import HTTPException
 
 from core.alarms.operation import ActionRefusedError
 from service.api.auth.declared import allowed_methods
-from service.api.auth.passwords import PasswordRefusedError, TooManyLoginsError
+from service.api.auth.passwords import PasswordRefusedError
 from service.live.commands import (
     BaselineRefusedError,
     CommandFailedError,
@@ -236,11 +236,6 @@ def install_problem_handlers(app: FastAPI) -> None:
 
     for kind in REFUSALS:
         app.add_exception_handler(kind, _refused)
-
-    @app.exception_handler(TooManyLoginsError)
-    async def _busy(request: Request, _: TooManyLoginsError) -> Response:
-        detail, wait = "too many concurrent logins; try again", {"Retry-After": "1"}
-        return _render(request, 503, "Busy", detail, headers=wait)
 
     @app.exception_handler(CommandFailedError)
     async def _not_carried_out(request: Request, error: CommandFailedError) -> Response:

@@ -89,7 +89,7 @@ async def serve_requests(
             [serving] = beats.start({"serve": partial(server.run_on, listener)}, tasks)
             while not server.started:
                 await asyncio.sleep(0.01)
-            token = await context.access.offer_set_up()
+            token = await context.access.run(context.access.offer_set_up)
             await on_ready(url_of(listener, has_tls=server.config.is_ssl), token)
             running.append(tasks.create_task(_rendered(app), name="document"))
             await stopped.wait()

@@ -9,7 +9,7 @@ import typer
 
 from acquisition.clock import SystemClock
 from core.units import NS_PER_S
-from service.api.auth.service import AccessService
+from service.api.auth.authenticator import Authenticator
 from service.cli.options import (
     JsonOutput,
     PasswordFd,
@@ -67,8 +67,9 @@ def create(
         if wanted not in known:
             fail(f"unknown unit {wanted}; known units: {', '.join(known)}", 2)
     with access_of(plant, creates=True) as access:
-        now_ns = SystemClock().now_ns()
-        key, shown = AccessService(access).create_key(name, role, unit or (), days, now_ns)
+        people = Authenticator(access, SystemClock())
+        key, shown = people.create_key(name, role, unit or (), days)
+    now_ns = key.created_ns
     print_result({**_row(key, now_ns), "key": shown}, [shown], json_output, indent=None)
     if not json_output:
         typer.echo(f"{_line(key, now_ns)}; the key is shown only once", err=True)
@@ -133,7 +134,7 @@ def add(
     """Add an account, with a password from the prompt or from --password-fd."""
     plant, password = load_plant_file(plant_file), password_from(password_fd)
     with access_of(plant, creates=True) as access:
-        added = AccessService(access).add(name, role, password, SystemClock().now_ns())
+        added = Authenticator(access, SystemClock()).add(name, role, password)
     typer.echo(f"{added}: added as {role}")
 
 
@@ -172,7 +173,7 @@ def set_password(plant_file: PlantPath, name: Name, password_fd: PasswordFd = No
     """Set a new password for an account and end all its sessions."""
     plant, password = load_plant_file(plant_file), password_from(password_fd)
     with access_of(plant) as access:
-        AccessService(access).set_password(account_name(name), password, SystemClock().now_ns())
+        Authenticator(access, SystemClock()).set_password(account_name(name), password)
     typer.echo(f"{account_name(name)}: password changed, all sessions ended")
 
 

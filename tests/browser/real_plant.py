@@ -12,8 +12,8 @@ from pathlib import Path
 
 from rigs.command_line import OPEN, free_port
 
-from service.api.auth.passwords import Hashing
-from service.api.auth.service import AccessService
+from acquisition.clock import SystemClock
+from service.api.auth.authenticator import Authenticator
 from service.app.storage import open_store
 from service.cli.accounts import access_of
 from service.cli.offline.demo_history import fill
@@ -96,9 +96,9 @@ class Plant(ExitStack):
     def add_accounts(self) -> None:
         """Add an account of each role, named after it, before anything is started."""
         with access_of(self._plant_here(), creates=True) as access:
-            people = AccessService(access, Hashing())
+            people = Authenticator(access, SystemClock())
             for role in Role:
-                people.add(role.value, role, PASSWORD, time.time_ns())
+                people.add(role.value, role, PASSWORD)
 
     def live_first(self) -> None:
         """Give the unit a past with a learned baseline before anything is started."""

@@ -148,13 +148,13 @@ CHANGE_PROBLEMS = problem_responses(
 
 def account_router(authenticator: Authenticator) -> APIRouter:
     """Return the router for accounts."""
-    stored, service = authenticator.store.accounts, authenticator.service
-    now_ns, change = authenticator.clock.now_ns, authenticator.change
+    stored, change = authenticator.store.accounts, authenticator.change
+    now_ns = authenticator.clock.now_ns
     router = subject_router("/accounts", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
     router.dependencies.append(Depends(name_caller))
 
     async def one(name: str) -> AccountModel:
-        found = await authenticator.work.run(lambda: stored.get(name))
+        found = await authenticator.run(lambda: stored.get(name))
         if found is None:
             raise ProblemError(404, "Unknown account", "the account does not exist")
         return account_model(found)
@@ -162,15 +162,14 @@ def account_router(authenticator: Authenticator) -> APIRouter:
     @router.get("")
     async def accounts() -> list[AccountModel]:
         """List all accounts, sorted by name."""
-        return [account_model(account) for account in await authenticator.work.run(stored.all)]
+        return [account_model(account) for account in await authenticator.run(stored.all)]
 
     @router.post("", status_code=201, responses=CHANGE_PROBLEMS)
     async def add_account(asked: NewAccountModel) -> AccountModel:
         """Add an account; its password must be changed at the first login."""
         new = asked.name, Role(asked.role), asked.password
-        return await one(
-            await change(lambda: service.add(*new, now_ns(), must_change=True), hashes=True)
-        )
+        add = authenticator.add
+        return await one(await change(lambda: add(*new, must_change=True), hashes=True))
 
     @router.put("/{name}/role", responses=CHANGE_PROBLEMS)
     async def set_role(name: AccountName, asked: SetRoleModel) -> AccountModel:
@@ -188,8 +187,8 @@ def account_router(authenticator: Authenticator) -> APIRouter:
         """
         _require_other(request, name, "use POST /session/password to change your own password")
         await one(name)  # before hashing, which is slow
-        new = name, asked.password
-        await change(lambda: service.set_password(*new, now_ns(), must_change=True), hashes=True)
+        new, set_password = (name, asked.password), authenticator.set_password
+        await change(lambda: set_password(*new, must_change=True), hashes=True)
         return await one(name)
 
     @router.delete("/{name}", status_code=204, responses=CHANGE_PROBLEMS)
@@ -222,7 +221,7 @@ def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
     @router.get("")
     async def keys() -> list[KeyModel]:
         """List all API keys, also expired and revoked keys, oldest first, without their secrets."""
-        keys, now_ns = await authenticator.work.run(stored.all), clock.now_ns()
+        keys, now_ns = await authenticator.run(stored.all), clock.now_ns()
         return [KeyModel.of(key, state=key.state(now_ns)) for key in keys]
 
     @router.post("", status_code=201, responses=CHANGE_PROBLEMS)
@@ -232,16 +231,14 @@ def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
             if unit not in context.units:
                 detail = f"unknown unit {unit!r}; known units: {', '.join(context.units)}"
                 raise ProblemError(422, "Wrong parameter", detail, "units")
-        new, now_ns = (asked.name, Role(asked.role), asked.units, asked.days), clock.now_ns()
-        made, shown = await authenticator.change(
-            lambda: authenticator.service.create_key(*new, now_ns)
-        )
-        return CreatedKeyModel.of(made, state=made.state(now_ns), key=shown)
+        new = asked.name, Role(asked.role), asked.units, asked.days
+        made, shown = await authenticator.change(lambda: authenticator.create_key(*new))
+        return CreatedKeyModel.of(made, state=made.state(made.created_ns), key=shown)
 
     @router.delete("/{key}", status_code=204, responses=CHANGE_PROBLEMS)
     async def revoke_key(key: KeyId) -> None:
         """Revoke an API key permanently; the request is idempotent."""
-        if await authenticator.work.run(lambda: stored.get(key)) is None:
+        if await authenticator.run(lambda: stored.get(key)) is None:
             raise ProblemError(404, "Unknown key", "the key does not exist")
         await authenticator.change(lambda: stored.revoke(key, clock.now_ns()))
 

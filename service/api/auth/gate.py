@@ -1,52 +1,23 @@
 """Authentication of callers by middleware, and check of the permission for each route."""
 
 from collections.abc import Callable, Mapping
-from urllib.parse import urlsplit
 
 from fastapi import Request
-from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.auth.authenticator import CALLER, Authenticator, Caller
+from service.api.auth.authenticator import BEARER_ONLY, Authenticator
+from service.api.auth.credentials import CALLER, Caller, is_foreign
 from service.api.auth.declared import Declared, Reach
-from service.api.auth.refusals import REFUSED, SAFE
 from service.api.problems import DETAIL, STORE_FAILS, ProblemError, problem_answer
 from service.store.access.audit_entries import Acting, Source, acting, acting_as, name_actor
 from service.store.access.identities import LOCAL, Identity, Means
 from service.store.port import StoreError
 
-OWN_SITES = ("same-origin", "none")
-"""Accepted values of the header `Sec-Fetch-Site`: own pages, and addresses typed by the user."""
+SAFE = ("GET", "HEAD", "OPTIONS")
+"""Safe HTTP methods, which change no state."""
 
-
-def is_foreign(scope: Scope, *, requires_origin: bool) -> bool:
-    """Whether a request may come from a page of another origin (cross-site request forgery).
-
-    Browsers send cookies with requests of pages of any site, and let these pages reach loopback.
-    With `requires_origin`, a request without headers ``Origin`` and ``Sec-Fetch-Site`` counts as
-    foreign.
-    """
-    headers = Headers(scope=scope)
-    hosts, origins = headers.getlist("host"), headers.getlist("origin")
-    sites = headers.getlist("sec-fetch-site")
-    if not origins and not sites:
-        return requires_origin
-    if any(site not in OWN_SITES for site in sites):
-        return True
-    return any(not _is_own(origin, scope["scheme"], hosts) for origin in origins)
-
-
-def _is_own(origin: str, scheme: str, hosts: list[str]) -> bool:
-    try:
-        given = urlsplit(origin)
-    except ValueError:
-        return False
-    # behind a proxy that terminates TLS, the page uses https and the request http
-    return given.scheme in (scheme, "https") and [given.netloc] == hosts
-
-
-BEARER_ONLY = {"WWW-Authenticate": 'Bearer realm="padwatch"'}
-"""Header of answers with status 401; the scheme Bearer opens no login dialog in browsers."""
+REFUSED = (401, 403, 409, 413, 422, 429)
+"""HTTP statuses of refused requests."""
 
 
 def not_logged_in() -> ProblemError:
@@ -98,7 +69,7 @@ class Gate:
                 await self._app(scope, receive, watched)
             if scope["method"] not in SAFE and status in REFUSED:
                 operation = f"{scope['method']} {scope['path']}"
-                await self._desk.refusals.note(operation, state.get(DETAIL, ""), status)
+                await self._desk.record_refusal(operation, state.get(DETAIL, ""), status)
 
     async def _admit(self, scope: Scope) -> None:
         try:

@@ -1,22 +1,16 @@
 """Routes for login, logout, password change, and creation of the first account."""
 
-from math import ceil
 from typing import Annotated
 
 from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
 from service.api.auth.accounts import LoginName, Password, RoleName
-from service.api.auth.authenticator import (
-    COOKIE,
-    PLAIN_COOKIE,
-    Authenticator,
-    Caller,
-)
+from service.api.auth.authenticator import Authenticator, LoggedIn, tidy_name
+from service.api.auth.credentials import COOKIE, PLAIN_COOKIE, Caller
 from service.api.auth.declared import OPEN, Reach, needs
-from service.api.auth.gate import BEARER_ONLY, caller_of, identity_of
+from service.api.auth.gate import caller_of, identity_of
 from service.api.auth.passwords import PasswordRefusedError
-from service.api.auth.service import LoggedIn, NotLoggedIn
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel
 from service.store.access.identities import Means, Permission, Role
@@ -103,8 +97,11 @@ def session_router(authenticator: Authenticator) -> APIRouter:
     @router.post("/session", status_code=201, responses=LOGIN_PROBLEMS, dependencies=[OPEN])
     async def log_in(request: Request, response: Response, asked: LoginModel) -> SessionModel:
         """Log in: start a session and set its cookie; an earlier session of the browser ends."""
-        found = await authenticator.log_in(asked.name, asked.password, _peer(request))
-        logged_in, shown = _logged_in(found), caller_of(request).shown
+        given, shown = (asked.name, asked.password, _peer(request)), caller_of(request).shown
+        logged_in = await authenticator.run_hashing(
+            lambda: authenticator.log_in(*given),
+            is_known=authenticator.backoff.knows(tidy_name(asked.name), _peer(request)),
+        )
         if shown.means is Means.SESSION:
             await authenticator.log_out(shown.secret, is_replaced=True)
         return await _begun(authenticator, request, response, logged_in)
@@ -133,19 +130,19 @@ def session_router(authenticator: Authenticator) -> APIRouter:
             detail = "this identity has no password; log in with an account first"
             raise ProblemError(409, "No password", detail)
         given = identity.name, asked.password, asked.new_password, _peer(request)
-        change, times = authenticator.service.change_password, authenticator.now
+        change = authenticator.change_password
         try:
-            found = await authenticator.change(lambda: change(*given, *times), hashes=True)
+            logged_in = await authenticator.change(lambda: change(*given), hashes=True)
         except PasswordRefusedError as error:
             raise ProblemError(422, "Wrong parameter", str(error), "new_password") from error
-        return await _begun(authenticator, request, response, _logged_in(found))
+        return await _begun(authenticator, request, response, logged_in)
 
     @router.post("/set-up", status_code=201, responses=SET_UP_PROBLEMS, dependencies=[OPEN])
     async def create_first_account(request: Request, asked: SetUpModel) -> SessionModel:
         """Create the first account, an administrator, with the token that the service printed."""
-        given, now_ns = (asked.token, asked.name, asked.password), authenticator.clock.now_ns()
-        is_made = await authenticator.work.run_hashing(
-            lambda: authenticator.service.set_up(*given, now_ns), is_known=False
+        given = asked.token, asked.name, asked.password
+        is_made = await authenticator.run_hashing(
+            lambda: authenticator.set_up(*given), is_known=False
         )
         if not is_made:
             detail = "the token is wrong or was used, or an account exists already"
@@ -157,18 +154,6 @@ def session_router(authenticator: Authenticator) -> APIRouter:
 
 def _peer(request: Request) -> str:
     return request.client.host if request.client else ""
-
-
-def _logged_in(found: LoggedIn | NotLoggedIn) -> LoggedIn:
-    """Return a successful login; raise a problem of status 401 or 429 for a failed one."""
-    if isinstance(found, LoggedIn):
-        return found
-    if not found.wait_s:
-        detail = "the name or the password is wrong"
-        raise ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
-    wait = {"Retry-After": str(max(1, ceil(found.wait_s)))}
-    detail = f"too many failed logins; try again after {wait['Retry-After']} s"
-    raise ProblemError(429, "Wait", detail, headers=wait)
 
 
 async def _begun(
@@ -189,9 +174,7 @@ async def session_model(caller: Caller, authenticator: Authenticator) -> Session
     """Return the API model of a caller with its identity and permissions."""
     identity = caller.identity
     may_all = identity is not None and (identity.is_proven or identity.role is Role.ADMIN)
-    needs_set_up = not may_all and not await authenticator.work.run(
-        authenticator.store.accounts.all
-    )
+    needs_set_up = not may_all and not await authenticator.run(authenticator.store.accounts.all)
     return SessionModel(
         login_required=caller.must_log_in,
         set_up_needed=needs_set_up,

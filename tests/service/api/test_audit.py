@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from service.api.auth.refusals import N_AT_ONCE, SECONDS_EACH
+from service.api.auth.authenticator import N_AT_ONCE, SECONDS_EACH
 from service.store.access.audit_entries import AuditAction
 
 AUDIT = "/api/v1/audit"

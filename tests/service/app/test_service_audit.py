@@ -129,12 +129,12 @@ async def test_a_token_for_setting_up_is_drawn_only_where_nobody_could_log_in(ac
     plain = access_desk(plant_with(), access_store, clock)
     demo = access_desk(plant_with(), access_store, clock, is_demo=True)
 
-    assert await demo.offer_set_up() is None
+    assert demo.offer_set_up() is None
     for desk in (closed, plain):
-        assert await desk.offer_set_up() is not None
+        assert desk.offer_set_up() is not None
     access_store.accounts.add("anna", Role.ADMIN, "$argon2id$", 0)
     for desk in (closed, plain):
-        assert await desk.offer_set_up() is None
+        assert desk.offer_set_up() is None
 
 
 def test_a_replay_is_for_this_computer_and_asks_for_logins_as_the_plant_does(tmp_path):

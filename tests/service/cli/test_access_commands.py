@@ -11,8 +11,8 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
-from service.api.auth.passwords import Hashing
-from service.api.auth.service import AccessService, LoggedIn
+from acquisition.clock import SystemClock
+from service.api.auth.authenticator import Authenticator
 from service.cli.commands import app
 from service.runtime.process import made_by
 from service.store.access.identities import Identity, Role
@@ -58,8 +58,8 @@ def test_an_account_that_was_added_can_log_in_and_stands_in_the_audit_trail(padw
     assert (added.exit_code, added.stdout) == (0, "anna: added as admin\n")
 
     newest = access.audit.entries(AuditQuery(limit=1))[0]
-    doors = AccessService(access, Hashing())
-    assert isinstance(doors.log_in("anna", PASSWORD, "::1", NOW_NS, 0), LoggedIn)
+    doors = Authenticator(access, SystemClock())
+    assert doors.log_in("anna", PASSWORD, "::1").identity.name == "anna"
     said = (newest.action, newest.object, newest.source)
     assert said == ("account.added", "anna", "command_line")
     assert newest.peer == made_by()
@@ -134,11 +134,11 @@ def test_a_key_is_shown_once_and_opens_until_it_is_revoked(padwatch, access, pla
     with closing(sqlite3.connect(plant_path.parent / "data" / "padwatch.sqlite3")) as connection:
         assert key not in "\n".join(connection.iterdump())
 
-    doors = AccessService(access, Hashing())
-    assert isinstance(doors.machine(key, NOW_NS), Identity)
+    doors = Authenticator(access, SystemClock())
+    assert isinstance(doors.machine(key), Identity)
     said = [padwatch("keys", "revoke", listed["id"]).stdout for _ in range(2)]
     assert said == [f"{listed['id']}: revoked\n", f"{listed['id']}: was already revoked\n"]
-    assert doors.machine(key, NOW_NS) is None
+    assert doors.machine(key) is None
     assert ", revoked, " in padwatch("keys", "list").stdout
 
 

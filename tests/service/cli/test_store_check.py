@@ -18,7 +18,7 @@ from acquisition.clock import SystemClock
 from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
 from core.monitor.assessment import Assessment
-from service.api.auth.service import AccessService
+from service.api.auth.authenticator import Authenticator
 from service.app.kept_files import waveform_keeper
 from service.app.storage import open_store
 from service.settings.adapter_values import recorded_unit
@@ -243,8 +243,8 @@ def test_what_was_taken_back_since_the_copy_is_not_given_again(plant_path, tmp_p
         for name in ("anna", "bert"):
             people.accounts.add(name, Role.ADMIN, "hash", made_ns)
         people.sessions.add(Session(b"d" * 32, "anna", made_ns, made_ns), 1, 0)
-        create = AccessService(people).create_key
-        keys = [create(name, Role.ADMIN, (), 1, made_ns)[0] for name in ("old", "new")]
+        create = Authenticator(people, SystemClock()).create_key
+        keys = [create(name, Role.ADMIN, (), 1)[0] for name in ("old", "new")]
     made = json.loads(padwatch("backup", plant_path, tmp_path / "copies", "--json").output)
     with closing(open_access_file(database)) as people:
         people.keys.revoke(keys[0].id, made_ns)

@@ -34,8 +34,7 @@ class Access:
 
     async def account(self, name: str, role: Role) -> None:
         """Add an account whose password its owner has set."""
-        now_ns = self.service.clock.now_ns()
-        await asyncio.to_thread(self.desk.service.add, name, role, PASSWORD, now_ns)
+        await asyncio.to_thread(self.desk.add, name, role, PASSWORD)
 
     async def session(self, name: str) -> str:
         """Log in; the token of the session."""
@@ -45,8 +44,7 @@ class Access:
         return token_of(answer)
 
     def key(self, role: Role, *units: str, days: int = 1) -> str:
-        now_ns = self.service.clock.now_ns()
-        _, shown = self.desk.service.create_key(f"key-{role}", role, units, days, now_ns)
+        _, shown = self.desk.create_key(f"key-{role}", role, units, days)
         return shown
 
 

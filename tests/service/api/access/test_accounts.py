@@ -8,7 +8,9 @@ from typing import Any
 import httpx2
 import pytest
 
-from service.api.auth.passwords import MAX_AT_ONCE, MAX_WAITING, AccessThreads, TooManyLoginsError
+from service.api.auth.authenticator import MAX_WAITING, Authenticator
+from service.api.auth.passwords import MAX_AT_ONCE
+from service.api.problems import ProblemError
 from service.store.access.identities import Role
 
 ACCOUNTS, KEYS = "/api/v1/accounts", "/api/v1/keys"
@@ -143,30 +145,28 @@ def held() -> Iterator[threading.Event]:
     event.set()
 
 
-async def waiting_logins(held: threading.Event) -> tuple[AccessThreads, list[asyncio.Task[bool]]]:
+async def waiting_logins(work: Authenticator, held: threading.Event) -> list[asyncio.Task[bool]]:
     """Begin as many logins as may wait."""
-    work = AccessThreads()
     begun = [work.run_hashing(held.wait, is_known=False) for _ in range(MAX_WAITING)]
     logins = [asyncio.create_task(each) for each in begun]
     await asyncio.sleep(0)
-    return work, logins
+    return logins
 
 
-async def test_only_so_many_passwords_wait_and_nobody_else_for_them(held):
-    work, logins = await waiting_logins(held)
+async def test_only_so_many_passwords_wait_and_nobody_else_for_them(access, held):
+    work, logins = access.desk, await waiting_logins(access.desk, held)
 
-    with pytest.raises(TooManyLoginsError):
+    with pytest.raises(ProblemError, match="too many concurrent logins"):
         await work.run_hashing(held.wait, is_known=False)
     assert await work.run(lambda: "found") == "found"
     held.set()
     assert await asyncio.gather(*logins) == [True] * MAX_WAITING
     assert await work.run_hashing(lambda: "in") == "in"
-    work.close()
 
 
-async def test_at_the_end_nothing_more_is_begun(held):
-    work, logins = await waiting_logins(held)
-    work.close()
+async def test_at_the_end_nothing_more_is_begun(access, held):
+    logins = await waiting_logins(access.desk, held)
+    await access.desk.close()
     held.set()
     ended = await asyncio.gather(*logins, return_exceptions=True)
 

@@ -93,7 +93,7 @@ async def test_a_login_of_the_proxy_hides_neither_a_session_nor_a_key(access, an
 
 async def test_a_known_person_gets_in_while_strangers_take_all_places(access, anna):
     assert anna  # from the same place before
-    while access.desk.work._places.acquire(blocking=False):
+    while access.desk._places.acquire(blocking=False):
         pass
     statuses = []
     for peer in ("192.0.2.7", "192.0.2.8"):
@@ -225,7 +225,7 @@ async def test_a_new_password_ends_all_other_logins_and_logout_this_one(access, 
 
 
 async def test_the_first_account_is_made_with_the_printed_token_and_once(access):
-    token = await access.desk.offer_set_up()
+    token = access.desk.offer_set_up()
     body = {"token": token, **ANNA}
     async with access.client() as client:
         before = (await client.get(SESSION)).json()
@@ -249,7 +249,7 @@ async def test_the_first_account_is_made_with_the_printed_token_and_once(access)
     assert refused.headers["www-authenticate"].startswith("Bearer")
     assert after["set_up_needed"] is False
     assert await access.session("anna")
-    assert await access.desk.offer_set_up() is None
+    assert access.desk.offer_set_up() is None
 
 
 async def test_logins_are_told_and_nothing_secret_of_them(access, anna):

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 from argon2 import PasswordHasher
 from harness.places import Place, SqlitePlace
+from rigs.standing_clock import SetClock
 
+from service.api.auth.authenticator import Authenticator
 from service.api.auth.passwords import Hashing
-from service.api.auth.service import AccessService
 from service.store.access.tables import AccessStore
 
 
@@ -54,10 +55,5 @@ def hashing(hasher: CountingHasher) -> Hashing:
 
 
 @pytest.fixture
-def people(access: AccessStore, hashing: Hashing) -> AccessService:
-    return AccessService(access, hashing)
-
-
-@pytest.fixture
-def doors(people: AccessService) -> AccessService:
-    return people
+def doors(access: AccessStore, hashing: Hashing) -> Authenticator:
+    return Authenticator(access, SetClock(), hashing=hashing)

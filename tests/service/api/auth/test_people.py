@@ -6,10 +6,11 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from argon2 import extract_parameters
 from argon2.low_level import Type
+from rigs.standing_clock import T0, at
 
 from core.units import DAY_NS
-from service.api.auth.passwords import PasswordRefusedError, new_password, plant_hasher
-from service.api.auth.service import SET_UP_S, AccessService, LoggedIn
+from service.api.auth.authenticator import SET_UP_S
+from service.api.auth.passwords import Hashing, PasswordRefusedError, new_password
 from service.store.access.audit_entries import Acting, Source, acting_as
 from service.store.access.identities import (
     Identity,
@@ -24,14 +25,13 @@ from service.store.access.identities import (
 from service.store.access.tables import AccessRefusedError
 from service.store.audit import AuditQuery
 
-T0 = 1_767_225_600_000_000_000
 S = 1_000_000_000
 PASSWORD = "rotor rope gauge"  # noqa: S105
 
 
-def test_an_account_is_kept_as_it_was_made(people, access):
-    people.add("Berta", Role.VIEWER, PASSWORD, T0)
-    people.add("anna", Role.ADMIN, PASSWORD, T0 + S)
+def test_an_account_is_kept_as_it_was_made(doors, access):
+    at(doors, T0).add("Berta", Role.VIEWER, PASSWORD)
+    at(doors, T0 + S).add("anna", Role.ADMIN, PASSWORD)
 
     found = access.accounts.all()
     assert [(one.name, one.role, one.created_ns) for one in found] == [
@@ -43,21 +43,21 @@ def test_an_account_is_kept_as_it_was_made(people, access):
     assert found[0].password_hash not in repr(found[0])
 
 
-def test_an_account_of_a_name_in_use_or_not_accepted_changes_nothing(people, access):
-    people.add("anna", Role.VIEWER, PASSWORD, T0)
+def test_an_account_of_a_name_in_use_or_not_accepted_changes_nothing(doors, access):
+    doors.add("anna", Role.VIEWER, PASSWORD)
     before = access.accounts.get("anna")
     with pytest.raises(AccessRefusedError, match="account anna already exists"):
-        people.add("ANNA", Role.ADMIN, PASSWORD, T0)
+        doors.add("ANNA", Role.ADMIN, PASSWORD)
     with pytest.raises(NameRefusedError):
-        people.add("=anna", Role.VIEWER, PASSWORD, T0)
+        doors.add("=anna", Role.VIEWER, PASSWORD)
     with pytest.raises(PasswordRefusedError):
-        people.add("berta", Role.VIEWER, "short", T0)
+        doors.add("berta", Role.VIEWER, "short")
     assert access.accounts.all() == [before]
 
 
-def test_neither_the_only_admin_nor_one_who_is_not_there_is_changed(people, access):
-    people.add("anna", Role.ADMIN, PASSWORD, T0)
-    people.add("berta", Role.ENGINEER, PASSWORD, T0)
+def test_neither_the_only_admin_nor_one_who_is_not_there_is_changed(doors, access):
+    doors.add("anna", Role.ADMIN, PASSWORD)
+    doors.add("berta", Role.ENGINEER, PASSWORD)
     told = access.audit.entries(AuditQuery())
     for change in (
         lambda: access.accounts.remove("anna", T0),
@@ -68,7 +68,7 @@ def test_neither_the_only_admin_nor_one_who_is_not_there_is_changed(people, acce
     for change in (
         lambda: access.accounts.remove("nobody", T0),
         lambda: access.accounts.set_role("nobody", Role.VIEWER, T0),
-        lambda: people.set_password("nobody", PASSWORD, T0),
+        lambda: doors.set_password("nobody", PASSWORD),
     ):
         with pytest.raises(AccessRefusedError, match="account nobody does not exist"):
             change()
@@ -79,8 +79,8 @@ def test_neither_the_only_admin_nor_one_who_is_not_there_is_changed(people, acce
     assert access.accounts.all() == []
 
 
-def test_of_two_admins_who_leave_at_once_one_stays(people, access):
-    people.add("viewer", Role.VIEWER, PASSWORD, T0)
+def test_of_two_admins_who_leave_at_once_one_stays(doors, access):
+    doors.add("viewer", Role.VIEWER, PASSWORD)
 
     def leave(name: str) -> bool:
         try:
@@ -92,102 +92,95 @@ def test_of_two_admins_who_leave_at_once_one_stays(people, access):
     for _ in range(5):
         for name in ("anna", "berta"):
             if access.accounts.get(name) is None:
-                people.add(name, Role.ADMIN, PASSWORD, T0)
+                doors.add(name, Role.ADMIN, PASSWORD)
         with ThreadPoolExecutor(2) as threads:
             assert sorted(threads.map(leave, ("anna", "berta"))) == [False, True]
 
 
-def test_the_set_up_token_makes_the_first_admin_and_nothing_more(people, access, doors):
-    token = people.offer_set_up(T0)
-    assert token is not None
+def test_the_set_up_token_makes_the_first_admin_and_nothing_more(doors, access):
+    token = doors.offer_set_up()
     with pytest.raises(PasswordRefusedError):  # that does not use the token up
-        people.set_up(token, "anna", "short", T0)
-    assert people.set_up(token, "anna", PASSWORD, T0)
-    assert not people.set_up(token, "berta", PASSWORD, T0)
-    found = doors.log_in("anna", PASSWORD, "::1", T0, 0)
-    assert isinstance(found, LoggedIn)
-    assert found.identity.role is Role.ADMIN
+        doors.set_up(token, "anna", "short")
+    assert doors.set_up(token, "anna", PASSWORD)
+    assert not doors.set_up(token, "berta", PASSWORD)
+    assert doors.log_in("anna", PASSWORD, "::1").identity.role is Role.ADMIN
     access.accounts.remove("anna", T0)
-    assert not people.set_up(token, "berta", PASSWORD, T0)
+    assert not doors.set_up(token, "berta", PASSWORD)
 
-    unused = people.offer_set_up(T0)
-    people.add("anna", Role.VIEWER, PASSWORD, T0)
-    assert unused is not None
-    assert not people.set_up(unused, "berta", PASSWORD, T0)
-    assert people.offer_set_up(T0) is None
+    unused = doors.offer_set_up()
+    doors.add("anna", Role.VIEWER, PASSWORD)
+    assert not doors.set_up(unused, "berta", PASSWORD)
+    assert doors.offer_set_up() is None
 
 
-def test_a_set_up_token_is_void_when_it_is_old_or_another_was_drawn(people):
-    first, second = people.offer_set_up(T0), people.offer_set_up(T0)
-    assert first is not None
-    assert second is not None
+def test_a_set_up_token_is_void_when_it_is_old_or_another_was_drawn(doors):
+    first, second = at(doors, T0).offer_set_up(), at(doors, T0).offer_set_up()
+    assert first
+    assert second
     late_ns = T0 + round(SET_UP_S * S)
-    assert not people.set_up(first, "anna", PASSWORD, T0)
-    assert not people.set_up(second, "anna", PASSWORD, late_ns)
-    assert not people.set_up("", "anna", PASSWORD, T0)
-    assert people.set_up(second, "anna", PASSWORD, late_ns - 1)
+    assert not at(doors, T0).set_up(first, "anna", PASSWORD)
+    assert not at(doors, late_ns).set_up(second, "anna", PASSWORD)
+    assert not at(doors, T0).set_up("", "anna", PASSWORD)
+    assert at(doors, late_ns - 1).set_up(second, "anna", PASSWORD)
 
 
-def test_of_many_who_set_up_at_once_one_is_admin(people, access):
-    token = people.offer_set_up(T0)
-    assert token is not None
+def test_of_many_who_set_up_at_once_one_is_admin(doors, access):
+    token = doors.offer_set_up()
     with ThreadPoolExecutor(8) as threads:
-        done = list(threads.map(lambda n: people.set_up(token, f"user{n}", PASSWORD, T0), range(8)))
+        done = list(threads.map(lambda n: doors.set_up(token, f"user{n}", PASSWORD), range(8)))
     assert (sum(done), len(access.accounts.all())) == (1, 1)
 
 
 def test_a_key_opens_as_what_it_was_made_for_until_its_day(access, doors):
-    key, shown = AccessService(access).create_key(
-        "Historian", Role.VIEWER, ("U1", "U2", "U1"), 30, T0
-    )
+    key, shown = at(doors, T0).create_key("Historian", Role.VIEWER, ("U1", "U2", "U1"), 30)
 
-    assert doors.machine(shown, T0 + S) == Identity(
+    assert at(doors, T0 + S).machine(shown) == Identity(
         "historian", Role.VIEWER, Means.KEY, ("U1", "U2")
     )
     end_ns = T0 + 30 * DAY_NS
-    assert isinstance(doors.machine(shown, end_ns - 1), Identity)
-    assert doors.machine(shown, end_ns) is None
+    assert isinstance(at(doors, end_ns - 1).machine(shown), Identity)
+    assert at(doors, end_ns).machine(shown) is None
     assert access.keys.get(key.id) != key  # its use is noted
     assert shown not in repr(access.keys.all())
 
 
 def test_a_key_with_a_wrong_end_opens_nothing_and_counts_as_unknown(access, doors):
-    key, shown = AccessService(access).create_key("historian", Role.VIEWER, (), 30, T0)
+    key, shown = doors.create_key("historian", Role.VIEWER, (), 30)
     other_id, other = new_key()
     forged = other.replace(other_id, key.id, 1)
     assert key_id(forged) == key_id(shown) == key.id
     for nothing in ("", "pw_", "pw__", shown + "\n", key.id, "pw_" + "0" * 12 + "_"):
         assert key_id(nothing) is None
     for wrong in (forged, shown[:-1], shown + "A", shown.upper(), f" {shown}", shown.swapcase()):
-        assert doors.machine(wrong, T0) is None
+        assert doors.machine(wrong) is None
     (stored,) = access.keys.all()
     assert stored.used_ns is None
 
 
 def test_the_last_use_of_a_key_is_written_once_a_minute(access, doors):
-    key, shown = AccessService(access).create_key("historian", Role.VIEWER, (), 30, T0)
+    key, shown = at(doors, T0).create_key("historian", Role.VIEWER, (), 30)
     seen = set()
     for second in range(150):
-        doors.machine(shown, T0 + second * S)
+        at(doors, T0 + second * S).machine(shown)
         stored = access.keys.get(key.id)
         assert stored is not None
         seen.add(stored.used_ns)
     assert seen == {T0, T0 + 60 * S, T0 + 120 * S}
 
 
-def test_no_key_is_made_for_ever_or_for_an_admin_of_one_unit(access):
+def test_no_key_is_made_for_ever_or_for_an_admin_of_one_unit(doors):
     for days in (0, 3651):
         with pytest.raises(AccessRefusedError, match="1 to 3650 days"):
-            AccessService(access).create_key("historian", Role.VIEWER, (), days, T0)
+            doors.create_key("historian", Role.VIEWER, (), days)
     with pytest.raises(AccessRefusedError, match="role admin"):
-        AccessService(access).create_key("historian", Role.ADMIN, ("U1",), 30, T0)
+        doors.create_key("historian", Role.ADMIN, ("U1",), 30)
 
 
 def test_a_revoked_key_opens_nothing_and_no_database_restores_it(access, doors, store_place):
-    key, shown = AccessService(access).create_key("historian", Role.VIEWER, (), 30, T0)
+    key, shown = at(doors, T0).create_key("historian", Role.VIEWER, (), 30)
     assert access.keys.revoke(key.id, T0 + S)
     assert not access.keys.revoke(key.id, T0 + 2 * S)
-    assert doors.machine(shown, T0 + S) is None
+    assert at(doors, T0 + S).machine(shown) is None
     (stored,) = access.keys.all()
     assert (stored.revoked_ns, stored.state(T0 + 99 * DAY_NS)) == (T0 + S, KeyState.REVOKED)
     for statement, words in (
@@ -201,17 +194,16 @@ def test_a_revoked_key_opens_nothing_and_no_database_restores_it(access, doors, 
             store_place.execute(statement)
 
 
-def test_every_change_is_in_the_audit_trail_with_what_was_before_and_nothing_secret(access, people):
+def test_every_change_is_in_the_audit_trail_with_what_was_before_and_nothing_secret(access, doors):
     accounts = access.accounts
-    token = people.offer_set_up(T0)
-    assert token is not None
+    token = at(doors, T0).offer_set_up()
     with acting_as(Acting(Source.COMMAND_LINE, "anna on host", "anna")):
-        people.set_up(token, "anna", PASSWORD, T0)
-        people.add("berta", Role.VIEWER, PASSWORD, T0 + 1)
+        at(doors, T0).set_up(token, "anna", PASSWORD)
+        at(doors, T0 + 1).add("berta", Role.VIEWER, PASSWORD)
         accounts.set_role("berta", Role.ENGINEER, T0 + 2)
-        people.set_password("berta", "another rope gauge", T0 + 3)
+        at(doors, T0 + 3).set_password("berta", "another rope gauge")
         accounts.remove("berta", T0 + 4)
-        key, shown = AccessService(access).create_key("historian", Role.VIEWER, ("U1",), 1, T0 + 5)
+        key, shown = at(doors, T0 + 5).create_key("historian", Role.VIEWER, ("U1",), 1)
         access.keys.revoke(key.id, T0 + 6)
         access.keys.revoke(key.id, T0 + 7)  # changes nothing
 
@@ -239,7 +231,7 @@ def test_every_change_is_in_the_audit_trail_with_what_was_before_and_nothing_sec
 
 
 def test_what_is_in_force_is_the_second_recommendation_of_rfc_9106():
-    found = extract_parameters(plant_hasher().hash(PASSWORD))
+    found = extract_parameters(Hashing().hash(PASSWORD))
     assert (found.type, found.version) == (Type.ID, 19)
     assert (found.time_cost, found.memory_cost, found.parallelism) == (3, 65_536, 4)
     assert (found.salt_len, found.hash_len) == (16, 32)

@@ -17,7 +17,7 @@ from core.alarms.life_cycle import update
 from core.alarms.operation import Acknowledge, operate
 from core.change.film_judge import alarm_condition
 from core.limits import NEVER_JUDGED
-from service.api.auth.service import AccessService
+from service.api.auth.authenticator import Authenticator
 from service.store.access.identities import Role
 
 ALARM = "U1:UJB:film_stiffness"
@@ -152,8 +152,8 @@ async def require_a_bundle_of_everything(service: Any) -> None:
 
 
 async def require_that_a_key_of_one_unit_gets_nothing_of_the_others(service: Any) -> None:
-    now_ns = service.clock.now_ns()
-    _, key = AccessService(service.access).create_key("historian", Role.VIEWER, ["U1"], 1, now_ns)
+    create_key = Authenticator(service.access, service.clock).create_key
+    _, key = create_key("historian", Role.VIEWER, ["U1"], 1)
     headers = {"Authorization": f"Bearer {key}"}
     answer = await service.client.get(f"{PATH}/1/bundle.zip", headers=headers)
 
