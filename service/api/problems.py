@@ -1,14 +1,14 @@
 """Error answers of the API: problem documents (RFC 9457)."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import structlog
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from starlette.exceptions import HTTPException
 
 from core.alarms.operation import ActionRefusedError
@@ -21,6 +21,7 @@ from service.live.commands import (
     ReferenceRefusedError,
 )
 from service.recordings.motion import NoMotionError
+from service.runtime.models import ValueModel
 from service.store.access.identities import NameRefusedError
 from service.store.access.tables import AccessRefusedError, UnknownAccountError
 from service.store.port import QueryTooLargeError, StoreError
@@ -80,10 +81,8 @@ REFUSALS: Mapping[type[Exception], tuple[int, str, str | None]] = {
 log = structlog.get_logger()
 
 
-class Mistake(BaseModel):
+class Mistake(ValueModel):
     """Description of a wrong parameter of a request."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     parameter: str = Field(description="Name of the parameter.", examples=["max_points"])
     detail: str = Field(
@@ -92,10 +91,8 @@ class Mistake(BaseModel):
     )
 
 
-class Problem(BaseModel):
+class Problem(ValueModel):
     """Problem document (RFC 9457)."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     type: str = Field(
         default="about:blank",
@@ -122,6 +119,8 @@ class ProblemError(Exception):
         Name of the wrong parameter; None if no single parameter is wrong.
     headers
         Additional headers of the answer.
+    errors
+        Wrong parameters, if there may be several.
     """
 
     def __init__(
@@ -131,10 +130,11 @@ class ProblemError(Exception):
         detail: str,
         parameter: str | None = None,
         headers: Mapping[str, str] | None = None,
+        errors: Iterable[Mistake] = (),
     ) -> None:
         super().__init__(detail)
         self.status, self.title, self.detail, self.headers = status, title, detail, headers
-        self.errors = [Mistake(parameter=parameter, detail=detail)] if parameter else []
+        self.errors = [Mistake(parameter=parameter, detail=detail)] if parameter else [*errors]
 
 
 def _documented(words: str) -> dict[str, Any]:
@@ -187,125 +187,91 @@ def problem_schemas() -> dict[str, Any]:
 
 
 def install_problem_handlers(app: FastAPI) -> None:
-    """Install exception handlers that render all errors as problem documents."""
+    """Install an exception handler that renders all errors as problem documents.
 
-    @app.exception_handler(ProblemError)
-    async def _problem(request: Request, error: ProblemError) -> Response:
-        return problem_answer(request, error)
+    The server logs the traceback of an unknown error, which is answered with status 500.
+    """
 
-    @app.exception_handler(HTTPException)
-    async def _http(request: Request, error: HTTPException) -> Response:
-        if error.status_code == 405 and (methods := _methods(request)):
-            return _not_allowed(request, methods)
-        text = str(error.detail)
-        title, detail = OF_FASTAPI.get(error.status_code, (text, text))
-        return _render(request, error.status_code, title, detail, headers=error.headers)
+    async def answer(request: Request, error: Exception) -> Response:
+        return problem_answer(request, _problem_of(request, error))
 
-    @app.exception_handler(RequestValidationError)
-    async def _validation(request: Request, error: RequestValidationError) -> Response:
-        if (methods := _methods(request)) and request.method not in methods:
-            return _not_allowed(request, methods)
-        found = error.errors()
-        mistakes = [
-            Mistake(
-                parameter=".".join(str(p) for p in e["loc"][1:]),
-                detail=OF_PYDANTIC.get(e["type"], str(e["msg"]).removeprefix("Value error, ")),
-            )
-            for e in found[:MAX_MISTAKES]
-        ]
-        detail = "; ".join(f"{mistake.parameter}: {mistake.detail}" for mistake in mistakes)
-        if len(found) > MAX_MISTAKES:
-            detail += f"; and {len(found) - MAX_MISTAKES} more"
-        return _render(request, 422, "Wrong parameter", detail, mistakes)
+    expected = (ProblemError, HTTPException, RequestValidationError, StoreError, CommandFailedError)
+    for kind in (*expected, QueryTooLargeError, *REFUSALS, Exception):
+        app.add_exception_handler(kind, answer)
 
-    @app.exception_handler(QueryTooLargeError)
-    async def _too_large(request: Request, error: QueryTooLargeError) -> Response:
-        mistakes = [Mistake(parameter=name, detail=str(error)) for name in ("start", "end")]
-        return _render(request, 422, "Range too large", str(error), mistakes)
 
-    @app.exception_handler(StoreError)
-    async def _store(request: Request, error: StoreError) -> Response:
-        log.error("database query failed", path=request.url.path, reason=str(error))
-        return _render(request, 503, "Store not available", STORE_FAILS)
+def _problem_of(request: Request, error: Exception) -> ProblemError:
+    """Return the problem with which an error is answered."""
+    if isinstance(error, HTTPException | RequestValidationError):
+        methods = allowed_methods(request.app.declared.values(), request.scope["path"])
+        if methods and request.method not in methods:
+            detail = f"method {request.method} is not allowed; use {' or '.join(methods)}"
+            allow = {"Allow": ", ".join(methods)}
+            return ProblemError(405, "Method not allowed", detail, headers=allow)
+    match error:
+        case ProblemError():
+            return error
+        case HTTPException(status_code=status, detail=text, headers=headers):
+            return ProblemError(status, *OF_FASTAPI.get(status, (text, text)), headers=headers)
+        case RequestValidationError():
+            return _wrong_parameters(error)
+        case QueryTooLargeError():
+            both = [Mistake(parameter=name, detail=str(error)) for name in ("start", "end")]
+            return ProblemError(422, "Range too large", str(error), errors=both)
+        case StoreError():
+            log.error("database query failed", path=request.url.path, reason=str(error))
+            return ProblemError(503, "Store not available", STORE_FAILS)
+        case CommandFailedError():
+            return ProblemError(503, error.title, str(error))
+    for kind, (status, title, parameter) in REFUSALS.items():
+        if isinstance(error, kind):
+            return ProblemError(status, title, str(error), parameter)
+    detail = "padwatch has failed; see the log of the service"
+    return ProblemError(500, "Internal error", detail)
 
-    async def _refused(request: Request, error: Exception) -> Response:
-        kinds = (kind for kind in REFUSALS if isinstance(error, kind))
-        status, title, parameter = REFUSALS[next(kinds)]
-        mistakes = [Mistake(parameter=parameter, detail=str(error))] if parameter else []
-        return _render(request, status, title, str(error), mistakes)
 
-    for kind in REFUSALS:
-        app.add_exception_handler(kind, _refused)
-
-    @app.exception_handler(CommandFailedError)
-    async def _not_carried_out(request: Request, error: CommandFailedError) -> Response:
-        return _render(request, 503, error.title, str(error))
-
-    @app.exception_handler(Exception)
-    async def _bug(request: Request, _: Exception) -> Response:
-        """Return a problem of status 500 without details; the server logs the traceback."""
-        return _render(
-            request, 500, "Internal error", "padwatch has failed; see the log of the service"
+def _wrong_parameters(error: RequestValidationError) -> ProblemError:
+    found = error.errors()
+    mistakes = [
+        Mistake(
+            parameter=".".join(str(p) for p in e["loc"][1:]),
+            detail=OF_PYDANTIC.get(e["type"], str(e["msg"]).removeprefix("Value error, ")),
         )
+        for e in found[:MAX_MISTAKES]
+    ]
+    detail = "; ".join(f"{mistake.parameter}: {mistake.detail}" for mistake in mistakes)
+    if len(found) > MAX_MISTAKES:
+        detail += f"; and {len(found) - MAX_MISTAKES} more"
+    return ProblemError(422, "Wrong parameter", detail, errors=mistakes)
 
 
 def problem_answer(request: Request, error: ProblemError) -> Response:
-    """Return the response to a request with the problem document of an error."""
-    words = (error.status, error.title, error.detail)
-    return _render(request, *words, error.errors, error.headers)
+    """Return the response to a request with the problem document of an error.
+
+    Texts are truncated so that the document stays within `MAX_BYTES`.
+    """
+    request.scope.setdefault("state", {})[DETAIL] = error.detail  # for the audit entry of a refusal
+    n_characters = 16 * MAX_BYTES  # as good as unlimited
+    while len(body := _document(error, request.scope["path"], n_characters)) > MAX_BYTES:
+        n_characters = min(n_characters, MAX_BYTES) // 2
+    return Response(body, error.status, error.headers, media_type=MEDIA_TYPE)
 
 
-def _methods(request: Request) -> list[str]:
-    return allowed_methods(request.app.declared.values(), request.scope["path"])
-
-
-def _not_allowed(request: Request, methods: Sequence[str]) -> Response:
-    detail = f"method {request.method} is not allowed; use {' or '.join(methods)}"
-    allow = {"Allow": ", ".join(methods)}
-    return _render(request, 405, "Method not allowed", detail, headers=allow)
-
-
-def _render(
-    request: Request,
-    status: int,
-    title: str,
-    detail: str,
-    errors: Sequence[Mistake] = (),
-    headers: Mapping[str, str] | None = None,
-) -> Response:
-    request.scope.setdefault("state", {})[DETAIL] = detail  # for the audit entry of a refusal
+def _document(error: ProblemError, path: str, n_characters: int) -> bytes:
+    """Return a problem document as JSON, with texts of at most `n_characters` or a part of it."""
     problem = Problem(
-        title=title,
-        status=status,
-        detail=detail,
-        instance=request.scope["path"],
-        errors=list(errors),
+        title=_cut(error.title, n_characters // 4),
+        status=error.status,
+        detail=_cut(error.detail, n_characters),
+        instance=_cut(path, n_characters // 4),
+        errors=[
+            Mistake(
+                parameter=_cut(mistake.parameter, n_characters // 16),
+                detail=_cut(mistake.detail, n_characters // 8),
+            )
+            for mistake in error.errors
+        ],
     )
-    return Response(_bounded(problem), status, headers, media_type=MEDIA_TYPE)
-
-
-def _bounded(problem: Problem) -> bytes:
-    """Return a problem document as JSON, with texts truncated to stay within `MAX_BYTES`."""
-    n_characters = MAX_BYTES // 2
-    while len(document := _json(problem)) > MAX_BYTES:
-        problem = Problem(
-            title=_cut(problem.title, n_characters // 4),
-            status=problem.status,
-            detail=_cut(problem.detail, n_characters),
-            instance=_cut(problem.instance, n_characters // 4),
-            errors=[
-                Mistake(
-                    parameter=_cut(mistake.parameter, n_characters // 16),
-                    detail=_cut(mistake.detail, n_characters // 8),
-                )
-                for mistake in problem.errors[:MAX_MISTAKES]
-            ],
-        )
-        n_characters //= 2
-    return document
-
-
-def _json(problem: Problem) -> bytes:
     return json.dumps(problem.model_dump(), ensure_ascii=False).encode("utf-8", "replace")
 
 
