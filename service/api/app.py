@@ -97,37 +97,11 @@ NOT_MODIFIED = {
 }
 
 
-def describe_answers(document: dict[str, Any]) -> None:
-    """Add schemas of problems, headers and entity tags to an OpenAPI document, in place."""
-    document.setdefault("components", {}).setdefault("schemas", {}).update(problem_schemas())
-    for path, methods in document["paths"].items():
-        for method, operation in methods.items():
-            if path.startswith("/api/"):
-                _add_headers(operation)
-            if method == "get" and path.startswith("/api/"):
-                _add_tags(operation)
-
-
 def operation_id(route: APIRoute) -> str:
     """Return the operation id of a route, such as ``get_units_unit_bearings``."""
     path = route.path_format.removeprefix("/api/v1/").strip("/")
     [method] = route.methods or {""}
     return f"{method.lower()}_{path.translate(str.maketrans('/-.', '___', '{}'))}"
-
-
-def _add_headers(operation: dict[str, Any]) -> None:
-    for status, answer in operation["responses"].items():
-        common = HEADERS if status.startswith("2") else PROBLEM_HEADERS.get(status, {})
-        if common:
-            answer["headers"] = {**common, **answer.get("headers", {})}
-
-
-def _add_tags(operation: dict[str, Any]) -> None:
-    answer = operation["responses"]["200"]
-    if JSON in answer.get("content", {}):
-        operation.setdefault("parameters", []).append(IF_NONE_MATCH)
-        operation["responses"]["304"] = NOT_MODIFIED
-        answer["headers"] = {"ETag": ETAG, **answer["headers"]}
 
 
 SCHEMES = {
@@ -148,22 +122,37 @@ NEEDED = "x-padwatch-needs"
 """OpenAPI extension with the permission that an operation requires; null if it is open."""
 
 
-def describe_access(document: dict[str, Any], operations: Mapping[str, Declared]) -> None:
-    """Add security schemes, required permissions and refusals to an OpenAPI document, in place.
+def describe(document: dict[str, Any], operations: Mapping[str, Declared]) -> None:
+    """Complete an OpenAPI document in place: access, problems, headers and entity tags.
 
     `operations` are the operations of the application by name (method and path template).
     """
-    document.setdefault("components", {})["securitySchemes"] = SCHEMES
+    components = document.setdefault("components", {})
+    components["securitySchemes"] = SCHEMES
+    components.setdefault("schemas", {}).update(problem_schemas())
     for path, methods in document["paths"].items():
         for method, operation in methods.items():
-            one = operations[f"{method.upper()} {path}"]
+            one, answers = operations[f"{method.upper()} {path}"], operation["responses"]
             operation[NEEDED] = one.needs.permission
             operation["security"] = [] if one.is_open else [{"session": []}, {"key": []}]
             statuses = () if one.is_open else (401, 403, 503)
-            responses = operation["responses"]
             for status in (*statuses, *((404,) if "{unit}" in path else ())):
                 words = {"description": WORDS[status]}
-                responses.setdefault(str(status), {**responses["default"], **words})
+                answers.setdefault(str(status), {**answers["default"], **words})
+            if path.startswith("/api/"):
+                _add_headers(operation, is_tagged=method == "get")
+
+
+def _add_headers(operation: dict[str, Any], is_tagged: bool) -> None:
+    answers = operation["responses"]
+    for status, answer in answers.items():
+        common = HEADERS if status.startswith("2") else PROBLEM_HEADERS.get(status, {})
+        if common:
+            answer["headers"] = {**common, **answer.get("headers", {})}
+    if is_tagged and JSON in answers["200"].get("content", {}):
+        operation.setdefault("parameters", []).append(IF_NONE_MATCH)
+        answers["304"] = NOT_MODIFIED
+        answers["200"]["headers"] = {"ETag": ETAG, **answers["200"]["headers"]}
 
 
 Repeating = Callable[[ASGIApp, Iterable[tuple[str, str]]], ASGIApp]
@@ -201,8 +190,7 @@ class GuardedApi(FastAPI):
         with self._describing:
             if self.openapi_schema is None:
                 document: dict[str, Any] = super().openapi()
-                describe_access(document, self.declared)
-                describe_answers(document)
+                describe(document, self.declared)
             return self.openapi_schema or {}
 
     async def _published(self, request: Request) -> Response:

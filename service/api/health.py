@@ -1,7 +1,6 @@
 """Routes for liveness, readiness and metrics of the service, and the metrics of requests."""
 
 import time
-from collections.abc import Callable
 from typing import Literal
 
 from fastapi import APIRouter, Response
@@ -46,17 +45,12 @@ class RequestMetrics:
 class TimedRequests:
     """ASGI middleware that measures the duration of each answered request."""
 
-    def __init__(
-        self,
-        app: ASGIApp,
-        metrics: RequestMetrics,
-        now_s: Callable[[], float] = time.perf_counter,
-    ) -> None:
-        self._app, self._metrics, self._now_s = app, metrics, now_s
+    def __init__(self, app: ASGIApp, metrics: RequestMetrics) -> None:
+        self._app, self._metrics = app, metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request and measure the time until its answer was sent."""
-        began_s, status = self._now_s(), 0
+        began_s, status = time.perf_counter(), 0
 
         async def noting(message: Message) -> None:
             nonlocal status
@@ -66,7 +60,7 @@ class TimedRequests:
         await self._app(scope, receive, noting)
         if status:
             route = getattr(scope.get("route"), "path", NO_ROUTE)
-            self._metrics.observe(route, status, self._now_s() - began_s)
+            self._metrics.observe(route, status, time.perf_counter() - began_s)
 
 
 class HealthModel(ApiModel):

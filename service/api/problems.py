@@ -154,7 +154,7 @@ def problem_responses(
 ) -> dict[int | str, dict[str, Any]]:
     """Return OpenAPI entries for the problems that an operation may return, by status.
 
-    `describe_access` adds 401, 403, 503, and 404 below a unit; `EVERY_OPERATION` has 422.
+    `describe` adds 401, 403, 503, and 404 below a unit; `EVERY_OPERATION` has 422.
     `statuses` are described by `WORDS`; `own` has further statuses with their descriptions.
     """
     words = {status: WORDS[status] for status in statuses} | dict(own or {})
