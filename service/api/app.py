@@ -22,8 +22,7 @@ from service.api.answers import (
 )
 from service.api.auth.accounts import account_router, key_router
 from service.api.auth.credentials import COOKIE
-from service.api.auth.declared import Declared, declared
-from service.api.auth.gate import Gate, require_declared
+from service.api.auth.gate import Declared, Gate, declared, require_declared
 from service.api.auth.sessions import session_router
 from service.api.context import Context
 from service.api.health import RequestMetrics, TimedRequests, health_router
@@ -230,7 +229,7 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
     # the last one runs first
     app.add_middleware(Unrouted, answers=context.answers)
     app.add_middleware(AnswerHeaders, clock=context.clock)
-    app.add_middleware(Gate, declared=lambda: app.declared, authenticator=authenticator)
+    app.add_middleware(Gate, authenticator=authenticator)
     app.add_middleware(TimedRequests, metrics=requests)
     install_problem_handlers(app)
     for router in (

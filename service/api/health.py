@@ -9,7 +9,7 @@ from prometheus_client.exposition import generate_latest
 from prometheus_client.process_collector import ProcessCollector
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.auth.declared import OPEN, needs
+from service.api.auth.gate import OPEN, needs
 from service.api.context import Context
 from service.api.values import ApiModel
 from service.runtime.metrics import TEXT

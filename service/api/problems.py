@@ -12,7 +12,6 @@ from pydantic import Field
 from starlette.exceptions import HTTPException
 
 from core.alarms.operation import ActionRefusedError
-from service.api.auth.declared import allowed_methods
 from service.api.auth.passwords import PasswordRefusedError
 from service.live.commands import (
     BaselineRefusedError,
@@ -203,7 +202,7 @@ def install_problem_handlers(app: FastAPI) -> None:
 def _problem_of(request: Request, error: Exception) -> ProblemError:
     """Return the problem with which an error is answered."""
     if isinstance(error, HTTPException | RequestValidationError):
-        methods = allowed_methods(request.app.declared.values(), request.scope["path"])
+        methods = _allowed_methods(request)
         if methods and request.method not in methods:
             detail = f"method {request.method} is not allowed; use {' or '.join(methods)}"
             allow = {"Allow": ", ".join(methods)}
@@ -228,6 +227,18 @@ def _problem_of(request: Request, error: Exception) -> ProblemError:
             return ProblemError(status, title, str(error), parameter)
     detail = "padwatch has failed; see the log of the service"
     return ProblemError(500, "Internal error", detail)
+
+
+def _allowed_methods(request: Request) -> list[str]:
+    """Return the allowed HTTP methods of a path; an empty list for an unknown path.
+
+    If several path templates match, such as `/x/{version}` and `/x/freeze`, the template with
+    the fewest parameters applies.
+    """
+    path, operations = request.scope["path"], request.app.declared.values()
+    fitting = [operation for operation in operations if operation.matches(path)]
+    n_parameters = min((operation.path.count("{") for operation in fitting), default=0)
+    return sorted({each.method for each in fitting if each.path.count("{") == n_parameters})
 
 
 def _wrong_parameters(error: RequestValidationError) -> ProblemError:

@@ -12,8 +12,7 @@ from fastapi.responses import HTMLResponse, StreamingResponse
 from pydantic import Field
 
 from acquisition.clock import Clock
-from service.api.auth.declared import needs
-from service.api.auth.gate import identity_of
+from service.api.auth.gate import identity_of, needs
 from service.api.context import Context
 from service.api.downloads import Downloads, attachment, file_content
 from service.api.problems import ProblemError, problem_responses

@@ -6,8 +6,7 @@ from fastapi import APIRouter, Depends, Path, Request
 from pydantic import FailFast, Field
 
 from service.api.auth.authenticator import Authenticator
-from service.api.auth.declared import Reach, subject_router
-from service.api.auth.gate import identity_of, name_caller
+from service.api.auth.gate import Reach, identity_of, name_caller, subject_router
 from service.api.auth.passwords import MAX_LENGTH
 from service.api.context import Context
 from service.api.problems import ProblemError, problem_responses

@@ -1,17 +1,141 @@
-"""Authentication of callers by middleware, and check of the permission for each route."""
+"""Requirements of the routes, authentication of callers by middleware, and permission checks.
 
-from collections.abc import Callable, Mapping
+A route that declares no requirements is an error.
+"""
 
-from fastapi import Request
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from typing import Any
+
+from fastapi import APIRouter, Depends, FastAPI, Request
+from fastapi.dependencies.models import Dependant
+from fastapi.routing import APIRoute, iter_route_contexts
+from starlette.routing import BaseRoute, Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.auth.authenticator import BEARER_ONLY, Authenticator
 from service.api.auth.credentials import CALLER, Caller, is_foreign
-from service.api.auth.declared import Declared, Reach
 from service.api.problems import DETAIL, STORE_FAILS, ProblemError, problem_answer
 from service.store.access.audit_entries import Acting, Source, acting, acting_as, name_actor
-from service.store.access.identities import LOCAL, Identity, Means
+from service.store.access.identities import LOCAL, Identity, Means, Permission
 from service.store.port import StoreError
+
+
+class Reach(StrEnum):
+    """Units that a route concerns, if the path of the route contains no unit."""
+
+    PLANT = "plant"
+    """All units; an API key that is limited to some units is refused."""
+
+    NO_UNIT = "no_unit"
+    """No unit; an API key that is limited to some units can only read."""
+
+    ASKED = "asked"
+    """Unit of the query parameter ``unit``; all units if the parameter is absent."""
+
+
+@dataclass(frozen=True)
+class Needs:
+    """Requirements of a route: permission, and units for which the permission must be valid.
+
+    `permission` is None for an open route, which requires no login. `reach` are the units that the
+    route concerns if its path contains no unit; by default all.
+    """
+
+    permission: Permission | None
+    reach: Reach = Reach.PLANT
+
+    async def __call__(self) -> None:
+        """Do nothing as a dependency; `require_declared` checks the permission."""
+
+
+def needs(permission: Permission, reach: Reach = Reach.PLANT) -> Any:
+    """Return a FastAPI dependency that declares the requirements of a route or router."""
+    return Depends(Needs(permission, reach))
+
+
+OPEN: Any = Depends(Needs(None, Reach.NO_UNIT))
+"""Dependency that declares an open route, which requires no login."""
+
+
+def subject_router(
+    path: str, tag: str, permission: Permission = Permission.READ, reach: Reach = Reach.PLANT
+) -> APIRouter:
+    """Return a router for paths below ``/api/v1`` that require a permission by default.
+
+    `path` is the common start of the paths, `tag` their group in the OpenAPI document, and `reach`
+    the units that a route concerns if its path contains no unit.
+    """
+    return APIRouter(prefix=f"/api/v1{path}", tags=[tag], dependencies=[needs(permission, reach)])
+
+
+class UndeclaredRouteError(Exception):
+    """Raised if a route declares neither permission nor `OPEN`, or if an operation occurs twice."""
+
+
+@dataclass(frozen=True)
+class Declared:
+    """Operation of the API: HTTP method, path template, route and required permission."""
+
+    method: str
+    path: str
+    route: BaseRoute
+    needs: Needs
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the operation requires no permission."""
+        return self.needs.permission is None
+
+    @cached_property
+    def query_parameters(self) -> Sequence[str]:
+        """Names of the query parameters of the operation, including those of its dependencies."""
+        if not isinstance(self.route, APIRoute):
+            return ()
+        return tuple(dict.fromkeys(_query_names(self.route.dependant)))
+
+    def matches(self, path: str) -> bool:
+        """Whether a path matches the path template of the operation, for any HTTP method."""
+        return isinstance(self.route, Route) and self.route.path_regex.match(path) is not None
+
+
+def declared(app: FastAPI) -> Mapping[str, Declared]:
+    """Return the operations of an application, by name (method and path template).
+
+    The declaration of a route overrides the declaration of its router.
+
+    Raises `UndeclaredRouteError` if a route has no declaration, or an operation occurs twice.
+    """
+    found: dict[str, Declared] = {}
+    for context in iter_route_contexts(app.routes):
+        route, path = context.original_route, str(context.path)
+        for method in sorted(context.methods or ()) or ("?",):
+            operation = f"{method} {path}"
+            if operation in found:
+                raise UndeclaredRouteError(f"{operation}: the operation occurs twice; remove one")
+            found[operation] = Declared(method, path, route, _needs_of(app, operation, context))
+    return found
+
+
+def _needs_of(app: FastAPI, operation: str, context: Any) -> Needs:
+    if isinstance(context.original_route, APIRoute):
+        found = [each.dependency for each in context.dependencies]
+        if declarations := [each for each in found if isinstance(each, Needs)]:
+            return declarations[-1]
+    elif isinstance(context.original_route, Route) and context.path == app.openapi_url:
+        return Needs(None, Reach.NO_UNIT)
+    raise UndeclaredRouteError(f"{operation}: route without declaration; add needs(...) or OPEN")
+
+
+def _query_names(dependant: Dependant) -> Iterator[str]:
+    """Yield the names of the query parameters of an operation and of its dependencies."""
+    for field in dependant.query_params:
+        yield field.alias
+    for inner in dependant.dependencies:
+        yield from _query_names(inner)
+
 
 SAFE = ("GET", "HEAD", "OPTIONS")
 """Safe HTTP methods, which change no state."""
@@ -26,12 +150,6 @@ def not_logged_in() -> ProblemError:
     return ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
 
 
-def not_this_unit() -> ProblemError:
-    """Return the error with status 403 for an API key that is not valid for the requested unit."""
-    detail = "this key is limited to some units; request one of them"
-    return ProblemError(403, "Not allowed", detail)
-
-
 CHANGE_PASSWORD = "POST /api/v1/session/password"  # noqa: S105  an operation
 
 
@@ -39,16 +157,10 @@ class Gate:
     """ASGI middleware that authenticates callers, and protects routes that are not open.
 
     It adds the client address to audit entries, and records refused changes in the audit trail.
-    `declared` returns the operations of the application, with their requirements, by name.
     """
 
-    def __init__(
-        self,
-        app: ASGIApp,
-        declared: Callable[[], Mapping[str, Declared]],
-        authenticator: Authenticator,
-    ) -> None:
-        self._app, self._declared, self._desk = app, declared, authenticator
+    def __init__(self, app: ASGIApp, authenticator: Authenticator) -> None:
+        self._app, self._desk = app, authenticator
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request with its caller in the state; answer 401, 403 or 503 if refused."""
@@ -77,26 +189,18 @@ class Gate:
         except StoreError as error:
             raise ProblemError(503, "Store not available", STORE_FAILS) from error
         scope["state"][CALLER] = caller
-        if caller.identity is None and not self._is_open(scope):
+        if caller.identity is None and not any(
+            each.is_open and each.method == scope["method"] and each.matches(scope["path"])
+            for each in scope["app"].declared.values()
+        ):
             raise not_logged_in()
-        _require_own_page(scope, caller)
+        means = caller.shown.means
+        may_be_forged = scope["method"] not in SAFE and means is not Means.KEY
+        if may_be_forged and is_foreign(scope, requires_origin=means is not None):
+            detail = "requests from pages of other sites are rejected"
+            raise ProblemError(403, "Cross-site request", detail)
         if caller.identity is not None and caller.identity.is_proven:
             name_actor(caller.identity.actor)
-
-    def _is_open(self, scope: Scope) -> bool:
-        return any(
-            each.is_open and each.method == scope["method"] and each.matches(scope["path"])
-            for each in self._declared().values()
-        )
-
-
-def _require_own_page(scope: Scope, caller: Caller) -> None:
-    """Raise a problem of status 403 if a page of another origin requests a change."""
-    if scope["method"] in SAFE or caller.shown.means is Means.KEY:
-        return
-    if is_foreign(scope, requires_origin=caller.shown.means is not None):
-        detail = "requests from pages of other sites are rejected"
-        raise ProblemError(403, "Cross-site request", detail)
 
 
 def caller_of(request: Request) -> Caller:
@@ -115,9 +219,7 @@ async def require_declared(request: Request) -> None:
     needed = request.app.declared[operation].needs
     if needed.permission is None:
         return
-    identity = caller_of(request).identity
-    if identity is None:
-        raise not_logged_in()
+    identity = identity_of(request)
     if identity.must_change_password and operation != CHANGE_PASSWORD:
         detail = "an administrator set your password; change it before other requests"
         raise ProblemError(403, "Password change required", detail)
@@ -125,14 +227,16 @@ async def require_declared(request: Request) -> None:
         if identity.is_proven:
             raise ProblemError(403, "Not allowed", "your role does not permit this request")
         raise not_logged_in()
-    unit = _unit_of(request.path_params)
+    unit = request.path_params.get("unit")
+    if unit is None and "alarm" in request.path_params:
+        unit = request.path_params["alarm"].partition(":")[0]
     if needed.reach is Reach.ASKED:
         units = request.query_params.getlist("unit")
         unit = units[0] if len(units) == 1 else None
-    if unit is None and needed.reach is not Reach.NO_UNIT and identity.units:
-        raise not_this_unit()
-    if not identity.may(needed.permission, unit):
-        raise not_this_unit()
+    is_plant = unit is None and needed.reach is not Reach.NO_UNIT
+    if (is_plant and identity.units) or not identity.may(needed.permission, unit):
+        detail = "this key is limited to some units; request one of them"
+        raise ProblemError(403, "Not allowed", detail)
 
 
 def identity_of(request: Request) -> Identity:
@@ -141,15 +245,6 @@ def identity_of(request: Request) -> Identity:
     if identity is None:
         raise not_logged_in()
     return identity
-
-
-def _unit_of(parameters: Mapping[str, str]) -> str | None:
-    """Return the unit in the path, or in an alarm identifier in the path; None without a unit."""
-    if "unit" in parameters:
-        return parameters["unit"]
-    if "alarm" in parameters:
-        return parameters["alarm"].partition(":")[0]
-    return None
 
 
 def actor_or(given: str | None) -> str:

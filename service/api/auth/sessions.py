@@ -8,8 +8,7 @@ from pydantic import Field
 from service.api.auth.accounts import LoginName, Password, RoleName
 from service.api.auth.authenticator import Authenticator, LoggedIn, tidy_name
 from service.api.auth.credentials import COOKIE, PLAIN_COOKIE, Caller
-from service.api.auth.declared import OPEN, Reach, needs
-from service.api.auth.gate import caller_of, identity_of
+from service.api.auth.gate import OPEN, Reach, caller_of, identity_of, needs
 from service.api.auth.passwords import PasswordRefusedError
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel

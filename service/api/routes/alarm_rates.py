@@ -12,7 +12,7 @@ from core.alarms.alarm import PLANT, AlarmEvent
 from core.alarms.statistics import ChatterRule, figures_of, stale_alarms
 from core.limits import AlarmLevel
 from core.units import DAY_NS
-from service.api.auth.declared import Reach, subject_router
+from service.api.auth.gate import Reach, subject_router
 from service.api.context import Context
 from service.api.parameters import Moment, OnlyUnit, ns_from_datetime, require_order, time_query
 from service.api.problems import ProblemError, problem_responses

@@ -12,8 +12,7 @@ from core.limits import AlarmLevel
 from core.units import ns_from_s
 from service.api.answers import in_thread, rendered
 from service.api.auth.backoff import TokenBucket
-from service.api.auth.declared import Reach, needs, subject_router
-from service.api.auth.gate import actor_or, identity_of
+from service.api.auth.gate import Reach, actor_or, identity_of, needs, subject_router
 from service.api.context import Context
 from service.api.parameters import (
     Attitude,

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Query, Response
 from pydantic import Field
 
 from service.api.answers import in_thread, rendered
-from service.api.auth.declared import subject_router
+from service.api.auth.gate import subject_router
 from service.api.context import Context
 from service.api.parameters import OptionalTimeRange, at_most, only
 from service.api.tables import Column, Format, table_content, table_response

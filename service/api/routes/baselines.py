@@ -11,8 +11,7 @@ from core.baseline.cell_table import CellStatistics
 from core.baseline.history import absolute_and_ratio
 from core.condition.cells import CellGrid
 from service.api.answers import in_thread, rendered
-from service.api.auth.declared import subject_router
-from service.api.auth.gate import actor_or
+from service.api.auth.gate import actor_or, subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.downloads import file_content
 from service.api.parameters import ns_from_datetime

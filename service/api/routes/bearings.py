@@ -12,7 +12,7 @@ from core.monitor.catalogue import quantity_named, quantity_of
 from core.spectra.runout import RunoutVerdict
 from core.spectra.speed import SpeedSource
 from core.stiffness.estimators import ESTIMATORS, reported_name
-from service.api.auth.declared import subject_router
+from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, QuantityName, UnitId
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import (

@@ -12,7 +12,7 @@ from core.arrays import SampleArray
 from core.quality import Level, Quality, Reason, bad, missing, worst
 from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
-from service.api.auth.declared import subject_router
+from service.api.auth.gate import subject_router
 from service.api.context import Context, UnitId
 from service.api.parameters import duration, several
 from service.api.problems import ProblemError, problem_responses

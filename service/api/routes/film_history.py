@@ -14,7 +14,7 @@ from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel
 from core.machine.unit import Estimator
 from service.api.answers import in_thread
-from service.api.auth.declared import subject_router
+from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange, at_most
 from service.api.problems import problem_responses

@@ -15,7 +15,7 @@ from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading
 from core.change.settings import ChangeLimits, FilmRules, percent_of
 from core.limits import AlarmLevel
-from service.api.auth.declared import subject_router
+from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import ProblemError
 from service.api.routes.film_models import (

@@ -12,7 +12,7 @@ from core.arrays import FloatArray
 from core.machine.unit import Bearing
 from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
-from service.api.auth.declared import subject_router
+from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import duration
 from service.api.problems import ProblemError, problem_responses

@@ -6,8 +6,7 @@ from fastapi import APIRouter, Request
 from pydantic import Field
 
 from service.api.answers import in_thread
-from service.api.auth.declared import needs, subject_router
-from service.api.auth.gate import actor_or
+from service.api.auth.gate import actor_or, needs, subject_router
 from service.api.context import Context, UnitId
 from service.api.parameters import Moment, OptionalTimeRange, ns_from_datetime
 from service.api.routes.alarms import COMMENT_LIMIT, Allowances

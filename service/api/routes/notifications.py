@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter
 
-from service.api.auth.declared import Reach, subject_router
+from service.api.auth.gate import Reach, subject_router
 from service.api.context import Context
 from service.api.values import ApiModel
 from service.live.receivers import ReceiverView

@@ -9,7 +9,7 @@ from pydantic import Field
 from core.quality import Level, Reading
 from core.stiffness.estimators import is_reversed, reported_name
 from service.api.answers import Make
-from service.api.auth.declared import subject_router
+from service.api.auth.gate import subject_router
 from service.api.context import Context
 from service.api.routes.bearings import ResultModel, result_model
 from service.api.routes.film_models import FilmBriefModel

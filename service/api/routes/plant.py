@@ -11,7 +11,7 @@ from core.monitor.catalogue import CATALOGUE, quantity_named
 from core.samples.blocks import StampFault
 from core.samples.gaps import Gap
 from core.units import ns_from_s
-from service.api.auth.declared import Reach, needs, subject_router
+from service.api.auth.gate import Reach, needs, subject_router
 from service.api.context import Context, UnitId
 from service.api.downloads import file_content
 from service.api.parameters import TimeRange

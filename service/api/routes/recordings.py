@@ -11,7 +11,7 @@ from pydantic import Field
 from acquisition.delivery.units import UNIT_OF
 from acquisition.errors import ConfigError
 from service.api.answers import in_thread, rendered
-from service.api.auth.declared import subject_router
+from service.api.auth.gate import subject_router
 from service.api.context import Context
 from service.api.downloads import attachment, file_content
 from service.api.parameters import at_most, only

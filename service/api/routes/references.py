@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter
 from pydantic import Field
 
-from service.api.auth.declared import needs, subject_router
-from service.api.auth.gate import actor_or
+from service.api.auth.gate import actor_or, needs, subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import problem_responses
 from service.api.routes.bearings import MicrometrePair

@@ -13,7 +13,7 @@ from core.monitor.assessment import Assessment
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.stiffness.order_line import marked_hz
 from service.api.answers import in_thread
-from service.api.auth.declared import subject_router
+from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import TimeRange, at_most, several
 from service.api.problems import ProblemError, problem_responses

@@ -12,7 +12,7 @@ from core.condition.cells import CellGrid
 from core.monitor.catalogue import quantity_named
 from core.units import ns_from_s
 from service.api.answers import in_thread
-from service.api.auth.declared import subject_router
+from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange, at_most
 from service.api.problems import ProblemError

@@ -13,7 +13,7 @@ from starlette.routing import Mount
 
 from service.api.answers import Answers
 from service.api.app import GuardedApi
-from service.api.auth.declared import OPEN, Reach, UndeclaredRouteError, declared, needs
+from service.api.auth.gate import OPEN, Reach, UndeclaredRouteError, declared, needs
 from service.dashboard.assets import edition
 from service.store.access.identities import Permission, Role, new_key, new_token
 

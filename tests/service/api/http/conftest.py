@@ -13,7 +13,7 @@ from pydantic import BaseModel
 
 from service.api.answers import Answers
 from service.api.app import GuardedApi
-from service.api.auth.declared import OPEN, declared
+from service.api.auth.gate import OPEN, declared
 from service.api.http.server import HttpServer, http_server
 from service.api.problems import install_problem_handlers, refuse_unknown_parameters
 from service.runtime.asker import ASKER, Asker
