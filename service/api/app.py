@@ -20,7 +20,7 @@ from service.api.answers import (
     Repetition,
     Unrouted,
 )
-from service.api.auth.accounts import account_router, key_router
+from service.api.auth.accounts import access_router
 from service.api.auth.credentials import COOKIE
 from service.api.auth.gate import Declared, Gate, declared, require_declared
 from service.api.auth.sessions import session_router
@@ -256,8 +256,7 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
         delivery_router(context),
         audit_router(context),
         session_router(authenticator),
-        account_router(authenticator),
-        key_router(context, authenticator),
+        access_router(context, authenticator),
         *others,
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])

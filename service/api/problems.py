@@ -136,6 +136,15 @@ class ProblemError(Exception):
         self.errors = [Mistake(parameter=parameter, detail=detail)] if parameter else [*errors]
 
 
+BEARER_ONLY = {"WWW-Authenticate": 'Bearer realm="padwatch"'}
+"""Header of answers with status 401; the scheme Bearer opens no login dialog in browsers."""
+
+
+def not_logged_in(detail: str = "log in, or send a valid API key") -> ProblemError:
+    """Return the error with status 401 for an unauthenticated request or a failed login."""
+    return ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
+
+
 def _documented(words: str) -> dict[str, Any]:
     content = {"schema": {"$ref": f"{SCHEMAS}Problem"}}
     return {"description": words, "content": {MEDIA_TYPE: content}}

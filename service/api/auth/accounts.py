@@ -18,7 +18,6 @@ from service.store.access.identities import (
     Permission,
     Role,
 )
-from service.store.access.tables import Account
 
 RoleName = Literal["viewer", "operator", "engineer", "admin"]
 
@@ -55,7 +54,7 @@ class AccountModel(ApiModel):
     name: Annotated[str, Field(examples=["anna"])]
     """Login name."""
 
-    password_set: Time
+    password_set: Annotated[Time, Field(validation_alias="password_ns")]
     """Time when the password was last set."""
 
 
@@ -127,56 +126,51 @@ class CreatedKeyModel(KeyModel):
     """Complete key with its secret, which is not stored and cannot be read again."""
 
 
-def account_model(account: Account) -> AccountModel:
-    """Return the API model of an account, without its password hash."""
-    return AccountModel.of(account, password_set=account.password_ns)
-
-
 AccountName = Annotated[
     str, Path(description="Name of an account.", max_length=256, examples=["anna"])
 ]
 
-CHANGE_PROBLEMS = problem_responses(
-    409,
-    own={
-        404: "Unknown account or key",
-        422: "A wrong parameter, or a name or password that is not accepted",
-    },
+NEW_PROBLEMS = problem_responses(
+    own={422: "A wrong parameter, or a name or password that is not accepted"}
 )
+CHANGE_PROBLEMS = NEW_PROBLEMS | problem_responses(409, own={404: "Unknown account or key"})
+
+KeyId = Annotated[
+    str, Path(description="Public part of a key.", max_length=64, examples=["5f0c6f3a9b1e"])
+]
 
 
-def account_router(authenticator: Authenticator) -> APIRouter:
-    """Return the router for accounts."""
-    stored, change = authenticator.store.accounts, authenticator.change
-    now_ns = authenticator.clock.now_ns
-    router = subject_router("/accounts", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
+def access_router(context: Context, authenticator: Authenticator) -> APIRouter:
+    """Return the router for accounts and API keys."""
+    store, now_ns = authenticator.store, authenticator.clock.now_ns
+    change = authenticator.change
+    router = subject_router("", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
     router.dependencies.append(Depends(name_caller))
 
     async def one(name: str) -> AccountModel:
-        found = await authenticator.run(lambda: stored.get(name))
+        found = await authenticator.run(lambda: store.accounts.get(name))
         if found is None:
             raise ProblemError(404, "Unknown account", "the account does not exist")
-        return account_model(found)
+        return AccountModel.of(found)
 
-    @router.get("")
+    @router.get("/accounts")
     async def accounts() -> list[AccountModel]:
         """List all accounts, sorted by name."""
-        return [account_model(account) for account in await authenticator.run(stored.all)]
+        return [AccountModel.of(account) for account in await authenticator.run(store.accounts.all)]
 
-    @router.post("", status_code=201, responses=CHANGE_PROBLEMS)
+    @router.post("/accounts", status_code=201, responses=CHANGE_PROBLEMS)
     async def add_account(asked: NewAccountModel) -> AccountModel:
         """Add an account; its password must be changed at the first login."""
-        new = asked.name, Role(asked.role), asked.password
-        add = authenticator.add
+        new, add = (asked.name, Role(asked.role), asked.password), authenticator.add
         return await one(await change(lambda: add(*new, must_change=True), hashes=True))
 
-    @router.put("/{name}/role", responses=CHANGE_PROBLEMS)
+    @router.put("/accounts/{name}/role", responses=CHANGE_PROBLEMS)
     async def set_role(name: AccountName, asked: SetRoleModel) -> AccountModel:
         """Change the role of an account, effective from the next request of the person."""
-        await change(lambda: stored.set_role(name, Role(asked.role), now_ns()))
+        await change(lambda: store.accounts.set_role(name, Role(asked.role), now_ns()))
         return await one(name)
 
-    @router.put("/{name}/password", responses=CHANGE_PROBLEMS)
+    @router.put("/accounts/{name}/password", responses=CHANGE_PROBLEMS)
     async def set_password(
         request: Request, name: AccountName, asked: SetPasswordModel
     ) -> AccountModel:
@@ -186,15 +180,39 @@ def account_router(authenticator: Authenticator) -> APIRouter:
         """
         _require_other(request, name, "use POST /session/password to change your own password")
         await one(name)  # before hashing, which is slow
-        new, set_password = (name, asked.password), authenticator.set_password
-        await change(lambda: set_password(*new, must_change=True), hashes=True)
+        new, set_new = (name, asked.password), authenticator.set_password
+        await change(lambda: set_new(*new, must_change=True), hashes=True)
         return await one(name)
 
-    @router.delete("/{name}", status_code=204, responses=CHANGE_PROBLEMS)
+    @router.delete("/accounts/{name}", status_code=204, responses=CHANGE_PROBLEMS)
     async def remove_account(request: Request, name: AccountName) -> None:
         """Remove the account of another person, and end the sessions of the account."""
         _require_other(request, name, "you cannot remove your own account")
-        await change(lambda: stored.remove(name, now_ns()))
+        await change(lambda: store.accounts.remove(name, now_ns()))
+
+    @router.get("/keys")
+    async def keys() -> list[KeyModel]:
+        """List all API keys, also expired and revoked keys, oldest first, without their secrets."""
+        found, time_ns = await authenticator.run(store.keys.all), now_ns()
+        return [KeyModel.of(key, state=key.state(time_ns)) for key in found]
+
+    @router.post("/keys", status_code=201, responses=CHANGE_PROBLEMS)
+    async def create_key(asked: NewKeyModel) -> CreatedKeyModel:
+        """Create an API key for a machine; only this answer contains the secret of the key."""
+        for unit in asked.units:
+            if unit not in context.units:
+                detail = f"unknown unit {unit!r}; known units: {', '.join(context.units)}"
+                raise ProblemError(422, "Wrong parameter", detail, "units")
+        new = asked.name, Role(asked.role), asked.units, asked.days
+        made, shown = await change(lambda: authenticator.create_key(*new))
+        return CreatedKeyModel.of(made, state=made.state(made.created_ns), key=shown)
+
+    @router.delete("/keys/{key}", status_code=204, responses=CHANGE_PROBLEMS)
+    async def revoke_key(key: KeyId) -> None:
+        """Revoke an API key permanently; the request is idempotent."""
+        if await authenticator.run(lambda: store.keys.get(key)) is None:
+            raise ProblemError(404, "Unknown key", "the key does not exist")
+        await change(lambda: store.keys.revoke(key, now_ns()))
 
     return router
 
@@ -204,41 +222,3 @@ def _require_other(request: Request, name: str, detail: str) -> None:
     identity = identity_of(request)
     if identity.means is Means.SESSION and identity.name == name:
         raise ProblemError(409, "Conflict", detail)
-
-
-KeyId = Annotated[
-    str, Path(description="Public part of a key.", max_length=64, examples=["5f0c6f3a9b1e"])
-]
-
-
-def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
-    """Return the router for API keys."""
-    stored, clock = authenticator.store.keys, authenticator.clock
-    router = subject_router("/keys", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
-    router.dependencies.append(Depends(name_caller))
-
-    @router.get("")
-    async def keys() -> list[KeyModel]:
-        """List all API keys, also expired and revoked keys, oldest first, without their secrets."""
-        keys, now_ns = await authenticator.run(stored.all), clock.now_ns()
-        return [KeyModel.of(key, state=key.state(now_ns)) for key in keys]
-
-    @router.post("", status_code=201, responses=CHANGE_PROBLEMS)
-    async def create_key(asked: NewKeyModel) -> CreatedKeyModel:
-        """Create an API key for a machine; only this answer contains the secret of the key."""
-        for unit in asked.units:
-            if unit not in context.units:
-                detail = f"unknown unit {unit!r}; known units: {', '.join(context.units)}"
-                raise ProblemError(422, "Wrong parameter", detail, "units")
-        new = asked.name, Role(asked.role), asked.units, asked.days
-        made, shown = await authenticator.change(lambda: authenticator.create_key(*new))
-        return CreatedKeyModel.of(made, state=made.state(made.created_ns), key=shown)
-
-    @router.delete("/{key}", status_code=204, responses=CHANGE_PROBLEMS)
-    async def revoke_key(key: KeyId) -> None:
-        """Revoke an API key permanently; the request is idempotent."""
-        if await authenticator.run(lambda: stored.get(key)) is None:
-            raise ProblemError(404, "Unknown key", "the key does not exist")
-        await authenticator.change(lambda: stored.revoke(key, clock.now_ns()))
-
-    return router

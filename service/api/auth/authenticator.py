@@ -16,9 +16,9 @@ from starlette.types import Scope
 from acquisition.clock import Clock
 from core.units import DAY_NS, NS_PER_S, ns_from_s
 from service.api.auth.backoff import Backoff, TokenBucket
-from service.api.auth.credentials import Caller, Credentials, credentials_of, is_from_here
+from service.api.auth.credentials import Caller, credentials_of, is_from_here
 from service.api.auth.passwords import MAX_AT_ONCE, Hashing, new_password
-from service.api.problems import ProblemError
+from service.api.problems import ProblemError, not_logged_in
 from service.store.access.audit_entries import AuditAction, acting
 from service.store.access.identities import (
     LOCAL,
@@ -61,6 +61,8 @@ MAX_KNOWN_WAITING = 8
 
 LOOKUP_THREADS = 2
 
+WRONG = "the name or the password is wrong"
+
 REQUEST_REFUSED = "request.refused"
 
 N_AT_ONCE = 20
@@ -68,9 +70,6 @@ N_AT_ONCE = 20
 
 SECONDS_EACH = 30.0
 """Time after which one more refusal may be recorded, s: at most 2,880 a day."""
-
-BEARER_ONLY = {"WWW-Authenticate": 'Bearer realm="padwatch"'}
-"""Header of answers with status 401; the scheme Bearer opens no login dialog in browsers."""
 
 T = TypeVar("T")
 
@@ -129,21 +128,19 @@ class Authenticator:
         Raises `StoreError` if the store cannot be read.
         """
         local_role = self.local_role if is_from_here(scope) else None
-        shown = credentials_of(scope)
-        identity = await self._proven(shown)
-        if identity is None and local_role is not None and shown.means is not Means.KEY:
+        means, secret = credentials_of(scope)
+        identity = await self._proven(means, secret) if secret else None
+        if identity is None and local_role is not None and means is not Means.KEY:
             identity = Identity(LOCAL, local_role, Means.LOCAL)
-        return Caller(identity, shown, must_log_in=local_role is None)
+        return Caller(identity, means, secret, must_log_in=local_role is None)
 
-    async def _proven(self, shown: Credentials) -> Identity | None:
-        if not shown.secret:
-            return None
-        key, cache = digest(shown.secret), self._cache
+    async def _proven(self, means: Means | None, secret: str) -> Identity | None:
+        key, cache = digest(secret), self._cache
         until_s, identity = cache.get(key, (0.0, None))
         if self.clock.monotonic_s() < until_s:
             return identity
-        check = self.machine if shown.means is Means.KEY else self.person
-        identity = await self.run(lambda: check(shown.secret))
+        check = self.machine if means is Means.KEY else self.person
+        identity = await self.run(lambda: check(secret))
         if identity is not None:
             if len(cache) >= MAX_CACHED:
                 cache.clear()
@@ -243,7 +240,7 @@ class Authenticator:
         self.set_password(account.name, new)
         changed = self.store.accounts.get(account.name)
         if changed is None:
-            raise _wrong_login()
+            raise not_logged_in(WRONG)
         return self._begun(changed, peer)
 
     async def log_out(self, token: str, *, is_replaced: bool = False) -> None:
@@ -380,7 +377,7 @@ class Authenticator:
         account = self.store.accounts.get(name)
         is_right = self._hashing.verify(account.password_hash if account else None, password)
         if account is None or not is_right:
-            raise _wrong_login()
+            raise not_logged_in(WRONG)
         return account
 
     def _begun(self, account: Account, peer: str) -> LoggedIn:
@@ -388,14 +385,9 @@ class Authenticator:
         session = Session(digest(token), account.name, now_ns, now_ns)
         oldest_ns = self._limits.oldest_ns(now_ns)
         if not self.store.sessions.add(session, account.password_number, oldest_ns):
-            raise _wrong_login()  # the password was changed meanwhile
+            raise not_logged_in(WRONG)  # the password was changed meanwhile
         self.backoff.succeeded(account.name, peer)
         return LoggedIn(token, _person(account))
-
-
-def _wrong_login() -> ProblemError:
-    detail = "the name or the password is wrong"
-    return ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
 
 
 @contextmanager

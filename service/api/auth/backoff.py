@@ -2,8 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Hashable
-from dataclasses import dataclass
-from ipaddress import IPv6Address, ip_address
+from ipaddress import IPv4Address, IPv6Network, ip_address
 from threading import Lock
 
 from core.units import NS_PER_S
@@ -15,37 +14,15 @@ IPV6_NETWORK_BITS = 64
 """Length of the IPv6 address prefix that counts as one client, bits."""
 
 
-@dataclass(frozen=True)
-class WaitRule:
-    """Rule of an exponential backoff: the wait after a number of failed logins.
+FORGET_S = 3600.0
+"""Time without a failure after which the number of failures is reset, s."""
 
-    Parameters
-    ----------
-    n_free
-        Number of failures from which there is a wait: 1 s at first, doubled by each failure.
-    longest_s
-        Maximum wait, s.
-    forget_s
-        Time without a failure after which the number of failures is reset, s.
-    """
+ACCOUNT_FREE, ACCOUNT_LONGEST_S = 5, 60.0
+"""Free failures and maximum wait of an account, short so that attackers do not lock out the owner.
+"""
 
-    n_free: int
-    longest_s: float
-    forget_s: float = 3600.0
-
-    def wait_ns(self, n_failures: int) -> int:
-        """Return the wait until the next attempt after a number of consecutive failures, ns."""
-        if n_failures < self.n_free:
-            return 0
-        doubled_s = 2.0 ** min(n_failures - self.n_free, 30)
-        return round(min(doubled_s, self.longest_s) * NS_PER_S)
-
-
-ACCOUNT_RULE = WaitRule(n_free=5, longest_s=60.0)
-"""Backoff for an account; waits are short, so that attackers do not lock out the owner."""
-
-PEER_RULE = WaitRule(n_free=10, longest_s=900.0)
-"""Backoff for an address; more failures are free, since a control room may share one address."""
+PEER_FREE, PEER_LONGEST_S = 10, 900.0
+"""Free failures and maximum wait of an address; a control room may share one address."""
 
 
 class Backoff:
@@ -57,8 +34,8 @@ class Backoff:
 
     def __init__(self) -> None:
         self._lock = Lock()
-        self._accounts = FailureCounts(ACCOUNT_RULE, MAX_REMEMBERED)
-        self._peers = FailureCounts(PEER_RULE, MAX_REMEMBERED)
+        self._accounts = FailureCounts(ACCOUNT_FREE, ACCOUNT_LONGEST_S)
+        self._peers = FailureCounts(PEER_FREE, PEER_LONGEST_S)
         self._known: OrderedDict[tuple[str, str], None] = OrderedDict()
 
     def attempt(self, name: str, peer: str, now_ns: int) -> float:
@@ -102,19 +79,24 @@ class Backoff:
 
 
 class FailureCounts:
-    """Numbers of failed logins by account or address; the least recently changed is dropped."""
+    """Numbers of failed logins by account or address, and the waits after them.
 
-    def __init__(self, rule: WaitRule, max_remembered: int) -> None:
-        self._rule, self._max_remembered = rule, max_remembered
+    There is a wait from `n_free` consecutive failures: 1 s at first, doubled by each failure up to
+    `longest_s`. Of more than `max_remembered` accounts, the least recently changed is dropped.
+    """
+
+    def __init__(self, n_free: int, longest_s: float, max_remembered: int = MAX_REMEMBERED) -> None:
+        self.n_free, self._longest_s, self._max_remembered = n_free, longest_s, max_remembered
         self._failures: OrderedDict[Hashable, tuple[int, int]] = OrderedDict()
-
-    def __len__(self) -> int:
-        return len(self._failures)
 
     def wait(self, key: Hashable, now_ns: int) -> int:
         """Return the time until an account or address may attempt a login, ns; 0 if it may now."""
-        number, newest_ns = self._recent(key, now_ns)
-        return max(0, newest_ns + self._rule.wait_ns(number) - now_ns)
+        n_failures, newest_ns = self._recent(key, now_ns)
+        if n_failures < self.n_free:
+            return 0
+        doubled_s = 2.0 ** min(n_failures - self.n_free, 30)
+        wait_ns = round(min(doubled_s, self._longest_s) * NS_PER_S)
+        return max(0, newest_ns + wait_ns - now_ns)
 
     def add(self, key: Hashable, now_ns: int) -> None:
         """Add one failure of an account or address at the monotonic time `now_ns`, ns."""
@@ -137,7 +119,7 @@ class FailureCounts:
     def _recent(self, key: Hashable, now_ns: int) -> tuple[int, int]:
         """Return the number of consecutive failures, and the time of the newest one, ns."""
         number, newest_ns = self._failures.get(key, (0, now_ns))
-        is_old = now_ns - newest_ns >= self._rule.forget_s * NS_PER_S
+        is_old = now_ns - newest_ns >= FORGET_S * NS_PER_S
         return (0, now_ns) if is_old else (number, newest_ns)
 
 
@@ -147,12 +129,10 @@ def client_of(peer: str) -> str:
         address = ip_address(peer.partition("%")[0])
     except ValueError:
         return peer
-    if isinstance(address, IPv6Address):
-        if address.ipv4_mapped is not None:
-            return str(address.ipv4_mapped)
-        n_host_bits = 128 - IPV6_NETWORK_BITS
-        return str(IPv6Address(int(address) >> n_host_bits << n_host_bits))
-    return str(address)
+    if isinstance(address, IPv4Address):
+        return str(address)
+    network = IPv6Network((address, IPV6_NETWORK_BITS), strict=False)
+    return str(address.ipv4_mapped or network.network_address)
 
 
 class TokenBucket:

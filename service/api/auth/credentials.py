@@ -18,34 +18,24 @@ PLAIN_COOKIE = "padwatch"
 BEARER = "bearer"
 
 
-@dataclass(frozen=True)
-class Credentials:
-    """Credentials of a request, not yet checked.
-
-    `means` is session or API key; None without credentials. `secret` is the session token or API
-    key; it is empty if ambiguous, as with two cookies.
-    """
-
-    means: Means | None = None
-    secret: str = field(default="", repr=False)
-
-
-def credentials_of(scope: Scope) -> Credentials:
+def credentials_of(scope: Scope) -> tuple[Means | None, str]:
     """Return the credentials in the headers of a request; a key takes precedence over a cookie.
 
-    Authorization headers of other schemes than Bearer are for proxies, and are ignored.
+    The result is the method, None without credentials, and the session token or API key, empty if
+    ambiguous, as with two cookies. Authorization headers of other schemes than Bearer are for
+    proxies, and are ignored.
     """
     headers = Headers(scope=scope)
     pairs = [value.partition(" ") for value in headers.getlist("authorization")]
     keys = [key.strip() for scheme, _, key in pairs if scheme.lower() == BEARER]
     if keys:
-        return Credentials(Means.KEY, keys[0] if len(keys) == 1 else "")
+        return Means.KEY, keys[0] if len(keys) == 1 else ""
     cookies = _cookies(headers, COOKIE)
     if not cookies and scope["scheme"] == "http":
         cookies = _cookies(headers, PLAIN_COOKIE)
     if not cookies:
-        return Credentials()
-    return Credentials(Means.SESSION, cookies[0] if len(cookies) == 1 else "")
+        return None, ""
+    return Means.SESSION, cookies[0] if len(cookies) == 1 else ""
 
 
 def _cookies(headers: Headers, wanted: str) -> list[str]:
@@ -108,12 +98,13 @@ class Caller:
     ----------
     identity
         Identity of the caller; None without valid credentials if a login is required.
-    shown
-        Credentials in the request, valid or not.
+    means, secret
+        Credentials in the request, valid or not, as by `credentials_of`.
     must_log_in
         Whether requests from the caller's address require a login or key.
     """
 
     identity: Identity | None
-    shown: Credentials = field(repr=False)
+    means: Means | None
+    secret: str = field(repr=False)
     must_log_in: bool

@@ -15,9 +15,9 @@ from fastapi.routing import APIRoute, iter_route_contexts
 from starlette.routing import BaseRoute, Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.auth.authenticator import BEARER_ONLY, Authenticator
+from service.api.auth.authenticator import Authenticator
 from service.api.auth.credentials import CALLER, Caller, is_foreign
-from service.api.problems import DETAIL, STORE_FAILS, ProblemError, problem_answer
+from service.api.problems import DETAIL, STORE_FAILS, ProblemError, not_logged_in, problem_answer
 from service.store.access.audit_entries import Acting, Source, acting, acting_as, name_actor
 from service.store.access.identities import LOCAL, Identity, Means, Permission
 from service.store.port import StoreError
@@ -144,12 +144,6 @@ REFUSED = (401, 403, 409, 413, 422, 429)
 """HTTP statuses of refused requests."""
 
 
-def not_logged_in() -> ProblemError:
-    """Return the error with status 401 for an unauthenticated request."""
-    detail = "log in, or send a valid API key"
-    return ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
-
-
 CHANGE_PASSWORD = "POST /api/v1/session/password"  # noqa: S105  an operation
 
 
@@ -194,7 +188,7 @@ class Gate:
             for each in scope["app"].declared.values()
         ):
             raise not_logged_in()
-        means = caller.shown.means
+        means = caller.means
         may_be_forged = scope["method"] not in SAFE and means is not Means.KEY
         if may_be_forged and is_foreign(scope, requires_origin=means is not None):
             detail = "requests from pages of other sites are rejected"

@@ -1,11 +1,12 @@
 """Routes for login, logout, password change, and creation of the first account."""
 
+from dataclasses import replace
 from typing import Annotated
 
 from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
-from service.api.auth.accounts import LoginName, Password, RoleName
+from service.api.auth.accounts import NEW_PROBLEMS, LoginName, Password, RoleName
 from service.api.auth.authenticator import Authenticator, LoggedIn, tidy_name
 from service.api.auth.credentials import COOKIE, PLAIN_COOKIE, Caller
 from service.api.auth.gate import OPEN, Reach, caller_of, identity_of, needs
@@ -75,12 +76,8 @@ LOGIN_PROBLEMS = problem_responses(
 
 PASSWORD_PROBLEMS = LOGIN_PROBLEMS | problem_responses(own={409: "The caller has no password"})
 
-SET_UP_PROBLEMS = problem_responses(
-    503,
-    own={
-        403: "The token is wrong or has been used, or there is an account already",
-        422: "A wrong parameter, or a name or password that is not accepted",
-    },
+SET_UP_PROBLEMS = NEW_PROBLEMS | problem_responses(
+    503, own={403: "The token is wrong or has been used, or there is an account already"}
 )
 
 
@@ -88,29 +85,50 @@ def session_router(authenticator: Authenticator) -> APIRouter:
     """Return the router for sessions and for the creation of the first account."""
     router = APIRouter(prefix="/api/v1", tags=["access"])
 
+    async def session_model(caller: Caller) -> SessionModel:
+        identity = caller.identity
+        may_all = identity is not None and (identity.is_proven or identity.role is Role.ADMIN)
+        accounts = authenticator.store.accounts
+        return SessionModel(
+            login_required=caller.must_log_in,
+            set_up_needed=not may_all and not await authenticator.run(accounts.all),
+            password_change_needed=identity is not None and identity.must_change_password,
+            name=identity.name if identity is not None and identity.is_proven else None,
+            role=identity.role.value if identity is not None else None,
+            permissions=[p for p in Permission if identity is not None and identity.role.may(p)],
+        )
+
+    async def begun(request: Request, response: Response, logged_in: LoggedIn) -> SessionModel:
+        # the browser may use HTTPS although a proxy forwards its requests over HTTP
+        scheme = request.headers.get("origin", "").partition(":")[0]
+        secure = "https" in (request.url.scheme, scheme)
+        name, token = COOKIE if secure else PLAIN_COOKIE, logged_in.token
+        response.set_cookie(name, token, secure=secure, httponly=True, samesite="strict")
+        return await session_model(replace(caller_of(request), identity=logged_in.identity))
+
     @router.get("/session", dependencies=[OPEN])
     async def current_identity(request: Request) -> SessionModel:
         """Return identity and permissions of the caller, and whether a login is required."""
-        return await session_model(caller_of(request), authenticator)
+        return await session_model(caller_of(request))
 
     @router.post("/session", status_code=201, responses=LOGIN_PROBLEMS, dependencies=[OPEN])
     async def log_in(request: Request, response: Response, asked: LoginModel) -> SessionModel:
         """Log in: start a session and set its cookie; an earlier session of the browser ends."""
-        given, shown = (asked.name, asked.password, _peer(request)), caller_of(request).shown
+        peer, caller = _peer(request), caller_of(request)
         logged_in = await authenticator.run_hashing(
-            lambda: authenticator.log_in(*given),
-            is_known=authenticator.backoff.knows(tidy_name(asked.name), _peer(request)),
+            lambda: authenticator.log_in(asked.name, asked.password, peer),
+            is_known=authenticator.backoff.knows(tidy_name(asked.name), peer),
         )
-        if shown.means is Means.SESSION:
-            await authenticator.log_out(shown.secret, is_replaced=True)
-        return await _begun(authenticator, request, response, logged_in)
+        if caller.means is Means.SESSION:
+            await authenticator.log_out(caller.secret, is_replaced=True)
+        return await begun(request, response, logged_in)
 
     @router.delete("/session", status_code=204, dependencies=[OPEN])
     async def log_out(request: Request, response: Response) -> None:
         """Log out: end the session of the browser, if any, and delete the session cookie."""
-        shown = caller_of(request).shown
-        if shown.means is Means.SESSION:
-            await authenticator.log_out(shown.secret)
+        caller = caller_of(request)
+        if caller.means is Means.SESSION:
+            await authenticator.log_out(caller.secret)
         response.delete_cookie(COOKIE, secure=True, httponly=True, samesite="strict")
         response.delete_cookie(PLAIN_COOKIE, httponly=True, samesite="strict")
 
@@ -134,51 +152,19 @@ def session_router(authenticator: Authenticator) -> APIRouter:
             logged_in = await authenticator.change(lambda: change(*given), hashes=True)
         except PasswordRefusedError as error:
             raise ProblemError(422, "Wrong parameter", str(error), "new_password") from error
-        return await _begun(authenticator, request, response, logged_in)
+        return await begun(request, response, logged_in)
 
     @router.post("/set-up", status_code=201, responses=SET_UP_PROBLEMS, dependencies=[OPEN])
     async def create_first_account(request: Request, asked: SetUpModel) -> SessionModel:
         """Create the first account, an administrator, with the token that the service printed."""
-        given = asked.token, asked.name, asked.password
-        is_made = await authenticator.run_hashing(
-            lambda: authenticator.set_up(*given), is_known=False
-        )
-        if not is_made:
+        given, set_up = (asked.token, asked.name, asked.password), authenticator.set_up
+        if not await authenticator.run_hashing(lambda: set_up(*given), is_known=False):
             detail = "the token is wrong or was used, or an account exists already"
             raise ProblemError(403, "Setup rejected", detail)
-        return await session_model(caller_of(request), authenticator)
+        return await session_model(caller_of(request))
 
     return router
 
 
 def _peer(request: Request) -> str:
     return request.client.host if request.client else ""
-
-
-async def _begun(
-    authenticator: Authenticator, request: Request, response: Response, logged_in: LoggedIn
-) -> SessionModel:
-    # the browser may use HTTPS although a proxy forwards its requests over HTTP
-    scheme = request.headers.get("origin", "").partition(":")[0]
-    is_secure = "https" in (request.url.scheme, scheme)
-    name = COOKIE if is_secure else PLAIN_COOKIE
-    response.set_cookie(name, logged_in.token, secure=is_secure, httponly=True, samesite="strict")
-    caller = caller_of(request)
-    return await session_model(
-        Caller(logged_in.identity, caller.shown, caller.must_log_in), authenticator
-    )
-
-
-async def session_model(caller: Caller, authenticator: Authenticator) -> SessionModel:
-    """Return the API model of a caller with its identity and permissions."""
-    identity = caller.identity
-    may_all = identity is not None and (identity.is_proven or identity.role is Role.ADMIN)
-    needs_set_up = not may_all and not await authenticator.run(authenticator.store.accounts.all)
-    return SessionModel(
-        login_required=caller.must_log_in,
-        set_up_needed=needs_set_up,
-        password_change_needed=identity is not None and identity.must_change_password,
-        name=identity.name if identity is not None and identity.is_proven else None,
-        role=identity.role.value if identity is not None else None,
-        permissions=[p for p in Permission if identity is not None and identity.role.may(p)],
-    )

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from rigs.standing_clock import T0, at
 
 from service.api.auth.authenticator import Authenticator
-from service.api.auth.backoff import ACCOUNT_RULE
+from service.api.auth.backoff import ACCOUNT_FREE
 from service.api.auth.passwords import Hashing
 from service.api.problems import ProblemError
 from service.app.listener import ClosedError, require_protected
@@ -199,7 +199,7 @@ def test_a_login_renews_a_hash_once_the_parameters_have_risen(access, doors, dea
 
 
 def test_after_failures_even_the_right_password_waits_until_the_wait_is_over(doors, anna, hasher):
-    for _ in range(ACCOUNT_RULE.n_free):
+    for _ in range(ACCOUNT_FREE):
         assert refused(doors, anna, "wrong") == 401
     before = vars(hasher)["n_verified"]
 
@@ -211,7 +211,7 @@ def test_after_failures_even_the_right_password_waits_until_the_wait_is_over(doo
 def test_passwords_tried_all_at_once_are_counted_one_by_one(doors, anna):
     with ThreadPoolExecutor(16) as threads:
         tried = list(threads.map(lambda n: refused(doors, anna, f"wrong {n}"), range(64)))
-    assert tried.count(401) == ACCOUNT_RULE.n_free
+    assert tried.count(401) == ACCOUNT_FREE
 
 
 @pytest.mark.usefixtures("anna")
