@@ -25,7 +25,7 @@ from service.api.auth.credentials import COOKIE
 from service.api.auth.gate import Declared, Gate, declared, require_declared
 from service.api.auth.sessions import session_router
 from service.api.context import Context
-from service.api.health import RequestMetrics, TimedRequests, health_router
+from service.api.health import RequestMetrics, health_router
 from service.api.problems import (
     EVERY_OPERATION,
     WORDS,
@@ -230,7 +230,7 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
     app.add_middleware(Unrouted, answers=context.answers)
     app.add_middleware(AnswerHeaders, clock=context.clock)
     app.add_middleware(Gate, authenticator=authenticator)
-    app.add_middleware(TimedRequests, metrics=requests)
+    app.add_middleware(requests.timed)
     install_problem_handlers(app)
     for router in (
         # routes are tried in this order: first those that every open page polls

@@ -36,31 +36,28 @@ class RequestMetrics:
         """Add the duration of an answered request, s, to the histogram of its route and status."""
         self._durations.labels(route, str(status)).observe(duration_s)
 
+    def timed(self, app: ASGIApp) -> ASGIApp:
+        """Return ASGI middleware around `app` that measures the duration of answered requests."""
+
+        async def middleware(scope: Scope, receive: Receive, send: Send) -> None:
+            began_s, status = time.perf_counter(), 0
+
+            async def noting(message: Message) -> None:
+                nonlocal status
+                status = message.get("status", status)
+                await send(message)
+
+            await app(scope, receive, noting)
+            if status:
+                route = getattr(scope.get("route"), "path", NO_ROUTE)
+                self.observe(route, status, time.perf_counter() - began_s)
+
+        return middleware
+
     @property
     def text(self) -> bytes:
         """Metrics of requests and of this process in the Prometheus text format 0.0.4."""
         return generate_latest(self._registry)
-
-
-class TimedRequests:
-    """ASGI middleware that measures the duration of each answered request."""
-
-    def __init__(self, app: ASGIApp, metrics: RequestMetrics) -> None:
-        self._app, self._metrics = app, metrics
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request and measure the time until its answer was sent."""
-        began_s, status = time.perf_counter(), 0
-
-        async def noting(message: Message) -> None:
-            nonlocal status
-            status = message.get("status", status)
-            await send(message)
-
-        await self._app(scope, receive, noting)
-        if status:
-            route = getattr(scope.get("route"), "path", NO_ROUTE)
-            self._metrics.observe(route, status, time.perf_counter() - began_s)
 
 
 class HealthModel(ApiModel):
