@@ -3,14 +3,15 @@
 A route that declares no requirements is an error.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
 from fastapi import APIRouter, Depends, FastAPI, Request
-from fastapi.dependencies.models import Dependant
+from fastapi.dependencies.utils import get_flat_params
+from fastapi.params import Query
 from fastapi.routing import APIRoute, iter_route_contexts
 from starlette.routing import BaseRoute, Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -94,7 +95,8 @@ class Declared:
         """Names of the query parameters of the operation, including those of its dependencies."""
         if not isinstance(self.route, APIRoute):
             return ()
-        return tuple(dict.fromkeys(_query_names(self.route.dependant)))
+        parameters = get_flat_params(self.route.dependant)
+        return tuple(each.alias for each in parameters if isinstance(each.field_info, Query))
 
     def matches(self, path: str) -> bool:
         """Whether a path matches the path template of the operation, for any HTTP method."""
@@ -127,14 +129,6 @@ def _needs_of(app: FastAPI, operation: str, context: Any) -> Needs:
     elif isinstance(context.original_route, Route) and context.path == app.openapi_url:
         return Needs(None, Reach.NO_UNIT)
     raise UndeclaredRouteError(f"{operation}: route without declaration; add needs(...) or OPEN")
-
-
-def _query_names(dependant: Dependant) -> Iterator[str]:
-    """Yield the names of the query parameters of an operation and of its dependencies."""
-    for field in dependant.query_params:
-        yield field.alias
-    for inner in dependant.dependencies:
-        yield from _query_names(inner)
 
 
 SAFE = ("GET", "HEAD", "OPTIONS")
