@@ -22,7 +22,7 @@ from service.api.answers import (
 )
 from service.api.auth.accounts import access_router
 from service.api.auth.credentials import COOKIE
-from service.api.auth.gate import Declared, Gate, declared, require_declared
+from service.api.auth.gate import OPEN, Declared, Gate, declared, require_declared
 from service.api.auth.sessions import session_router
 from service.api.context import Context
 from service.api.health import RequestMetrics, health_router
@@ -179,7 +179,14 @@ class GuardedApi(FastAPI):
     def setup(self) -> None:
         """Add the route of the OpenAPI document, which is rendered once, not for each request."""
         if self.openapi_url:
-            self.add_route(self.openapi_url, self._published, include_in_schema=False)
+            self.add_api_route(
+                self.openapi_url,
+                self._published,
+                methods=["GET", "HEAD"],
+                operation_id="openapi",
+                include_in_schema=False,
+                dependencies=[OPEN],
+            )
 
     def openapi(self) -> dict[str, Any]:
         """Return the OpenAPI document, built at the first call, after all routes were added.

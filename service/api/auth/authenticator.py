@@ -238,10 +238,7 @@ class Authenticator:
         """
         account = self._checked(name, password, peer)
         self.set_password(account.name, new)
-        changed = self.store.accounts.get(account.name)
-        if changed is None:
-            raise not_logged_in(WRONG)
-        return self._begun(changed, peer)
+        return self._begun(self.store.accounts.get(account.name), peer)
 
     async def log_out(self, token: str, *, is_replaced: bool = False) -> None:
         """End the session of a token at once; an unknown token is ignored.
@@ -258,12 +255,10 @@ class Authenticator:
 
         The time of use is stored, and an expired session is deleted.
         """
-        found, now_ns = None, self.clock.now_ns()
-        if is_token(token):
-            found = self.store.sessions.get(digest(token))
+        found = self.store.sessions.get(digest(token)) if is_token(token) else None
         if found is None:
             return None
-        session, account = found
+        (session, account), now_ns = found, self.clock.now_ns()
         is_live = self._limits.is_live(session, now_ns)
         with _tried():
             if not is_live:
@@ -380,14 +375,15 @@ class Authenticator:
             raise not_logged_in(WRONG)
         return account
 
-    def _begun(self, account: Account, peer: str) -> LoggedIn:
+    def _begun(self, account: Account | None, peer: str) -> LoggedIn:
         token, now_ns = new_token(), self.clock.now_ns()
-        session = Session(digest(token), account.name, now_ns, now_ns)
-        oldest_ns = self._limits.oldest_ns(now_ns)
-        if not self.store.sessions.add(session, account.password_number, oldest_ns):
-            raise not_logged_in(WRONG)  # the password was changed meanwhile
-        self.backoff.succeeded(account.name, peer)
-        return LoggedIn(token, _person(account))
+        if account is not None:
+            session = Session(digest(token), account.name, now_ns, now_ns)
+            oldest_ns = self._limits.oldest_ns(now_ns)
+            if self.store.sessions.add(session, account.password_number, oldest_ns):
+                self.backoff.succeeded(account.name, peer)
+                return LoggedIn(token, _person(account))
+        raise not_logged_in(WRONG)  # the account was removed or its password changed meanwhile
 
 
 @contextmanager

@@ -82,11 +82,11 @@ class FailureCounts:
     """Numbers of failed logins by account or address, and the waits after them.
 
     There is a wait from `n_free` consecutive failures: 1 s at first, doubled by each failure up to
-    `longest_s`. Of more than `max_remembered` accounts, the least recently changed is dropped.
+    `longest_s`. Of more than `MAX_REMEMBERED`, the least recently changed number is dropped.
     """
 
-    def __init__(self, n_free: int, longest_s: float, max_remembered: int = MAX_REMEMBERED) -> None:
-        self.n_free, self._longest_s, self._max_remembered = n_free, longest_s, max_remembered
+    def __init__(self, n_free: int, longest_s: float) -> None:
+        self.n_free, self._longest_s = n_free, longest_s
         self._failures: OrderedDict[Hashable, tuple[int, int]] = OrderedDict()
 
     def wait(self, key: Hashable, now_ns: int) -> int:
@@ -103,7 +103,7 @@ class FailureCounts:
         number, _ = self._recent(key, now_ns)
         self._failures[key] = number + 1, now_ns
         self._failures.move_to_end(key)
-        if len(self._failures) > self._max_remembered:
+        if len(self._failures) > MAX_REMEMBERED:
             self._failures.popitem(last=False)
 
     def subtract(self, key: Hashable) -> None:

@@ -30,18 +30,12 @@ def credentials_of(scope: Scope) -> tuple[Means | None, str]:
     keys = [key.strip() for scheme, _, key in pairs if scheme.lower() == BEARER]
     if keys:
         return Means.KEY, keys[0] if len(keys) == 1 else ""
-    cookies = _cookies(headers, COOKIE)
-    if not cookies and scope["scheme"] == "http":
-        cookies = _cookies(headers, PLAIN_COOKIE)
-    if not cookies:
-        return None, ""
-    return Means.SESSION, cookies[0] if len(cookies) == 1 else ""
-
-
-def _cookies(headers: Headers, wanted: str) -> list[str]:
-    values = headers.getlist("cookie")
-    pairs = (pair.strip().partition("=") for value in values for pair in value.split(";"))
-    return [value for name, _, value in pairs if name.strip() == wanted]
+    cookies = ";".join(headers.getlist("cookie")).split(";")
+    for wanted in (COOKIE, PLAIN_COOKIE) if scope["scheme"] == "http" else (COOKIE,):
+        pairs = [cookie.strip().partition("=") for cookie in cookies]
+        if tokens := [value for name, _, value in pairs if name.strip() == wanted]:
+            return Means.SESSION, tokens[0] if len(tokens) == 1 else ""
+    return None, ""
 
 
 PASSED_ON = (b"forwarded", b"x-forwarded-for", b"x-real-ip", b"via")

@@ -13,7 +13,6 @@ from fastapi import APIRouter, Depends, FastAPI, Request
 from fastapi.dependencies.utils import get_flat_params
 from fastapi.params import Query
 from fastapi.routing import APIRoute, iter_route_contexts
-from starlette.routing import BaseRoute, Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.auth.authenticator import Authenticator
@@ -82,7 +81,7 @@ class Declared:
 
     method: str
     path: str
-    route: BaseRoute
+    route: APIRoute
     needs: Needs
 
     @property
@@ -93,14 +92,12 @@ class Declared:
     @cached_property
     def query_parameters(self) -> Sequence[str]:
         """Names of the query parameters of the operation, including those of its dependencies."""
-        if not isinstance(self.route, APIRoute):
-            return ()
         parameters = get_flat_params(self.route.dependant)
         return tuple(each.alias for each in parameters if isinstance(each.field_info, Query))
 
     def matches(self, path: str) -> bool:
         """Whether a path matches the path template of the operation, for any HTTP method."""
-        return isinstance(self.route, Route) and self.route.path_regex.match(path) is not None
+        return self.route.path_regex.match(path) is not None
 
 
 def declared(app: FastAPI) -> Mapping[str, Declared]:
@@ -113,22 +110,17 @@ def declared(app: FastAPI) -> Mapping[str, Declared]:
     found: dict[str, Declared] = {}
     for context in iter_route_contexts(app.routes):
         route, path = context.original_route, str(context.path)
+        dependencies = context.dependencies if isinstance(route, APIRoute) else ()
+        stated = [each.dependency for each in dependencies if isinstance(each.dependency, Needs)]
         for method in sorted(context.methods or ()) or ("?",):
             operation = f"{method} {path}"
+            if not isinstance(route, APIRoute) or not stated:
+                detail = "route without declaration; add needs(...) or OPEN"
+                raise UndeclaredRouteError(f"{operation}: {detail}")
             if operation in found:
                 raise UndeclaredRouteError(f"{operation}: the operation occurs twice; remove one")
-            found[operation] = Declared(method, path, route, _needs_of(app, operation, context))
+            found[operation] = Declared(method, path, route, stated[-1])
     return found
-
-
-def _needs_of(app: FastAPI, operation: str, context: Any) -> Needs:
-    if isinstance(context.original_route, APIRoute):
-        found = [each.dependency for each in context.dependencies]
-        if declarations := [each for each in found if isinstance(each, Needs)]:
-            return declarations[-1]
-    elif isinstance(context.original_route, Route) and context.path == app.openapi_url:
-        return Needs(None, Reach.NO_UNIT)
-    raise UndeclaredRouteError(f"{operation}: route without declaration; add needs(...) or OPEN")
 
 
 SAFE = ("GET", "HEAD", "OPTIONS")

@@ -1,7 +1,7 @@
 """Password rules and argon2id hashes."""
 
 import unicodedata
-from functools import cached_property
+from functools import cached_property, partial
 
 from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
@@ -17,6 +17,9 @@ MAX_AT_ONCE = 2
 NO_ACCOUNT = "no account has this password"
 
 
+normal_form = partial(unicodedata.normalize, "NFKC")
+
+
 class PasswordRefusedError(ValueError):
     """Raised if a new password is rejected; the message gives the reason, not the password."""
 
@@ -29,7 +32,7 @@ def new_password(written: str, name: str) -> str:
     Raises `PasswordRefusedError` if the password is too short or too long, has too few different
     characters, or contains the name of the account.
     """
-    password = _normal(written)
+    password = normal_form(written)
     if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
         raise PasswordRefusedError(
             f"a password must have {MIN_LENGTH} to {MAX_LENGTH} characters, got {len(password)}"
@@ -64,7 +67,7 @@ class Hashing:
         maximum length never matches.
         """
         # normalise before truncation: one character may have several encodings
-        tried = _bytes(_normal(password)[: MAX_LENGTH + 1])
+        tried = _bytes(normal_form(password)[: MAX_LENGTH + 1])
         unused = self._unused_hash  # computed once, whether the account is known or not
         try:
             self._hasher.verify(unused if stored is None else stored, tried)
@@ -81,11 +84,6 @@ class Hashing:
         return self._hasher.check_needs_rehash(stored)
 
 
-def _normal(password: str) -> str:
-    """Return the Unicode normal form NFKC of a password."""
-    return unicodedata.normalize("NFKC", password)
-
-
 def _bytes(password: str) -> bytes:
     """Return the bytes of a password for hashing, also with lone surrogates, as JSON allows."""
-    return _normal(password).encode("utf-8", "surrogatepass")
+    return normal_form(password).encode("utf-8", "surrogatepass")

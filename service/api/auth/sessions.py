@@ -13,6 +13,7 @@ from service.api.auth.gate import OPEN, Reach, caller_of, identity_of, needs
 from service.api.auth.passwords import PasswordRefusedError
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel
+from service.store.access.audit_entries import acting
 from service.store.access.identities import Means, Permission, Role
 
 
@@ -114,7 +115,7 @@ def session_router(authenticator: Authenticator) -> APIRouter:
     @router.post("/session", status_code=201, responses=LOGIN_PROBLEMS, dependencies=[OPEN])
     async def log_in(request: Request, response: Response, asked: LoginModel) -> SessionModel:
         """Log in: start a session and set its cookie; an earlier session of the browser ends."""
-        peer, caller = _peer(request), caller_of(request)
+        peer, caller = acting().peer or "", caller_of(request)
         logged_in = await authenticator.run_hashing(
             lambda: authenticator.log_in(asked.name, asked.password, peer),
             is_known=authenticator.backoff.knows(tidy_name(asked.name), peer),
@@ -146,7 +147,7 @@ def session_router(authenticator: Authenticator) -> APIRouter:
         if identity.means is not Means.SESSION:
             detail = "this identity has no password; log in with an account first"
             raise ProblemError(409, "No password", detail)
-        given = identity.name, asked.password, asked.new_password, _peer(request)
+        given = identity.name, asked.password, asked.new_password, acting().peer or ""
         change = authenticator.change_password
         try:
             logged_in = await authenticator.change(lambda: change(*given), hashes=True)
@@ -164,7 +165,3 @@ def session_router(authenticator: Authenticator) -> APIRouter:
         return await session_model(caller_of(request))
 
     return router
-
-
-def _peer(request: Request) -> str:
-    return request.client.host if request.client else ""

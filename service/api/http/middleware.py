@@ -3,9 +3,10 @@
 import asyncio
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from ipaddress import ip_address
 
-from starlette.datastructures import MutableHeaders
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -44,9 +45,6 @@ class AddedHeaders:
         await self._app(scope, receive, completed)
 
 
-FOR, PROTO = b"x-forwarded-for", b"x-forwarded-proto"
-
-
 class TrustedProxy:
     """ASGI middleware that takes client address and scheme from the headers of a trusted proxy.
 
@@ -59,22 +57,17 @@ class TrustedProxy:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request with the client and scheme reported by the proxy."""
-        scope["client"] = _client(_last(scope, FOR))
-        scope["scheme"] = "https" if _last(scope, PROTO).lower() == "https" else "http"
+        scope["client"] = None
+        with suppress(ValueError):
+            scope["client"] = str(ip_address(_last(scope, "x-forwarded-for"))), 0
+        is_https = _last(scope, "x-forwarded-proto").lower() == "https"
+        scope["scheme"] = "https" if is_https else "http"
         await self._app(scope, receive, send)
 
 
-def _last(scope: Scope, name: bytes) -> str:
+def _last(scope: Scope, name: str) -> str:
     """Return the last value of a list header, which the proxy added; empty without the header."""
-    values = [value for found, value in scope["headers"] if found == name]
-    return values[-1].decode("latin-1").rpartition(",")[2].strip() if values else ""
-
-
-def _client(address: str) -> tuple[str, int] | None:
-    try:
-        return str(ip_address(address)), 0
-    except ValueError:
-        return None
+    return ",".join(Headers(scope=scope).getlist(name)).rpartition(",")[2].strip()
 
 
 HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(?::[0-9]{1,5})?")
