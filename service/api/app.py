@@ -16,7 +16,6 @@ from service.api.answers import (
     ORIGIN_HEADER,
     TIME_HEADER,
     AnswerHeaders,
-    Answers,
     Repetition,
     Unrouted,
 )
@@ -160,33 +159,16 @@ Repeating = Callable[[ASGIApp, Iterable[tuple[str, str]]], ASGIApp]
 class GuardedApi(FastAPI):
     """FastAPI application in which every route declares the permission that it requires.
 
-    Parameters
-    ----------
-    answers
-        Cache of the OpenAPI document.
-    options
-        Keyword arguments of `FastAPI`.
+    `options` are keyword arguments of `FastAPI`, whose own pages load scripts from other sites.
     """
 
-    def __init__(self, answers: Answers, **options: Any) -> None:
-        super().__init__(dependencies=[Depends(require_declared)], **options)
+    def __init__(self, **options: Any) -> None:
+        super().__init__(dependencies=[Depends(require_declared)], openapi_url=None, **options)
         self.declared: Mapping[str, Declared] = {}
         """Operations with their required permissions, by method and path such as ``GET /livez``."""
         self.repeating: Repeating | None = None
         """Function that puts the whole application with its server's headers into `Repetition`."""
-        self._answers, self._describing = answers, Lock()
-
-    def setup(self) -> None:
-        """Add the route of the OpenAPI document, which is rendered once, not for each request."""
-        if self.openapi_url:
-            self.add_api_route(
-                self.openapi_url,
-                self._published,
-                methods=["GET", "HEAD"],
-                operation_id="openapi",
-                include_in_schema=False,
-                dependencies=[OPEN],
-            )
+        self._describing = Lock()
 
     def openapi(self) -> dict[str, Any]:
         """Return the OpenAPI document, built at the first call, after all routes were added.
@@ -198,9 +180,6 @@ class GuardedApi(FastAPI):
                 document: dict[str, Any] = super().openapi()
                 describe(document, self.declared)
             return self.openapi_schema or {}
-
-    async def _published(self, request: Request) -> Response:
-        return await self._answers.of(request, lambda: 0, self.openapi)
 
 
 DESCRIPTION = """
@@ -214,13 +193,9 @@ Times are UTC, RFC 3339. Errors are problem documents (RFC 9457).
 def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi:
     """Return the application of the API; `others` are routers of other packages."""
     app = GuardedApi(
-        context.answers,
         title="padwatch",
         version=version("padwatch"),
         description=DESCRIPTION,
-        openapi_url="/api/v1/openapi.json",
-        docs_url=None,  # FastAPI's pages load scripts from other sites
-        redoc_url=None,
         responses=EVERY_OPERATION,
         generate_unique_id_function=operation_id,
     )
@@ -239,6 +214,18 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
     app.add_middleware(Gate, authenticator=authenticator)
     app.add_middleware(requests.timed)
     install_problem_handlers(app)
+
+    @app.api_route(
+        "/api/v1/openapi.json",
+        methods=["GET", "HEAD"],
+        operation_id="openapi",
+        include_in_schema=False,
+        dependencies=[OPEN],
+    )
+    async def document(request: Request) -> Response:
+        """Return the OpenAPI document, which is rendered once, not for each request."""
+        return await context.answers.of(request, lambda: 0, app.openapi)
+
     for router in (
         # routes are tried in this order: first those that every open page polls
         overview_router(context),

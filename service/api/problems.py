@@ -201,7 +201,7 @@ def install_problem_handlers(app: FastAPI) -> None:
     """
 
     async def answer(request: Request, error: Exception) -> Response:
-        return problem_answer(request, _problem_of(request, error))
+        return problem_answer(request, error)
 
     expected = (ProblemError, HTTPException, RequestValidationError, StoreError, CommandFailedError)
     for kind in (*expected, QueryTooLargeError, *REFUSALS, Exception):
@@ -265,16 +265,16 @@ def _wrong_parameters(error: RequestValidationError) -> ProblemError:
     return ProblemError(422, "Wrong parameter", detail, errors=mistakes)
 
 
-def problem_answer(request: Request, error: ProblemError) -> Response:
+def problem_answer(request: Request, error: Exception) -> Response:
     """Return the response to a request with the problem document of an error.
 
     Texts are truncated so that the document stays within `MAX_BYTES`.
     """
-    request.scope.setdefault("state", {})[DETAIL] = error.detail  # for the audit entry of a refusal
-    n_characters = 16 * MAX_BYTES  # as good as unlimited
-    while len(body := _document(error, request.scope["path"], n_characters)) > MAX_BYTES:
+    found, n_characters = _problem_of(request, error), 16 * MAX_BYTES  # as good as unlimited
+    request.scope.setdefault("state", {})[DETAIL] = found.detail  # for the audit entry of a refusal
+    while len(body := _document(found, request.scope["path"], n_characters)) > MAX_BYTES:
         n_characters = min(n_characters, MAX_BYTES) // 2
-    return Response(body, error.status, error.headers, media_type=MEDIA_TYPE)
+    return Response(body, found.status, found.headers, media_type=MEDIA_TYPE)
 
 
 def _document(error: ProblemError, path: str, n_characters: int) -> bytes:

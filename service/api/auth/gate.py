@@ -17,7 +17,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.auth.authenticator import Authenticator
 from service.api.auth.credentials import CALLER, Caller, is_foreign
-from service.api.problems import DETAIL, STORE_FAILS, ProblemError, not_logged_in, problem_answer
+from service.api.problems import DETAIL, ProblemError, not_logged_in, problem_answer
 from service.store.access.audit_entries import Acting, Source, acting, acting_as, name_actor
 from service.store.access.identities import LOCAL, Identity, Means, Permission
 from service.store.port import StoreError
@@ -155,7 +155,7 @@ class Gate:
         with acting_as(Acting(Source.API, str(client[0]) if client else None)):
             try:
                 await self._admit(scope)
-            except ProblemError as error:
+            except (ProblemError, StoreError) as error:
                 await problem_answer(Request(scope), error)(scope, receive, watched)
             else:
                 await self._app(scope, receive, watched)
@@ -164,11 +164,7 @@ class Gate:
                 await self._desk.record_refusal(operation, state.get(DETAIL, ""), status)
 
     async def _admit(self, scope: Scope) -> None:
-        try:
-            caller = await self._desk.caller(scope)
-        except StoreError as error:
-            raise ProblemError(503, "Store not available", STORE_FAILS) from error
-        scope["state"][CALLER] = caller
+        caller = scope["state"][CALLER] = await self._desk.caller(scope)
         if caller.identity is None and not any(
             each.is_open and each.method == scope["method"] and each.matches(scope["path"])
             for each in scope["app"].declared.values()

@@ -11,7 +11,6 @@ from rigs.tiers import covering, first_fast
 from starlette.responses import PlainTextResponse
 from starlette.routing import Mount
 
-from service.api.answers import Answers
 from service.api.app import GuardedApi
 from service.api.auth.gate import OPEN, Reach, UndeclaredRouteError, declared, needs
 from service.dashboard.assets import edition
@@ -295,7 +294,7 @@ async def test_a_key_for_some_units_may_ask_for_the_history_of_those(access, sho
 
 
 def test_a_route_without_a_declaration_is_refused_by_its_name():
-    app = GuardedApi(Answers(), openapi_url=None)
+    app = GuardedApi()
     router = APIRouter(prefix="/things")
     router.add_api_route("/{thing}", lambda thing: thing, methods=["PUT"])
     app.include_router(router)

@@ -11,7 +11,6 @@ import pytest
 from fastapi import Depends, Request, Response
 from pydantic import BaseModel
 
-from service.api.answers import Answers
 from service.api.app import GuardedApi
 from service.api.auth.gate import OPEN, declared
 from service.api.http.server import HttpServer, http_server
@@ -42,7 +41,7 @@ class Application:
     goes_on: asyncio.Event = field(default_factory=asyncio.Event)
 
     def app(self) -> GuardedApi:
-        app = GuardedApi(Answers(), openapi_url=None)
+        app = GuardedApi()
         install_problem_handlers(app)
         checks = [OPEN, Depends(refuse_unknown_parameters)]
         app.add_api_route("/", self.hello, dependencies=checks)
