@@ -21,7 +21,6 @@ from service.store.access.identities import (
 
 RoleName = Literal["viewer", "operator", "engineer", "admin"]
 
-
 LoginName = Annotated[
     str,
     Field(
@@ -31,7 +30,6 @@ LoginName = Annotated[
     ),
 ]
 
-
 Password = Annotated[
     str,
     Field(
@@ -40,7 +38,6 @@ Password = Annotated[
         examples=["a long and unusual sentence"],
     ),
 ]
-
 
 UnitName = Annotated[str, Field(max_length=32, examples=["U1"])]
 

@@ -288,12 +288,8 @@ class Authenticator:
 
         With `must_change`, the password must be changed at the first login.
 
-        Raises
-        ------
-        NameRefusedError, PasswordRefusedError
-            If the name or password is rejected.
-        AccessRefusedError
-            If the name is taken.
+        Raises `NameRefusedError` or `PasswordRefusedError` if the name or password is rejected, and
+        `AccessRefusedError` if the name is taken.
         """
         name = account_name(name)
         hashed = self._hashing.hash(new_password(password, name))
@@ -305,12 +301,8 @@ class Authenticator:
 
         With `must_change`, the password must be changed at the next login.
 
-        Raises
-        ------
-        PasswordRefusedError
-            If the password is rejected.
-        AccessRefusedError
-            If the account does not exist.
+        Raises `PasswordRefusedError` if the password is rejected, and `AccessRefusedError` if the
+        account does not exist.
         """
         hashed = self._hashing.hash(new_password(password, name))
         self.store.accounts.set_password(name, hashed, self.clock.now_ns(), must_change)
@@ -346,12 +338,8 @@ class Authenticator:
         `units` are the units for which the key is valid, empty for all units; `days` is the
         validity period of the key from now, days.
 
-        Raises
-        ------
-        NameRefusedError
-            If the name is rejected.
-        AccessRefusedError
-            If the validity period is out of range, or an admin key is limited to units.
+        Raises `NameRefusedError` if the name is rejected, and `AccessRefusedError` if the validity
+        period is out of range, or an admin key is limited to units.
         """
         if not 1 <= days <= MAX_DAYS:
             raise AccessRefusedError(f"a key is valid for 1 to {MAX_DAYS} days, not for {days}")

@@ -14,8 +14,6 @@ MIN_DIFFERENT = 6
 MAX_AT_ONCE = 2
 """Maximum number of concurrently computed hashes, which limits the use of memory and cores."""
 
-NO_ACCOUNT = "no account has this password"
-
 
 normal_form = partial(unicodedata.normalize, "NFKC")
 
@@ -77,7 +75,7 @@ class Hashing:
 
     @cached_property
     def _unused_hash(self) -> str:
-        return self._hasher.hash(NO_ACCOUNT)
+        return self._hasher.hash("no account has this password")
 
     def is_outdated(self, stored: str) -> bool:
         """Whether the hash `stored` was computed with parameters other than the current ones."""

@@ -56,11 +56,8 @@ class NewPasswordModel(RequestModel):
     """Current password."""
 
 
-class SetUpModel(RequestModel):
+class SetUpModel(LoginModel):
     """Request to create the first account."""
-
-    name: LoginName
-    password: Password
 
     token: Annotated[str, Field(max_length=256, examples=["the token that the service printed"])]
     """Set-up token that the service printed when it started."""
