@@ -116,9 +116,6 @@ SCHEMES = {
     },
 }
 
-NEEDED = "x-padwatch-needs"
-"""OpenAPI extension with the permission that an operation requires; null if it is open."""
-
 
 def describe(document: dict[str, Any], operations: Mapping[str, Declared]) -> None:
     """Complete an OpenAPI document in place: access, problems, headers and entity tags.
@@ -131,7 +128,7 @@ def describe(document: dict[str, Any], operations: Mapping[str, Declared]) -> No
     for path, methods in document["paths"].items():
         for method, operation in methods.items():
             one, answers = operations[f"{method.upper()} {path}"], operation["responses"]
-            operation[NEEDED] = one.needs.permission
+            operation["x-padwatch-needs"] = one.needs.permission  # null if it is open
             operation["security"] = [] if one.is_open else [{"session": []}, {"key": []}]
             statuses = () if one.is_open else (401, 403, 503)
             for status in (*statuses, *((404,) if "{unit}" in path else ())):

@@ -25,8 +25,8 @@ from service.store.access.identities import NameRefusedError
 from service.store.access.tables import AccessRefusedError, UnknownAccountError
 from service.store.port import QueryTooLargeError, StoreError
 
-DETAIL = "detail"
-"""Key under which the ``state`` of an ASGI scope contains the detail of a problem document."""
+PROBLEM = "problem"
+"""Key under which the ``state`` of an ASGI scope contains the `ProblemError` of the answer."""
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -271,7 +271,7 @@ def problem_answer(request: Request, error: Exception) -> Response:
     Texts are truncated so that the document stays within `MAX_BYTES`.
     """
     found, n_characters = _problem_of(request, error), 16 * MAX_BYTES  # as good as unlimited
-    request.scope.setdefault("state", {})[DETAIL] = found.detail  # for the audit entry of a refusal
+    request.scope.setdefault("state", {})[PROBLEM] = found  # for the audit entry of a refusal
     while len(body := _document(found, request.scope["path"], n_characters)) > MAX_BYTES:
         n_characters = min(n_characters, MAX_BYTES) // 2
     return Response(body, found.status, found.headers, media_type=MEDIA_TYPE)

@@ -211,10 +211,8 @@ class Authenticator:
         try:
             await asyncio.to_thread(self.store.audit.record, [entry])
         except StoreError as error:
-            log.error(
-                "a refused request cannot be audited; the next entry will count it",
-                reason=str(error),
-            )
+            words = "a refused request cannot be audited; the next entry will count it"
+            log.error(words, reason=str(error))
             return False
         return True
 

@@ -66,9 +66,8 @@ def is_foreign(scope: Scope, *, requires_origin: bool) -> bool:
     sites = headers.getlist("sec-fetch-site")
     if not origins and not sites:
         return requires_origin
-    if any(site not in OWN_SITES for site in sites):
-        return True
-    return any(not _is_own(origin, scope["scheme"], hosts) for origin in origins)
+    is_own = all(_is_own(origin, scope["scheme"], hosts) for origin in origins)
+    return not is_own or any(site not in OWN_SITES for site in sites)
 
 
 def _is_own(origin: str, scheme: str, hosts: list[str]) -> bool:

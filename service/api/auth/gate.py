@@ -13,11 +13,11 @@ from fastapi import APIRouter, Depends, FastAPI, Request
 from fastapi.dependencies.utils import get_flat_params
 from fastapi.params import Query
 from fastapi.routing import APIRoute, iter_route_contexts
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.api.auth.authenticator import Authenticator
 from service.api.auth.credentials import CALLER, Caller, is_foreign
-from service.api.problems import DETAIL, ProblemError, not_logged_in, problem_answer
+from service.api.problems import PROBLEM, ProblemError, not_logged_in, problem_answer
 from service.store.access.audit_entries import Acting, Source, acting, acting_as, name_actor
 from service.store.access.identities import LOCAL, Identity, Means, Permission
 from service.store.port import StoreError
@@ -129,7 +129,6 @@ SAFE = ("GET", "HEAD", "OPTIONS")
 REFUSED = (401, 403, 409, 413, 422, 429)
 """HTTP statuses of refused requests."""
 
-
 CHANGE_PASSWORD = "POST /api/v1/session/password"  # noqa: S105  an operation
 
 
@@ -144,24 +143,18 @@ class Gate:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request with its caller in the state; answer 401, 403 or 503 if refused."""
-        client, status = scope.get("client"), 0
-        state = scope.setdefault("state", {})
-
-        async def watched(message: Message) -> None:
-            nonlocal status
-            status = message.get("status", status)
-            await send(message)
-
+        client, state = scope.get("client"), scope.setdefault("state", {})
         with acting_as(Acting(Source.API, str(client[0]) if client else None)):
             try:
                 await self._admit(scope)
             except (ProblemError, StoreError) as error:
-                await problem_answer(Request(scope), error)(scope, receive, watched)
+                await problem_answer(Request(scope), error)(scope, receive, send)
             else:
-                await self._app(scope, receive, watched)
-            if scope["method"] not in SAFE and status in REFUSED:
+                await self._app(scope, receive, send)
+            problem: ProblemError | None = state.get(PROBLEM)
+            if problem and problem.status in REFUSED and scope["method"] not in SAFE:
                 operation = f"{scope['method']} {scope['path']}"
-                await self._desk.record_refusal(operation, state.get(DETAIL, ""), status)
+                await self._desk.record_refusal(operation, problem.detail, problem.status)
 
     async def _admit(self, scope: Scope) -> None:
         caller = scope["state"][CALLER] = await self._desk.caller(scope)
