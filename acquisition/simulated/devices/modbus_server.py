@@ -20,8 +20,7 @@ _ROUNDING = 1e-6
 """Tolerance in steps for a sleep that ends too early by a rounding error."""
 
 _MAX_STEPS = 100
-"""Largest number of overdue steps produced before requests are answered again; a computer that is
-too slow for the device would otherwise never answer."""
+"""Most overdue steps at once, so that a computer that is too slow still answers requests."""
 
 
 class ModbusServer(DaqServer):
