@@ -93,7 +93,6 @@ def test_a_large_loss_is_danger_with_its_size_and_a_rise_of_stiffness_is_found_t
     assert newest.finding.change == pytest.approx(np.log(0.9), abs=0.02)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("size", "lasting_std", "most"), [(0.03, 0.02, 0), (0.1, 0.03, AlarmLevel.ALERT)]
 )

@@ -135,7 +135,10 @@ class ServiceRig:
 
     def kill(self) -> None:
         """Kill -9 of the measuring process, which is the program; its serving process ends, too."""
-        children = [] if self.process is None else psutil.Process(self.pid).children()
+        children: list[psutil.Process] = []
+        if self.process is not None:
+            with suppress(psutil.NoSuchProcess):  # it has ended by itself
+                children = psutil.Process(self.pid).children()
         self._end(signal.SIGKILL)
         _, alive = psutil.wait_procs(children, PATIENCE_S)
         assert not alive, f"still running after the kill: {alive}"
