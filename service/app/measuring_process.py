@@ -84,7 +84,7 @@ async def run_service(
         analysis = Analysis(process, monitors, sources=timed)
         await analysis.start()
         runner = Runner(
-            *(units, live, analysis.analyser, analysis.recorder, analysis.bus, beats, clock)
+            units, live, analysis.analyser, analysis.recorder, analysis.bus, beats, clock
         )
         audit = ServiceTrail(plant, origin, process.store.audit, clock)
         await audit.begin()
@@ -92,12 +92,9 @@ async def run_service(
         supervision = Supervision(manager, beats, live, units, clock)
         reports = SocketReports([*held, SHARED], analysis.snapshots, analysis.snapshot, clock)
         ready = partial(supervision.announce, announce)
-        questions = Questions(
-            *(analysis.executor, live, analysis.soundness, analysis.metrics, ready)
-        )
+        questions = Questions(analysis.executor, live, analysis.soundness, analysis.metrics, ready)
         start = Start(plant, origin, is_demo)
-        parts = (reports.report, questions.answer, clock, child)
-        serving = ServingChild(start, listener, *parts)
+        serving = ServingChild(start, listener, reports.report, questions.answer, clock, child)
 
         async def run() -> None:
             await runner.run()

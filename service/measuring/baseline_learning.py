@@ -174,7 +174,7 @@ class Learner:
         entries = self._store.baselines(place.unit, place.bearing)
         version = 1 + max((entry.version for entry in entries), default=0)
         origin = Origin(
-            *(place.unit, place.bearing, place.estimator.value, version, author, now_ns, reason)
+            place.unit, place.bearing, place.estimator.value, version, author, now_ns, reason
         )
         baseline = learn(
             found.history,

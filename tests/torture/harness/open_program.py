@@ -1,4 +1,4 @@
-"""The command, which asks nobody on this computer to log in, as `padwatch demo` does."""
+"""The command; clients on this computer need no login, as with `padwatch demo`."""
 
 import sys
 from functools import partial
