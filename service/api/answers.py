@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from hashlib import blake2b
 from inspect import iscoroutinefunction
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
 import pyarrow as pa
 from fastapi import Request, Response
@@ -29,9 +29,7 @@ from service.runtime.times import rfc3339
 from service.store.access.identities import Identity
 from service.store.port import StoreError
 
-T = TypeVar("T")
-
-Answer = BaseModel | Mapping[str, Any] | bytes
+Answer = BaseModel | Mapping[str, Any]
 Make = Callable[[], Answer] | Callable[[], Awaitable[Answer]]
 
 JSON = "application/json"
@@ -53,15 +51,9 @@ MAX_KNOWN = 4096
 """Number of answered requests that can be repeated without routing; ten for each open page."""
 
 Revision = Callable[[], Hashable]
-Remake = Callable[[str | None], Make]
 
 
-async def in_thread(do: Callable[[], T]) -> T:
-    """Call a function in a thread; return its result."""
-    return await asyncio.to_thread(do)
-
-
-def json_of(answer: BaseModel | Mapping[str, Any]) -> bytes:
+def json_of(answer: Answer) -> bytes:
     """Return an answer as JSON; NaN and infinity in a mapping become null."""
     return to_json(answer, inf_nan_mode="null")
 
@@ -118,7 +110,7 @@ class Answers:
 
     If the bodies exceed `max_bytes` together, the least recently used answers are dropped.
     Concurrent requests for the same answer wait for one computation of it. Answered requests are
-    remembered by caller, so that `Unrouted` and `Repetition` can answer them again.
+    remembered by caller, so that `Repetition` can answer them again.
     """
 
     def __init__(self, max_bytes: int = MAX_CACHE_BYTES) -> None:
@@ -127,10 +119,10 @@ class Answers:
         self._max_bytes, self._n_bytes = max_bytes, 0
         self._kept: OrderedDict[tuple[str, str], Response] = OrderedDict()
         self._making: dict[tuple[str, str], _Making] = {}
-        self._known: OrderedDict[Hashable, tuple[Revision, Remake, object]] = OrderedDict()
+        self._known: OrderedDict[Hashable, tuple[Revision, object]] = OrderedDict()
 
     async def of(
-        self, request: Request, revision: Revision, make: Make, lasting: Remake | None = None
+        self, request: Request, revision: Revision, make: Make, *, is_polled: bool = False
     ) -> Response:
         """Return the answer to a request; status 304 at once if the client has cached it.
 
@@ -140,49 +132,33 @@ class Answers:
             Function that returns a value that changes whenever the answer changes; the text of
             the value identifies the answer.
         make
-            Function that returns the answer; bytes are JSON. It is called in a thread and may
-            block, or is a coroutine function.
-        lasting
-            Function that returns the `make` of a repeated request from its parameter ``since``,
-            which may differ; None if a repeated request must be routed again.
+            Function that returns the answer. It is called in a thread and may block, or is a
+            coroutine function.
+        is_polled
+            Whether `revision` remains that of the request, so that `Repetition` can answer it.
         """
         scope = request.scope
-        if lasting is not None and (asked := _asked(scope, _identity(scope))) is not None:
-            self._known[asked[0]] = revision, lasting, scope["route"]
+        if is_polled and (asked := _asked(scope, _identity(scope))) is not None:
+            self._known[asked] = revision, scope["route"]
             if len(self._known) > MAX_KNOWN:
                 self._known.popitem(last=False)
-        return await self._of(scope, revision, make)
-
-    async def repeated(self, scope: Scope) -> Response | None:
-        """Return the answer to a request that was answered before; None if it must be routed."""
-        found = self._find(scope, _identity(scope))
-        try:
-            return found and await self._of(scope, found[0], found[1])
-        except (ProblemError, StoreError):
-            return None  # the route raises it again
+        key, ready = self._ready(scope, revision)
+        return ready or await self._made(key, make)
 
     def at_once(self, scope: Scope, identity: Identity | None) -> Response | None:
         """Return the answer to a request of a caller that was answered before.
 
         Return None if neither this cache nor the cache of the client contains the answer.
         """
-        found = self._find(scope, identity)
-        try:
-            return found and self._ready(scope, found[0])[1]
-        except (ProblemError, StoreError):
-            return None
-
-    def _find(self, scope: Scope, identity: Identity | None) -> tuple[Revision, Make] | None:
         asked = _asked(scope, identity)
-        if asked is None or asked[0] not in self._known:
+        if asked is None or asked not in self._known:
             return None
-        self._known.move_to_end(asked[0])
-        revision, lasting, scope["route"] = self._known[asked[0]]
-        return revision, lasting(asked[1])
-
-    async def _of(self, scope: Scope, revision: Revision, make: Make) -> Response:
-        key, ready = self._ready(scope, revision)
-        return ready or await self._made(key, make)
+        self._known.move_to_end(asked)
+        revision, scope["route"] = self._known[asked]
+        try:
+            return self._ready(scope, revision)[1]
+        except (ProblemError, StoreError):
+            return None  # the route raises it again
 
     def _ready(self, scope: Scope, revision: Revision) -> tuple[tuple[str, str], Response | None]:
         """Return the key of an answer in the cache, and the answer if it need not be made."""
@@ -222,7 +198,7 @@ class Answers:
         tag, encoding = key
 
         def answer(made: Answer) -> Response:
-            body, headers = encoded(made if isinstance(made, bytes) else json_of(made), encoding)
+            body, headers = encoded(json_of(made), encoding)
             return Response(body, media_type=JSON, headers={"ETag": tag, **headers})
 
         if iscoroutinefunction(make):
@@ -245,7 +221,7 @@ async def rendered(make: Callable[[], BaseModel]) -> Response:
     return Response(await asyncio.to_thread(lambda: json_of(make())), media_type=JSON)
 
 
-SINCE = re.compile(rb"since=([0-9a-f]+-[0-9]{1,18})")
+SINCE = re.compile(rb"since=[0-9a-f]+-[0-9]{1,18}")
 """Query of a request for changes after a revision, which differs from poll to poll."""
 
 
@@ -255,12 +231,12 @@ def _identity(scope: Scope) -> Identity | None:
     return caller.identity
 
 
-def _asked(scope: Scope, identity: Identity | None) -> tuple[Hashable, str | None] | None:
-    """Return what an answer depends on, and the value of ``since`` if it is the only parameter.
+def _asked(scope: Scope, identity: Identity | None) -> Hashable | None:
+    """Return what an answer depends on, except the value of ``since`` as the only parameter.
 
-    The former are identity of the caller, URL without that value, server address, and the headers
-    that select an answer or its host. None for a request that is not repeated: with a body, or
-    another method than GET.
+    This is the identity of the caller, the URL, the server address, and the headers that select an
+    answer or its host. None for a request that is not repeated: with a body, or another method than
+    GET.
     """
     if scope["method"] != "GET":
         return None
@@ -268,30 +244,12 @@ def _asked(scope: Scope, identity: Identity | None) -> tuple[Hashable, str | Non
     if any(name not in (b"accept", b"host") for name, _ in headers):
         return None
     query = scope["query_string"]
-    found = SINCE.fullmatch(query)
-    url = scope["path"], b"since" if found else query
-    asked = identity, url, headers, scope.get("server")
-    return asked, found[1].decode() if found else None
+    url = scope["path"], b"since" if SINCE.fullmatch(query) else query
+    return identity, url, headers, scope.get("server")
 
 
 SELECTING = (b"accept", b"host", b"content-length", b"transfer-encoding")
 """Headers by which requests for the same URL differ."""
-
-
-class Unrouted:
-    """ASGI middleware that answers requests without routing if they were answered before.
-
-    It applies to requests that the same caller with the same rights has made before: permission and
-    parameters were checked then. With fifty polling pages, this halves the computing time.
-    """
-
-    def __init__(self, app: ASGIApp, answers: Answers) -> None:
-        self._app, self._answers = app, answers
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request, or forward it."""
-        answer = await self._answers.repeated(scope)
-        await (answer or self._app)(scope, receive, send)
 
 
 class Repetition:

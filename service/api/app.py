@@ -17,7 +17,6 @@ from service.api.answers import (
     TIME_HEADER,
     AnswerHeaders,
     Repetition,
-    Unrouted,
 )
 from service.api.auth.accounts import access_router
 from service.api.auth.credentials import COOKIE
@@ -206,7 +205,6 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
         clock=context.clock,
     )
     # the last one runs first
-    app.add_middleware(Unrouted, answers=context.answers)
     app.add_middleware(AnswerHeaders, clock=context.clock)
     app.add_middleware(Gate, authenticator=authenticator)
     app.add_middleware(requests.timed)

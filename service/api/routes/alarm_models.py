@@ -10,6 +10,7 @@ from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmState
 from core.alarms.kinds import FILM_STIFFNESS
 from core.alarms.life_cycle import next_level
 from core.change.film_judge import FilmNews
+from core.change.settings import FilmRules
 from core.condition.cells import CellGrid, OperatingPoint
 from core.limits import AlarmLevel
 from service.api.values import (
@@ -245,28 +246,30 @@ def alarm_list_revision(alarms: LiveAlarms, films: LiveFilms) -> Callable[[], Ha
 def alarm_model(engine: LiveAlarms, films: LiveFilms, alarm: Alarm) -> AlarmModel:
     """Return the API model of an alarm with its current state."""
     identity, condition = alarm.identity, alarm.condition
-    is_judged = engine.is_judged(alarm)
+    is_judged, grid = engine.is_judged(alarm), grid_of(films)
     unseen = "not_connected" if condition.is_known else str(condition.reason)
     judged = "within_limits" if condition.level is None else "active"
+    news = _film_news(films, identity)
+    reading = news and news.reading
+    cause = news and news.findings[news.worst].attribution
     return AlarmModel.of(
         alarm,
         identity,
         condition,
         is_active=alarm.level is not None,
         is_chattering=engine.is_chattering(alarm),
-        raised_at=_raised_at(alarm.raised_at, grid_of(films)),
+        raised_at=_raised_at(alarm.raised_at, grid),
         condition=judged if is_judged else "unknown",
         condition_reason=condition.reason if is_judged else unseen,
         value_unit=value_unit(identity.kind),
-        waits_for=_awaited(alarm, films) if is_judged else None,
-        evidence=_evidence(films, identity),
-        film=_film(films, identity),
+        waits_for=_awaited(alarm, news, films.rules(identity.unit)) if is_judged else None,
+        evidence=cause and cause.reason,
+        film=reading and condition_model(reading.time_ns, reading.condition, grid),
     )
 
 
-def _awaited(alarm: Alarm, films: LiveFilms) -> str | None:
+def _awaited(alarm: Alarm, news: FilmNews | None, rules: FilmRules | None) -> str | None:
     """Return the state that an alarm takes after its running delays; None if it stays as it is."""
-    news, rules = _film_news(films, alarm.identity), films.rules(alarm.identity.unit)
     level, timers = alarm.level, [alarm.timers]
     if news is not None and rules is not None:
         timers = [(each.alert, each.danger) for each in news.decisions]
@@ -301,24 +304,6 @@ def _is_chosen(alarm: Alarm, query: AlarmQuery) -> bool:
             for name, wanted in ranges.items()
         )
     )
-
-
-def _film(films: LiveFilms, identity: AlarmIdentity) -> FilmConditionModel | None:
-    """Return the operating condition at the newest reading of the film of an alarm.
-
-    None if the alarm is not about a film, and before the first reading.
-    """
-    news, rules = _film_news(films, identity), films.rules(identity.unit)
-    if news is None or rules is None:
-        return None
-    return condition_model(news.reading.time_ns, news.reading.condition, rules.grid)
-
-
-def _evidence(films: LiveFilms, identity: AlarmIdentity) -> str | None:
-    """Return the reason for the cause of the film's largest change; None without a cause."""
-    news = _film_news(films, identity)
-    found = news.findings[news.worst].attribution if news is not None else None
-    return None if found is None else found.reason
 
 
 def _film_news(films: LiveFilms, identity: AlarmIdentity) -> FilmNews | None:

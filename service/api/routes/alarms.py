@@ -1,5 +1,6 @@
 """Routes for the alarm list, alarm events, and operations on alarms."""
 
+import asyncio
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import Annotated, Any
@@ -10,7 +11,7 @@ from pydantic import Field
 from core.alarms import operation
 from core.limits import AlarmLevel
 from core.units import ns_from_s
-from service.api.answers import in_thread, rendered
+from service.api.answers import rendered
 from service.api.auth.backoff import TokenBucket
 from service.api.auth.gate import Reach, actor_or, identity_of, needs, subject_router
 from service.api.context import Context
@@ -173,7 +174,7 @@ def alarm_router(context: Context) -> APIRouter:
         def make() -> AlarmListModel:
             return alarm_list_model(engine, films, context.origin, chosen, acknowledged)
 
-        return await context.answers.of(request, revision, make, lambda _: make)
+        return await context.answers.of(request, revision, make, is_polled=True)
 
     @router.get(
         "/events",
@@ -201,8 +202,8 @@ def alarm_router(context: Context) -> APIRouter:
 
         if wanted == "json":
             return await rendered(read)
-        found = await in_thread(read)
-        columns = await in_thread(lambda: event_table(found.events))
+        found = await asyncio.to_thread(read)
+        columns = await asyncio.to_thread(event_table, found.events)
         cursor = None if found.next_before is None else str(found.next_before)
         return table_response(wanted, columns, "alarm-events", cursor)
 

@@ -1,13 +1,14 @@
 """Route for the audit trail: recorded actions of persons, machines and the service."""
 
-import json
+import asyncio
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Response
 from pydantic import Field
+from pydantic_core import from_json
 
-from service.api.answers import in_thread, rendered
+from service.api.answers import rendered
 from service.api.auth.gate import subject_router
 from service.api.context import Context
 from service.api.parameters import OptionalTimeRange, at_most, only
@@ -142,7 +143,7 @@ def audit_router(context: Context) -> APIRouter:
         """
         pairs = (each.partition(":") for each in before.split(",")) if before else ()
         numbers = {name: int(number) for name, _, number in pairs}
-        page, cursor = await in_thread(lambda: read_page(chains, query, numbers))
+        page, cursor = await asyncio.to_thread(read_page, chains, query, numbers)
         if wanted == "json":
             own = (each.head_error for each in chains.values())
             errors = [each for each in (context.plant().audit_error, *own) if each]
@@ -189,11 +190,7 @@ def _document(text: str | None) -> dict[str, Any] | None:
     if text is None:
         return None
     try:
-        document = json.loads(text, parse_constant=_refuse)
-    except (ValueError, RecursionError):
+        document = from_json(text, allow_inf_nan=False)
+    except ValueError:
         document = text
     return document if isinstance(document, dict) else {"text": text}
-
-
-def _refuse(constant: str) -> None:
-    raise ValueError(f"{constant} is not a JSON number")

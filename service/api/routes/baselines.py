@@ -10,7 +10,7 @@ from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import CellStatistics
 from core.baseline.history import absolute_and_ratio
 from core.condition.cells import CellGrid
-from service.api.answers import in_thread, rendered
+from service.api.answers import rendered
 from service.api.auth.gate import actor_or, subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.downloads import file_content
@@ -138,7 +138,7 @@ def baseline_router(context: Context) -> APIRouter:
     async def export_baseline(unit: UnitId, bearing: BearingId, version: Version) -> Response:
         """Export the complete baseline as a JSON document, which padwatch can read without loss."""
         context.bearing(unit, bearing)
-        found = await in_thread(lambda: to_json(_stored(context, unit, bearing, version)))
+        found = await asyncio.to_thread(lambda: to_json(_stored(context, unit, bearing, version)))
         name = f"{unit}-{bearing}-baseline-{version}.json"
         headers = {"Content-Disposition": f'attachment; filename="{name}"'}
         return Response(found, headers=headers, media_type="application/json")

@@ -202,10 +202,9 @@ def bearing_router(context: Context) -> APIRouter:
     async def newest_result(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the newest result of a bearing; readings are null if the result is not current."""
         context.bearing(unit, bearing)
-        live = context.live
-        make = partial(latest_model, live, unit, bearing)
-        revision = partial(live.revision, unit)
-        return await context.answers.of(request, revision, make, lambda _: make)
+        make = partial(latest_model, context.live, unit, bearing)
+        revision = partial(context.live.revision, unit)
+        return await context.answers.of(request, revision, make, is_polled=True)
 
     @router.get(
         "/{bearing}/budgets/{quantity}",

@@ -1,5 +1,6 @@
 """Route for the stiffness readings of an oil film over time, with their operating conditions."""
 
+import asyncio
 from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import Annotated, Any, Literal
@@ -13,7 +14,6 @@ from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel
 from core.machine.unit import Estimator
-from service.api.answers import in_thread
 from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange, at_most
@@ -268,7 +268,7 @@ def film_history_router(context: Context) -> APIRouter:
         if wanted == "json":
             revision = partial(context.past_revision, unit, times)
             return await context.answers.of(request, revision, read)
-        columns = await in_thread(lambda: film_table(read()))
+        columns = await asyncio.to_thread(lambda: film_table(read()))
         return table_response(wanted, columns, f"film-{unit}-{bearing}")
 
     return router

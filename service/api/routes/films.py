@@ -264,8 +264,7 @@ def film_router(context: Context) -> APIRouter:
         """
         context.bearing(unit, bearing)
         make = partial(film_model, context, unit, bearing)
-        return await context.answers.of(
-            request, partial(context.now_revision, unit), make, lambda _: make
-        )
+        revision = partial(context.now_revision, unit)
+        return await context.answers.of(request, revision, make, is_polled=True)
 
     return router

@@ -1,11 +1,11 @@
 """Routes for notes about a unit or a bearing at a time."""
 
+import asyncio
 from typing import Annotated
 
 from fastapi import APIRouter, Request
 from pydantic import Field
 
-from service.api.answers import in_thread
 from service.api.auth.gate import actor_or, needs, subject_router
 from service.api.context import Context, UnitId
 from service.api.parameters import Moment, OptionalTimeRange, ns_from_datetime
@@ -39,8 +39,7 @@ def note_router(context: Context) -> APIRouter:
         Of a unit, the 1000 notes that were added last are listed, the newest first.
         """
         context.unit(unit)
-        audit = context.store.audit
-        return await in_thread(lambda: notes_between(audit, unit, *times))
+        return await asyncio.to_thread(notes_between, context.store.audit, unit, *times)
 
     @router.post("", responses=COMMENT_LIMIT, dependencies=[needs(Permission.ACT_ON_ALARMS)])
     async def add_note(request: Request, unit: UnitId, asked: AddNoteModel) -> Note:

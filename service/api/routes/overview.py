@@ -1,6 +1,7 @@
 """Route for the overview of the plant: what a tile shows of each unit, and what changed."""
 
 from collections.abc import Hashable
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
@@ -8,7 +9,6 @@ from pydantic import Field
 
 from core.quality import Level, Reading
 from core.stiffness.estimators import is_reversed, reported_name
-from service.api.answers import Make
 from service.api.auth.gate import subject_router
 from service.api.context import Context
 from service.api.routes.bearings import ResultModel, result_model
@@ -218,10 +218,7 @@ def overview_router(context: Context) -> APIRouter:
         ] = None,
     ) -> Response:
         """Return all units with bearings and films; values that are not current are null."""
-
-        def make(since: str | None) -> Make:
-            return lambda: shown.model(since)
-
-        return await context.answers.of(request, shown.revision, make(since), make)
+        make = partial(shown.model, since)
+        return await context.answers.of(request, shown.revision, make, is_polled=True)
 
     return router

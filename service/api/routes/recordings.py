@@ -1,5 +1,6 @@
 """Routes for recordings of samples: list, description and download of recordings."""
 
+import asyncio
 from collections.abc import Callable, Generator
 from typing import Annotated, Literal
 
@@ -10,7 +11,7 @@ from pydantic import Field
 
 from acquisition.delivery.units import UNIT_OF
 from acquisition.errors import ConfigError
-from service.api.answers import in_thread, rendered
+from service.api.answers import rendered
 from service.api.auth.gate import subject_router
 from service.api.context import Context
 from service.api.downloads import attachment, file_content
@@ -189,7 +190,7 @@ def recording_router(context: Context) -> APIRouter:
         """List the newest finished recordings, and the recordings around alarms in progress."""
         if unit is not None:
             context.unit(unit)
-        found = await in_thread(lambda: library_of(context).newest(limit, unit, kind))
+        found = await asyncio.to_thread(library_of(context).newest, limit, unit, kind)
         plant = context.plant()
         running = sorted(plant.captures.being_made)
         return RecordingsModel(
@@ -245,7 +246,7 @@ async def _download(
 ) -> StreamingResponse:
     await entry_of(context, recording)
     try:
-        pieces = await context.downloads.download(await in_thread(lambda: make(recording)))
+        pieces = await context.downloads.download(await asyncio.to_thread(make, recording))
     except (ConfigError, OSError) as error:
         raise damaged_recording(recording, error) from error
     return attachment(pieces, media_type, f"{recording}.{suffix}")
@@ -261,8 +262,7 @@ def library_of(context: Context) -> RecordingLibrary:
 
 async def entry_of(context: Context, recording: str) -> RecordingEntry:
     """Return the library entry of a recording; raise a problem of status 404 if it is unknown."""
-    library = library_of(context)
-    found = await in_thread(lambda: library.one(recording))
+    found = await asyncio.to_thread(library_of(context).one, recording)
     if found is None:
         detail = f"unknown recording {recording!r}; see /api/v1/recordings"
         raise ProblemError(404, "Unknown recording", detail)

@@ -1,5 +1,6 @@
 """Routes for the amplitude spectra of a bearing: newest spectra, and stored spectra over time."""
 
+import asyncio
 from collections.abc import Sequence
 from functools import partial
 from typing import Annotated, Literal
@@ -12,7 +13,6 @@ from pydantic import Field
 from core.monitor.assessment import Assessment
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.stiffness.order_line import marked_hz
-from service.api.answers import in_thread
 from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import TimeRange, at_most, several
@@ -206,7 +206,7 @@ def spectra_router(context: Context) -> APIRouter:
             found = await context.live.assessment(unit, bearing)
             if found is None:
                 raise no_result(unit, bearing)
-            return await in_thread(lambda: spectrum_model(found, sense))
+            return await asyncio.to_thread(spectrum_model, found, sense)
 
         return await context.answers.of(request, lambda: context.live.revision(unit), newest)
 

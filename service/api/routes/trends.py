@@ -1,5 +1,6 @@
 """Route for trends: quantities of a bearing over time."""
 
+import asyncio
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
 from functools import partial
@@ -11,7 +12,6 @@ from pydantic import Field
 from core.condition.cells import CellGrid
 from core.monitor.catalogue import quantity_named
 from core.units import ns_from_s
-from service.api.answers import in_thread
 from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange, at_most
@@ -158,10 +158,10 @@ def trend_router(context: Context) -> APIRouter:
         make = partial(_read, context, query, group_by, grid)
         if wanted == "json":
             revision = partial(context.past_revision, unit, times)
-            lasting = None if "last" in request.query_params else lambda _: make
-            return await context.answers.of(request, revision, make, lasting)
-        found = await in_thread(make)
-        columns = await in_thread(lambda: trend_table(found))
+            is_fixed = "last" not in request.query_params  # otherwise the range ends now
+            return await context.answers.of(request, revision, make, is_polled=is_fixed)
+        found = await asyncio.to_thread(make)
+        columns = await asyncio.to_thread(trend_table, found)
         return table_response(wanted, columns, f"trends-{unit}-{bearing}", found.next_cursor)
 
     return router
