@@ -138,7 +138,7 @@ class Answers:
             Whether `revision` remains that of the request, so that `Repetition` can answer it.
         """
         scope = request.scope
-        if is_polled and (asked := _asked(scope, _identity(scope))) is not None:
+        if is_polled and (asked := _asked(scope, scope["state"][CALLER].identity)) is not None:
             self._known[asked] = revision, scope["route"]
             if len(self._known) > MAX_KNOWN:
                 self._known.popitem(last=False)
@@ -225,12 +225,6 @@ SINCE = re.compile(rb"since=[0-9a-f]+-[0-9]{1,18}")
 """Query of a request for changes after a revision, which differs from poll to poll."""
 
 
-def _identity(scope: Scope) -> Identity | None:
-    """Return the identity of the caller of a request that `Gate` has authenticated."""
-    caller: Caller = scope["state"][CALLER]
-    return caller.identity
-
-
 def _asked(scope: Scope, identity: Identity | None) -> Hashable | None:
     """Return what an answer depends on, except the value of ``since`` as the only parameter.
 
@@ -281,7 +275,6 @@ class Repetition:
         self._app, self._answers, self._caller = app, answers, caller
         self._observe, self._clock = observe, clock
         added = MutableHeaders(dict(headers))
-        del added["Cache-Control"]
         _add_cache_headers(added)
         self._headers = added.raw
 
@@ -292,9 +285,8 @@ class Repetition:
         if answer is None:
             await self._app(scope, receive, send)
             return
-        date = (_TIME, rfc3339(self._clock.now_ns()).encode())
-        headers = [*answer.raw_headers, date, *self._headers]
-        status = answer.status_code
+        date = (TIME_HEADER.lower().encode(), rfc3339(self._clock.now_ns()).encode())
+        headers, status = [*answer.raw_headers, date, *self._headers], answer.status_code
         await send({"type": "http.response.start", "status": status, "headers": headers})
         await send({"type": "http.response.body", "body": answer.body})
         self._observe(scope["route"].path, status, time.perf_counter() - began_s)
@@ -311,8 +303,6 @@ class Repetition:
 
 TIME_HEADER = "Padwatch-Time"
 """Name of the header with the time of the answer, from which clients compute ages."""
-
-_TIME = TIME_HEADER.lower().encode()
 
 CACHE_CONTROL = "private, no-cache"
 """Value of the header Cache-Control: private caches only, revalidation before each use."""

@@ -64,6 +64,8 @@ MEANINGS = {
     " known bracket stiffness.",
     "stiffness_of_kb": "Film stiffness as a ratio to the bracket stiffness; null if the latter is"
     " known.",
+    "why_not": "Reason why the film is not watched; null if it is watched.",
+    "limits": "Alarm limits of the stiffness; null if the film is not watched.",
     "change_percent": "Most significant mean change of the stiffness, % of the expected stiffness;"
     " null if unknown.",
     "deviation_percent": "Deviation of the reading alone, % of the expected stiffness; null if it"

@@ -51,13 +51,13 @@ def require_order(start_ns: int, end_ns: int) -> None:
 Moment = Annotated[datetime, BeforeValidator(written_as_date)]
 
 
-def time_query(description: str, example: str) -> Any:
-    """Return the declaration of a query parameter for a time."""
-    return Query(description=description, examples=[example])
+def parameter(description: str, example: Any, **options: Any) -> Any:
+    """Return the declaration of a query parameter; `options` are those of `fastapi.Query`."""
+    return Query(description=description, examples=[example], **options)
 
 
-_START = time_query("Start, RFC 3339 with offset.", "2026-11-21T08:00:00Z")
-_END = time_query("End, RFC 3339 with offset.", "2026-11-21T09:00:00Z")
+_START = parameter("Start, RFC 3339 with offset.", "2026-11-21T08:00:00Z")
+_END = parameter("End, RFC 3339 with offset.", "2026-11-21T09:00:00Z")
 
 
 def duration(longest_s: float, description: str, **options: Any) -> Any:
@@ -75,8 +75,7 @@ def at_most(maximum: int, words: str, minimum: int = 1) -> Any:
 
 def several(words: str, examples: list[str], max_length: int) -> Any:
     """Return the declaration of a query parameter for at most `max_length` values, default all."""
-    description = f"{words}; default: all. May be repeated."
-    return Query(max_length=max_length, description=description, examples=[examples])
+    return parameter(f"{words}; default: all. May be repeated.", examples, max_length=max_length)
 
 
 SECONDS = {"min": 60, "h": 3600, "d": 86_400}
@@ -89,10 +88,10 @@ async def time_range(
     end: Annotated[Moment | None, _END] = None,
     last: Annotated[
         str | None,
-        Query(
+        parameter(
+            "Length of the range in place of start: minutes, hours or days.",
+            "24h",
             pattern=r"^[1-9][0-9]{0,4}(min|h|d)$",
-            description="Length of the range in place of start: minutes, hours or days.",
-            examples=["24h"],
         ),
     ] = None,
 ) -> tuple[int, int]:
@@ -135,23 +134,16 @@ def range_of(name: str, words: str, low: float, high: float) -> Any:
     """
 
     def bound(end: str, example: float) -> Any:
-        return Query(
-            alias=f"{name}_{end[:3].lower()}",
-            allow_inf_nan=False,
-            description=f"{end} {words}.",
-            examples=[example],
-        )
+        alias = f"{name}_{end[:3].lower()}"
+        return parameter(f"{end} {words}.", example, alias=alias, allow_inf_nan=False)
 
     async def given(
         minimum: Annotated[float | None, bound("Minimum", low)] = None,
         maximum: Annotated[float | None, bound("Maximum", high)] = None,
     ) -> ValueRange:
         if minimum is not None and maximum is not None and minimum > maximum:
-            parameter = f"{name}_min"
-            detail = (
-                f"{parameter} must be at most {maximum:g}, the requested maximum, got {minimum:g}"
-            )
-            raise ProblemError(422, "Wrong parameter", detail, parameter)
+            detail = f"must be at most {maximum:g}, the requested maximum, got {minimum:g}"
+            raise ProblemError(422, "Wrong parameter", f"{name}_min {detail}", f"{name}_min")
         return ValueRange(minimum, maximum)
 
     return Depends(given)
@@ -166,14 +158,12 @@ Attitude = Annotated[ValueRange, range_of("attitude", "attitude angle, degrees",
 
 States = Annotated[
     list[OperatingStateName] | None,
-    Query(description="Operating state to include; may be repeated.", examples=[["full_load"]]),
+    parameter("Operating state to include; may be repeated.", ["full_load"]),
 ]
 
-OnlyUnit = Annotated[
-    str | None, Query(max_length=32, description="Unit to include; default: all.", examples=["U1"])
-]
+OnlyUnit = Annotated[str | None, parameter("Unit to include; default: all.", "U1", max_length=32)]
 
 
 def only(description: str, example: str, max_length: int | None = None) -> Any:
     """Return the declaration of a query parameter that selects entries by one property."""
-    return Query(max_length=max_length, description=f"Only this {description}.", examples=[example])
+    return parameter(f"Only this {description}.", example, max_length=max_length)

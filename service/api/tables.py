@@ -10,11 +10,12 @@ from typing import Annotated, Any, Literal, TextIO, get_args
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from fastapi import Depends, Query, Request
+from fastapi import Depends, Request
 from fastapi.responses import StreamingResponse
 from pydantic import BaseModel
 
 from service.api.downloads import attachment
+from service.api.parameters import parameter
 from service.runtime.times import rfc3339
 from service.store.access.audit_entries import AuditEntry
 
@@ -110,10 +111,7 @@ async def wanted_format(
     request: Request,
     format: Annotated[  # noqa: A002  the name that callers know
         FormatName | None,
-        Query(
-            description="Format of the answer; default: that of the header Accept, or JSON.",
-            examples=["csv"],
-        ),
+        parameter("Format of the answer; default: that of the header Accept, or JSON.", "csv"),
     ] = None,
 ) -> FormatName:
     """Return the format requested by the query, else by the header Accept, else JSON."""

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import Annotated, Literal, cast
 
 import numpy as np
-from pydantic import AfterValidator, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, StringConstraints
 
 from core.arrays import FloatArray
 from core.condition.cells import BearingCondition, Cell, CellGrid, FilmConditions, OperatingPoint
@@ -72,6 +72,9 @@ class ReasonModel(ActorModel):
 
     reason: ReasonText
 
+
+NoteOrNone = Annotated[str | None, BeforeValidator(lambda text: text or None)]
+"""Type of a stored note; an empty note is converted to None."""
 
 LevelName = Literal["good", "uncertain", "bad"]
 

@@ -9,7 +9,7 @@ import typer
 from acquisition.clock import SystemClock
 from core.machine.unit import Bearing
 from service.api.routes.bearings import ReferenceModel, reference_model
-from service.api.routes.references import SetReferenceModel, set_reference_model
+from service.api.routes.references import SetReferenceModel
 from service.app.storage import has_store
 from service.cli.options import (
     JsonOutput,
@@ -60,7 +60,7 @@ def _bearing_references(
         "gap_reference_um": watched.gap_reference_um,
         "opposite_reference_um": watched.opposite_reference_um,
         "reference": reference_model(newest),
-        "history": [set_reference_model(reference) for reference in history],
+        "history": [SetReferenceModel.of(reference) for reference in history],
     }
 
 

@@ -14,7 +14,7 @@ from core.limits import AlarmLevel
 from core.units import DAY_NS
 from service.api.auth.gate import Reach, subject_router
 from service.api.context import Context
-from service.api.parameters import Moment, OnlyUnit, ns_from_datetime, require_order, time_query
+from service.api.parameters import Moment, OnlyUnit, ns_from_datetime, parameter, require_order
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.alarm_models import AlarmIdText, AlarmModel, alarm_model
 from service.api.values import ApiModel, Time
@@ -146,8 +146,8 @@ def alarm_rate_router(context: Context) -> APIRouter:
     @router.get("/rates", responses=problem_responses(404))
     async def alarm_rates(
         unit: OnlyUnit = None,
-        start: Annotated[Moment | None, time_query(*START)] = None,
-        end: Annotated[Moment | None, time_query(*END)] = None,
+        start: Annotated[Moment | None, parameter(*START)] = None,
+        end: Annotated[Moment | None, parameter(*END)] = None,
     ) -> AlarmRatesModel:
         """Count alarms per ten minutes and day; list frequent, chattering and long-active alarms.
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Path, Query, Request, Response
+from fastapi import APIRouter, Depends, Path, Request, Response
 from pydantic import Field
 
 from core.alarms import operation
@@ -24,6 +24,7 @@ from service.api.parameters import (
     States,
     at_most,
     only,
+    parameter,
 )
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.alarm_models import (
@@ -161,8 +162,7 @@ def alarm_router(context: Context) -> APIRouter:
         request: Request,
         chosen: ChosenAlarms,
         acknowledged: Annotated[
-            bool | None,
-            Query(description="Only alarms that are acknowledged, or are not.", examples=[False]),
+            bool | None, parameter("Only alarms that are acknowledged, or are not.", False)
         ] = None,
     ) -> Response:
         """List alarms that are not normal, most urgent first; then those of unknown condition.
@@ -283,10 +283,7 @@ async def event_query(
     times: OptionalTimeRange,
     alarm: Annotated[str | None, only("alarm", "U1:ujb_shaft_x:channel_not_ok", 128)] = None,
     before: Annotated[
-        int | None,
-        Query(
-            ge=1, le=10**15, description="Return only events older than this id.", examples=[117]
-        ),
+        int | None, parameter("Return only events older than this id.", 117, ge=1, le=10**15)
     ] = None,
     limit: Annotated[int, at_most(MAX_EVENTS, "events in the answer")] = 100,
 ) -> AlarmQuery:

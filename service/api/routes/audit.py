@@ -4,14 +4,14 @@ import asyncio
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Query, Response
+from fastapi import APIRouter, Depends, Response
 from pydantic import Field
 from pydantic_core import from_json
 
 from service.api.answers import rendered
 from service.api.auth.gate import subject_router
 from service.api.context import Context
-from service.api.parameters import OptionalTimeRange, at_most, only
+from service.api.parameters import OptionalTimeRange, at_most, only, parameter
 from service.api.tables import Column, Format, table_content, table_response
 from service.api.values import ApiModel, Time
 from service.store.access.audit_entries import MAX_NAME, AuditEntry, Source
@@ -95,11 +95,11 @@ MAX_ENTRIES = 1000
 NUMBER = "[a-z]{1,16}:[1-9][0-9]{0,14}"
 Cursor = Annotated[
     str | None,
-    Query(
+    parameter(
+        "Only entries after `next_before` of the previous page.",
+        "padwatch:117,access:45",
         pattern=f"^{NUMBER}(,{NUMBER})?$",
         max_length=80,
-        description="Only entries after `next_before` of the previous page.",
-        examples=["padwatch:117,access:45"],
     ),
 ]
 

@@ -89,23 +89,18 @@ def learning_model(
     if since_ns is None:
         since_ns = store.first_ns(place.unit, place.bearing, place.estimator)
     until_ns: int | None = None
-    n_readings: int | None = 0
-    n_days: int | None = 0
+    counts: tuple[int, int] | None = (0, 0)
     if since_ns is not None:
         until_ns = since_ns + round(settings.learning_days * DAY_NS)
-        is_learned = any(
-            entry.estimator is place.estimator and entry.learned_from_ns >= since_ns
-            for entry in entries
-        )
-        n_readings, n_days = (
-            (None, None) if is_learned else _counts(store, place, since_ns, until_ns, settings)
-        )
+        learned = [e for e in entries if e.estimator is place.estimator]
+        is_learned = any(entry.learned_from_ns >= since_ns for entry in learned)
+        counts = None if is_learned else _counts(store, place, since_ns, until_ns, settings)
     return LearningModel.of(
         since=since_ns,
         until=until_ns,
         is_over=until_ns is not None and now_ns >= until_ns,
-        n_readings=n_readings,
-        n_days=n_days,
+        n_readings=counts and counts[0],
+        n_days=counts and counts[1],
         n_days_wanted=settings.baseline.min_learning_days,
         recent=_recent(store, place, settings, now_ns),
     )

@@ -19,6 +19,7 @@ from service.api.values import (
     PLACES,
     ApiModel,
     BearingAnswer,
+    NoteOrNone,
     QualityModel,
     ReadingModel,
     Time,
@@ -42,7 +43,7 @@ class ReferenceModel(ApiModel):
 
     set: Time | None
     author: str | None
-    note: str | None
+    note: NoteOrNone
 
     source: Literal["plant_file", "given", "measured"]
     """Source: plant file, values entered by hand ("given"), or mean measured gaps ("measured")."""
@@ -149,9 +150,7 @@ def reference_model(reference: GapReference | None) -> ReferenceModel:
 
     None means that the gap reference of the plant file is in force.
     """
-    if reference is None:
-        return PLANT_FILE
-    return ReferenceModel.of(reference, note=reference.note or None)
+    return PLANT_FILE if reference is None else ReferenceModel.of(reference)
 
 
 def result_model(

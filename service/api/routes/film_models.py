@@ -132,16 +132,15 @@ class FilmLimitsModel(ApiModel):
 class FilmModel(BearingAnswer):
     """Current state of the oil film of a bearing."""
 
+    why_not: str | None
     estimator: Estimator | None
     baseline_version: int | None
+    limits: FilmLimitsModel | None
     x: FilmDirectionModel | None
     y: FilmDirectionModel | None
 
     is_watched: bool
     """Whether the film is watched: its stiffness is compared with a baseline."""
-
-    why_not: str | None
-    """Reason why the film is not watched; null if it is watched."""
 
     time: Time | None
     """Time of the newest reading; null without a reading since the service started."""
@@ -154,9 +153,6 @@ class FilmModel(BearingAnswer):
 
     condition: FilmConditionModel | None
     """Operating condition of the bearing at the newest result; null without current data."""
-
-    limits: FilmLimitsModel | None
-    """Alarm limits of the stiffness; null if the film is not watched."""
 
     damping_limits: FilmLimitsModel | None
     """Alarm limits of damping over stiffness; null if the film is not watched."""
@@ -174,11 +170,7 @@ class FilmWordModel(FilmVerdictModel, FilmStiffnessModel):
 class FilmBriefModel(ApiModel):
     """Summary of the oil film of a bearing."""
 
+    why_not: str | None
+    limits: FilmLimitsModel | None
     x: FilmWordModel | None
     y: FilmWordModel | None
-
-    why_not: str | None
-    """Reason why the film is not watched; null if it is watched."""
-
-    limits: FilmLimitsModel | None
-    """Alarm limits; null if the film is not watched."""

@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
@@ -14,7 +13,6 @@ from core.change.decision import Decision, Verdict
 from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading
 from core.change.settings import ChangeLimits, FilmRules, percent_of
-from core.limits import AlarmLevel
 from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import ProblemError
@@ -34,12 +32,6 @@ from service.live.status import CurrentBearing
 
 CURRENT_PERIODS = 2.5
 """Maximum time from a current reading to the newest result, in reading periods."""
-
-STIFFNESS_NAMES = (
-    ("stiffness_n_per_m", "expected_n_per_m"),
-    ("stiffness_of_kb", "expected_of_kb"),
-)
-"""Fields of stiffness and expected stiffness, for known and for unknown bracket stiffness."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +54,11 @@ class WatchedFilm:
     news: FilmNews | None
     baseline: BearingBaseline | None
     why_not_current: str | None
+
+    @property
+    def current(self) -> FilmNews | None:
+        """Newest reading with its findings; None if it is not current."""
+        return self.news if self.why_not_current is None else None
 
 
 def why_unwatched(context: Context, unit: str, bearing: str) -> str | None:
@@ -86,7 +83,7 @@ def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
         why_not=why_unwatched(context, unit, bearing),
         estimator=place and place.estimator,
         time=seen.news.reading.time_ns if seen and seen.news else None,
-        is_current=seen is not None and seen.why_not_current is None,
+        is_current=seen is not None and seen.current is not None,
         next_reading=(now.time_ns // period_ns + 1) * period_ns if seen and now else None,
         condition=grid
         and now
@@ -150,43 +147,34 @@ def _why_not_current(
     return None if news.findings[0].baseline_version == version else "baseline_changed"
 
 
-def _directions(seen: WatchedFilm) -> tuple[FilmDirectionModel, FilmDirectionModel]:
-    if seen.news is None or seen.why_not_current is not None:
-        levels = [f.level for f in seen.news.findings] if seen.news else [None] * len(QUANTITIES)
-        reason = seen.why_not_current or ""
-        x, y = (_unread(reason, *levels[row::2]) for row in range(2))
-        return x, y
-    x, y = (_direction(seen, seen.news, row) for row in range(len(DIRECTIONS)))
-    return x, y
+def _directions(seen: WatchedFilm) -> list[FilmDirectionModel]:
+    return [_direction(seen, row) for row in range(len(DIRECTIONS))]
 
 
-def _unread(
-    reason: str, level: AlarmLevel | None, ck_level: AlarmLevel | None
-) -> FilmDirectionModel:
-    """Return the state in a direction without a current reading: a reason and the alarm levels."""
-    why = {"verdict": "no_reading", "reason": reason}
-    unknown = dict.fromkeys(("change", "deviation", "cause"), None)
-    ck = FilmDampingModel.of(**why, level=ck_level, **unknown, ck_s=None, expected_s=None)
-    values = dict.fromkeys(chain(*STIFFNESS_NAMES), None)
-    return FilmDirectionModel.of(**why, level=level, **unknown, **values, damping=ck)
-
-
-def _direction(seen: WatchedFilm, news: FilmNews, row: int) -> FilmDirectionModel:
+def _direction(seen: WatchedFilm, row: int) -> FilmDirectionModel:
     ck = row + len(DIRECTIONS)
-    k_n_per_m, expected_n_per_m = _with_expected(news, row)
-    names = STIFFNESS_NAMES[bool(are_ratios(news.reading.values[row].ln_k))]
-    values = dict.fromkeys(chain(*STIFFNESS_NAMES), None)
-    ck_s, expected_s = _with_expected(news, ck)
+    k, of_kb = _with_expected(seen, row), [None, None]
+    if seen.current is not None and are_ratios(seen.current.reading.values[row].ln_k):
+        k, of_kb = of_kb, k
+    ck_s, expected_s = _with_expected(seen, ck)
     return FilmDirectionModel.of(
-        **_decided(seen, news, row),
-        **values | dict(zip(names, (k_n_per_m, expected_n_per_m), strict=True)),
-        damping=FilmDampingModel.of(**_decided(seen, news, ck), ck_s=ck_s, expected_s=expected_s),
+        **_decided(seen, row),
+        stiffness_n_per_m=k[0],
+        expected_n_per_m=k[1],
+        stiffness_of_kb=of_kb[0],
+        expected_of_kb=of_kb[1],
+        damping=FilmDampingModel.of(**_decided(seen, ck), ck_s=ck_s, expected_s=expected_s),
     )
 
 
-def _decided(seen: WatchedFilm, news: FilmNews, row: int) -> dict[str, Any]:
+def _decided(seen: WatchedFilm, row: int) -> dict[str, Any]:
     """Return the fields of `FilmQuantityModel`, of a row of `QUANTITIES`."""
-    finding, rules = news.findings[row], seen.rules
+    news, rules = seen.current, seen.rules
+    if news is None:
+        level = seen.news and seen.news.findings[row].level
+        why = {"verdict": "no_reading", "reason": seen.why_not_current, "level": level}
+        return why | dict.fromkeys(("change", "deviation", "cause"), None)
+    finding = news.findings[row]
     return {
         "verdict": finding.verdict,
         "reason": _reason(seen, news.reading, finding),
@@ -197,11 +185,13 @@ def _decided(seen: WatchedFilm, news: FilmNews, row: int) -> dict[str, Any]:
     }
 
 
-def _with_expected(news: FilmNews, row: int) -> list[float | None]:
+def _with_expected(seen: WatchedFilm, row: int) -> list[float | None]:
     """Return the value and the expected value of a row of `QUANTITIES`; None if unknown."""
-    finding = news.findings[row]
+    if seen.current is None:
+        return [None, None]
+    finding = seen.current.findings[row]
     quantity = QUANTITIES[finding.quantity]
-    value = getattr(news.reading.values[quantity.row], quantity.value)
+    value = getattr(seen.current.reading.values[quantity.row], quantity.value)
     expected = math.nan if finding.deviation is None else value - finding.deviation
     return [None if math.isnan(each) else math.exp(each) for each in (value, expected)]
 

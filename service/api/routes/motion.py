@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Response
 from pydantic import Field
 
 from acquisition.errors import ConfigError
@@ -14,7 +14,7 @@ from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
 from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
-from service.api.parameters import duration
+from service.api.parameters import duration, parameter
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.channels import NEWEST, NO_SAMPLES, held_blocks, require_samples
 from service.api.routes.recordings import (
@@ -214,17 +214,15 @@ def recorded_motion_router(context: Context) -> APIRouter:
     @router.get("/{recording}/motion", responses=RECORDING_PROBLEMS, response_model=MotionModel)
     async def motion(
         recording: RecordingId,
-        bearing: Annotated[
-            str, Query(max_length=32, description="Identifier of the bearing.", examples=["UJB"])
-        ],
+        bearing: Annotated[str, parameter("Identifier of the bearing.", "UJB", max_length=32)],
         start_s: Annotated[
             float,
-            Query(
+            parameter(
+                "Start, seconds from the first sample of the recording.",
+                30.0,
                 ge=0.0,
                 le=1e7,
                 allow_inf_nan=False,
-                description="Start, seconds from the first sample of the recording.",
-                examples=[30.0],
             ),
         ] = 0.0,
         seconds: Annotated[float, duration(MAX_SECONDS, "Duration.")] = 10.0,

@@ -4,13 +4,14 @@ from collections.abc import Hashable
 from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
 from core.quality import Level, Reading
 from core.stiffness.estimators import is_reversed, reported_name
 from service.api.auth.gate import subject_router
 from service.api.context import Context
+from service.api.parameters import parameter
 from service.api.routes.bearings import ResultModel, result_model
 from service.api.routes.film_models import FilmBriefModel
 from service.api.routes.films import film_brief
@@ -210,10 +211,10 @@ def overview_router(context: Context) -> APIRouter:
         request: Request,
         since: Annotated[
             str | None,
-            Query(
+            parameter(
+                "`revision` of an earlier answer: only units that changed after it.",
+                "9f86d081-412",
                 max_length=40,
-                description="`revision` of an earlier answer: only units that changed after it.",
-                examples=["9f86d081-412"],
             ),
         ] = None,
     ) -> Response:

@@ -15,6 +15,7 @@ from service.api.values import (
     ApiModel,
     BearingAnswer,
     ByName,
+    NoteOrNone,
     NoteText,
     OperatingStateName,
     PlaceName,
@@ -22,7 +23,6 @@ from service.api.values import (
 )
 from service.live.commands import TakeReference
 from service.store.access.identities import Permission
-from service.store.references import GapReference, SetVectorReference
 
 
 class SetReferenceModel(ApiModel):
@@ -30,7 +30,7 @@ class SetReferenceModel(ApiModel):
 
     set: Time
     author: str
-    note: str | None
+    note: NoteOrNone
 
     gap_reference_um: MicrometrePair
     """Probe gaps [x, y] with the shaft centred, µm."""
@@ -58,7 +58,7 @@ class Order1ReferenceModel(BearingAnswer):
 
     set: Time
     author: str
-    note: str | None
+    note: NoteOrNone
 
     state: Annotated[OperatingStateName, ByName]
     """Operating state to which the reference applies."""
@@ -72,11 +72,6 @@ class TakeReferenceModel(ActorModel):
 
     note: NoteText = ""
     """Note, at most 500 printable characters."""
-
-
-def set_reference_model(reference: GapReference) -> SetReferenceModel:
-    """Return the API model of a stored gap reference."""
-    return SetReferenceModel.of(reference, note=reference.note or None)
 
 
 TAKE_PROBLEMS = problem_responses(own={409: "The present condition does not permit a reference"})
@@ -95,7 +90,7 @@ def reference_router(context: Context) -> APIRouter:
         """
         context.bearing(unit, bearing)
         history = await asyncio.to_thread(context.store.gap_references.history, unit, bearing)
-        return [set_reference_model(reference) for reference in history]
+        return [SetReferenceModel.of(reference) for reference in history]
 
     @router.get("/order1-references", name="references")
     async def order1_references(unit: UnitId, bearing: BearingId) -> list[Order1ReferenceModel]:
@@ -106,7 +101,7 @@ def reference_router(context: Context) -> APIRouter:
         """
         context.bearing(unit, bearing)
         history = await asyncio.to_thread(context.store.order1_references.history, unit, bearing)
-        return [_model(found) for found in history]
+        return [Order1ReferenceModel.of(found, found.reference) for found in history]
 
     @router.post(
         "/order1-references",
@@ -119,10 +114,7 @@ def reference_router(context: Context) -> APIRouter:
         """Store the 1× vectors of the newest result as reference for its operating state."""
         context.bearing(unit, bearing)
         command = TakeReference(unit, bearing, actor_or(asked.actor), asked.note)
-        return _model(await context.operators.take_reference(command))
+        taken = await context.operators.take_reference(command)
+        return Order1ReferenceModel.of(taken, taken.reference)
 
     return router
-
-
-def _model(found: SetVectorReference) -> Order1ReferenceModel:
-    return Order1ReferenceModel.of(found, found.reference, note=found.note or None)

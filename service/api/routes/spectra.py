@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 import structlog
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
 from core.monitor.assessment import Assessment
@@ -15,7 +15,7 @@ from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, 
 from core.stiffness.order_line import marked_hz
 from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
-from service.api.parameters import TimeRange, at_most, several
+from service.api.parameters import TimeRange, at_most, parameter, several
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.bearings import no_result
 from service.api.values import (
@@ -221,8 +221,7 @@ def spectra_router(context: Context) -> APIRouter:
             int, at_most(MAX_SPECTRA, "spectra; more are thinned evenly", minimum=2)
         ] = 200,
         max_frequency_hz: Annotated[
-            float | None,
-            Query(gt=0.0, allow_inf_nan=False, description="Maximum frequency.", examples=[6.0]),
+            float | None, parameter("Maximum frequency.", 6.0, gt=0.0, allow_inf_nan=False)
         ] = None,
     ) -> Response:
         """List stored averaged amplitude spectra, all as displacement.
