@@ -55,11 +55,7 @@ def header(description: str, example: Any, kind: str = "string", **limits: Any) 
 
     `kind` is the JSON type of its value; `limits` are further members of its schema.
     """
-    return {
-        "description": description,
-        "schema": {"type": kind, **limits},
-        "example": example,
-    }
+    return {"description": description, "schema": {"type": kind, **limits}, "example": example}
 
 
 TAG = 'W/"1f2e3d4c5b6a79880716253f"'

@@ -11,13 +11,7 @@ from service.api.auth.passwords import MAX_LENGTH
 from service.api.context import Context
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel, Time
-from service.store.access.identities import (
-    MAX_DAYS,
-    MAX_NAME,
-    Means,
-    Permission,
-    Role,
-)
+from service.store.access.identities import MAX_DAYS, MAX_NAME, Means, Permission, Role
 
 RoleName = Literal["viewer", "operator", "engineer", "admin"]
 

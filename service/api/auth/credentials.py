@@ -15,8 +15,6 @@ COOKIE = "__Host-padwatch"
 PLAIN_COOKIE = "padwatch"
 """Name of the session cookie over HTTP, since some browsers reject secure cookies over HTTP."""
 
-BEARER = "bearer"
-
 
 def credentials_of(scope: Scope) -> tuple[Means | None, str]:
     """Return the credentials in the headers of a request; a key takes precedence over a cookie.
@@ -27,7 +25,7 @@ def credentials_of(scope: Scope) -> tuple[Means | None, str]:
     """
     headers = Headers(scope=scope)
     pairs = [value.partition(" ") for value in headers.getlist("authorization")]
-    keys = [key.strip() for scheme, _, key in pairs if scheme.lower() == BEARER]
+    keys = [key.strip() for scheme, _, key in pairs if scheme.lower() == "bearer"]
     if keys:
         return Means.KEY, keys[0] if len(keys) == 1 else ""
     cookies = ";".join(headers.getlist("cookie")).split(";")

@@ -30,8 +30,6 @@ from service.settings.alarm_kinds import LEVEL_NAMES, AlarmKindName, AlarmLevelN
 from service.settings.storage import Origin
 from service.store.port import AlarmQuery, StoredEvent, ValueRange
 
-ConditionName = Literal["active", "within_limits", "unknown"]
-
 AlarmIdText = Annotated[
     str,
     Field(
@@ -124,7 +122,7 @@ class AlarmModel(AlarmFactsModel):
     raised: Time | None
     """Start of the newest occurrence; null if the alarm was never raised."""
 
-    condition: ConditionName
+    condition: Literal["active", "within_limits", "unknown"]
     """Condition of the alarm by the newest data; "unknown" without good data. An active alarm whose
     condition becomes unknown stays active."""
 

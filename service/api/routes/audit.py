@@ -133,9 +133,7 @@ def audit_router(context: Context) -> APIRouter:
 
     @router.get("", response_model=AuditModel, responses=table_content("Audit trail"))
     async def audit_trail(
-        query: Annotated[AuditQuery, Depends(audit_query)],
-        wanted: Format,
-        before: Cursor = None,
+        query: Annotated[AuditQuery, Depends(audit_query)], wanted: Format, before: Cursor = None
     ) -> Response:
         """List audit entries with actor, action, object and state, newest first, in pages.
 

@@ -12,12 +12,7 @@ from core.condition.operating_state import STEADY
 from core.machine.unit import Estimator
 from core.units import DAY_NS
 from service.api.parameters import Moment
-from service.api.values import (
-    ApiModel,
-    BearingAnswer,
-    ReasonModel,
-    Time,
-)
+from service.api.values import ApiModel, BearingAnswer, ReasonModel, Time
 from service.live.commands import FilmPlace
 from service.live.models import BaselineOriginModel
 from service.settings.films import FilmAlarmSettings
@@ -145,8 +140,6 @@ def _complete(found: FilmHistory, settings: FilmAlarmSettings) -> list[npt.NDArr
 
 BaselineStatusName = Literal["in_force", "rejected", "superseded", "learned"]
 
-SupportName = Literal["own", "borrowed", "none"]
-
 
 class BaselineVersionModel(BaselineOriginModel, ApiModel):
     """Version of the learned baseline of a bearing, without its cells."""
@@ -225,7 +218,7 @@ class BaselineCellsModel(ApiModel):
     surface_std_percent: list[float]
     """Standard uncertainty of the fitted surface at the median condition of the cell, %."""
 
-    support: list[SupportName]
+    support: list[Literal["own", "borrowed", "none"]]
     """Basis on which new readings in the cell are judged: learned readings of the cell ("own"), of
     neighbouring cells ("borrowed"), or no basis ("none")."""
 

@@ -105,7 +105,7 @@ ACTION_PROBLEMS = problem_responses(
     own={
         404: "Unknown unit, bearing or version",
         409: "Conflict with the present baselines, or the film is not monitored",
-    },
+    }
 )
 
 PATH = "/units/{unit}/bearings/{bearing}/baselines"
@@ -192,11 +192,7 @@ def baseline_action_router(context: Context) -> APIRouter:
 
 
 async def _done(
-    context: Context,
-    unit: str,
-    bearing: str,
-    action: commands.BaselineAction,
-    asked: ReasonModel,
+    context: Context, unit: str, bearing: str, action: commands.BaselineAction, asked: ReasonModel
 ) -> BaselinesModel:
     """Execute an action on baselines; return the baselines after the action is stored."""
     if isinstance(action, commands.Accept | commands.Reject):

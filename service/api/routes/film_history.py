@@ -35,10 +35,6 @@ from service.settings.alarm_kinds import AlarmLevelName
 from service.store.film_readings import FilmHistory, FilmQuery
 from service.store.port import QueryTooLargeError
 
-EvidenceName = Literal["measured", "insufficient_excitation", "bad_quality"]
-
-ProvenanceName = Literal["measured", "simulated"]
-
 
 class FilmSeriesModel(ApiModel):
     """Readings of a film in x or y; every list has one value per time, null if unknown."""
@@ -58,7 +54,7 @@ class FilmSeriesModel(ApiModel):
     bearing_um_pk: list[float | None]
     """1× amplitude of the bearing, µm zero-to-peak."""
 
-    evidence: list[Annotated[EvidenceName, ByName]]
+    evidence: list[Annotated[Literal["measured", "insufficient_excitation", "bad_quality"], ByName]]
     """State of the reading: "measured", or the reason why its stiffness is unknown."""
 
     verdict: list[Annotated[VerdictName, ByName]]
@@ -106,7 +102,7 @@ class FilmReadingsModel(BearingHistory):
     time: list[TimeNs]
     """Times of the readings."""
 
-    provenance: list[ProvenanceName]
+    provenance: list[Literal["measured", "simulated"]]
     """Origin of the readings: "measured" on the machine, or "simulated"."""
 
 

@@ -5,13 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from core.machine.unit import Estimator
-from service.api.values import (
-    ApiModel,
-    BearingAnswer,
-    ByName,
-    FilmConditionModel,
-    Time,
-)
+from service.api.values import ApiModel, BearingAnswer, ByName, FilmConditionModel, Time
 from service.live.models import FilmCauseModel
 from service.settings.alarm_kinds import AlarmLevelName
 

@@ -17,12 +17,7 @@ from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import duration, parameter
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.channels import NEWEST, NO_SAMPLES, held_blocks, require_samples
-from service.api.routes.recordings import (
-    RecordingId,
-    damaged_recording,
-    entry_of,
-    library_of,
-)
+from service.api.routes.recordings import RecordingId, damaged_recording, entry_of, library_of
 from service.api.values import ApiModel, BearingAnswer, SampleRange, Time, listed
 from service.live.samples import newest_blocks, sample_window
 from service.live.status import HELD_S

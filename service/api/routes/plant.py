@@ -90,18 +90,15 @@ class SourceModel(LinkModel):
     """Offset and drift of the device clock; null if unknown."""
 
 
-SourceKind = Literal[
-    "modbus_ring", "modbus_fifo", "modbus_polled", "modbus_vector", "can", "simulated"
-]
-
-
 class SourceHealthModel(SourceModel):
     """Data source of a unit: kind, state, and counts of its samples."""
 
     unit: Annotated[str, Field(examples=["U1"])]
     rate_hz: float
 
-    kind: SourceKind
+    kind: Literal[
+        "modbus_ring", "modbus_fifo", "modbus_polled", "modbus_vector", "can", "simulated"
+    ]
     """Kind of source: protocol of the device, or simulation."""
 
     n_failed: int
@@ -127,10 +124,7 @@ def source_model(live: LiveUnits, unit: str) -> SourceModel:
         n_stamp_faults=status.clock.n_faults,
     )
     return SourceModel.of(
-        status,
-        status.account,
-        last_sample_time=status.last_sample_ns,
-        clock=clock,
+        status, status.account, last_sample_time=status.last_sample_ns, clock=clock
     )
 
 
