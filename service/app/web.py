@@ -11,8 +11,7 @@ from service.api.answers import EDITION_HEADER, ORIGIN_HEADER
 from service.api.app import GuardedApi, Repeating, create_app
 from service.api.auth.authenticator import Authenticator
 from service.api.context import Context
-from service.api.http.middleware import TrustedProxy
-from service.api.http.server import HttpServer, http_server
+from service.api.server import HttpServer, TrustedProxy, http_server
 from service.app.listener import tls_of
 from service.dashboard.assets import StaticFiles, edition
 from service.reports.routes import EvidenceService, evidence_router

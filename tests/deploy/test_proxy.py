@@ -15,8 +15,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse
 from starlette.types import Receive, Scope, Send
 
-from service.api.http.middleware import TrustedProxy
-from service.api.http.server import http_server
+from service.api.server import TrustedProxy, http_server
 from service.runtime.listening import socket_file
 from service.settings.processes import HttpLimitSettings
 

@@ -11,7 +11,7 @@ import httpx2
 from starlette.requests import Request
 
 from service.api.answers import Answers, json_of
-from service.api.http.middleware import SECURITY_HEADERS, AddedHeaders
+from service.api.server import SECURITY_HEADERS, AddedHeaders
 from service.live.status import LinkState
 from service.measuring.recorder import Findings
 from service.runtime.asker import ASKER

@@ -13,8 +13,8 @@ from pydantic import BaseModel
 
 from service.api.app import GuardedApi
 from service.api.auth.gate import OPEN, declared
-from service.api.http.server import HttpServer, http_server
 from service.api.problems import install_problem_handlers, refuse_unknown_parameters
+from service.api.server import HttpServer, http_server
 from service.runtime.asker import ASKER, Asker
 from service.settings.processes import HttpLimitSettings
 

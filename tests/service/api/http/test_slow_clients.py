@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from service.api.http.middleware import TrustedProxy
+from service.api.server import TrustedProxy
 from service.runtime.listening import CertificateError, PortInUseError, server_tls, socket_file
 
 
