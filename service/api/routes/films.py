@@ -153,9 +153,10 @@ def _directions(seen: WatchedFilm) -> list[FilmDirectionModel]:
 
 def _direction(seen: WatchedFilm, row: int) -> FilmDirectionModel:
     ck = row + len(DIRECTIONS)
-    k, of_kb = _with_expected(seen, row), [None, None]
+    unknown: list[float | None] = [None, None]
+    k, of_kb = _with_expected(seen, row), unknown
     if seen.current is not None and are_ratios(seen.current.reading.values[row].ln_k):
-        k, of_kb = of_kb, k
+        k, of_kb = unknown, k
     ck_s, expected_s = _with_expected(seen, ck)
     return FilmDirectionModel.of(
         **_decided(seen, row),
