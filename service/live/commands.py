@@ -4,16 +4,14 @@ import asyncio
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from importlib.metadata import version as version_of
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, get_args
 
 from pydantic import TypeAdapter, ValidationError
 
-from core.alarms import operation
 from core.alarms.alarm import Alarm
 from core.alarms.operation import Action, ActionRefusedError
 from core.machine.unit import Estimator
 from service.live.alarm_list import LiveAlarms
-from service.store.baselines import BaselineEntry, BaselineStep, StoredStep, Versions
 from service.store.notes import Note
 from service.store.references import SetVectorReference
 from service.store.sharing import Answer, CommandState
@@ -67,88 +65,6 @@ class Renew:
 BaselineAction: TypeAlias = Accept | Reject | Freeze | Thaw | Renew
 
 
-def baseline_step(
-    action: BaselineAction,
-    place: FilmPlace,
-    versions: Versions,
-    entries: list[BaselineEntry],
-    actor: str,
-    reason: str,
-    now_ns: int,
-) -> StoredStep:
-    """Return the step of the baseline history that an action on a baseline adds.
-
-    Raises `BaselineRefusedError` if the action is not possible in the present state of the
-    baselines.
-
-    Parameters
-    ----------
-    action, place
-        Action, and the oil film whose baselines it concerns.
-    versions
-        Present state of the bearing's baselines.
-    entries
-        All baselines of the bearing.
-    actor, reason
-        Author of the action and the reason given, stored with the step.
-    now_ns
-        Host time of the action, ns since 1970 UTC.
-    """
-    version: int | None = versions.in_force
-    from_ns: int | None = None
-    match action:
-        case Accept():
-            step, version = BaselineStep.ACCEPTED, action.version
-            _require_acceptable(action.version, place, versions, entries)
-        case Reject():
-            is_in_force, version = action.version == version, action.version
-            step = BaselineStep.WITHDRAWN if is_in_force else BaselineStep.REJECTED
-            _entry(action.version, entries)
-            if version in versions.rejected:
-                raise BaselineRefusedError(f"version {version} is already rejected")
-        case Freeze():
-            step = BaselineStep.FROZEN
-            if versions.is_frozen:
-                raise BaselineRefusedError(f"the baseline of {place.bearing} is already frozen")
-            if version is None:
-                raise BaselineRefusedError(f"{place.bearing} has no baseline in force; accept one")
-        case Thaw():
-            step = BaselineStep.THAWED
-            if not versions.is_frozen:
-                raise BaselineRefusedError(f"the baseline of {place.bearing} is not frozen")
-        case Renew():
-            step, version, from_ns = BaselineStep.RENEWED, None, action.from_ns
-            if from_ns > now_ns:
-                raise BaselineRefusedError("the time of a machine event must not be in the future")
-            if versions.renewed_ns is not None and from_ns < versions.renewed_ns:
-                raise BaselineRefusedError("a later machine event exists; enter a time after it")
-    return StoredStep(place.unit, place.bearing, version, step, now_ns, actor, reason, from_ns)
-
-
-def _entry(version: int, entries: list[BaselineEntry]) -> BaselineEntry:
-    for entry in entries:
-        if entry.version == version:
-            return entry
-    raise BaselineRefusedError(f"version {version} does not exist; choose a listed version")
-
-
-def _require_acceptable(
-    version: int, place: FilmPlace, versions: Versions, entries: list[BaselineEntry]
-) -> None:
-    entry = _entry(version, entries)
-    if version == versions.in_force:
-        raise BaselineRefusedError(f"version {version} is already in force")
-    if entry.estimator is not place.estimator:
-        raise BaselineRefusedError(
-            f"version {version} was learned with estimator {entry.estimator};"
-            f" the plant file selects {place.estimator}"
-        )
-    if versions.renewed_ns is not None and entry.learned_from_ns < versions.renewed_ns:
-        raise BaselineRefusedError(
-            f"version {version} is older than the last machine event; accept a later one"
-        )
-
-
 class UnreadableCommandError(Exception):
     """Error raised if a command is damaged or from another version of the program."""
 
@@ -186,19 +102,14 @@ class TakeReference:
 
 OperatorCommand: TypeAlias = AlarmCommand | BaselineCommand | TakeReference | Note
 
-_ALARM_ACTIONS = (
-    *(operation.Acknowledge, operation.Shelve, operation.Unshelve, operation.TakeOutOfService),
-    *(operation.ReturnToService, operation.Reset, operation.Comment),
-)
-
 _KINDS: dict[str, tuple[type[OperatorCommand], TypeAdapter[Any]]] = {
     **{
         kind.__name__: (AlarmCommand, TypeAdapter(tuple[str, kind]))  # type: ignore[valid-type]
-        for kind in _ALARM_ACTIONS
+        for kind in get_args(Action)
     },
     **{
         kind.__name__: (BaselineCommand, TypeAdapter(tuple[FilmPlace, kind, str, str]))  # type: ignore[valid-type]
-        for kind in (Accept, Reject, Freeze, Thaw, Renew)
+        for kind in get_args(BaselineAction)
     },
     TakeReference.__name__: (TakeReference, TypeAdapter(tuple[str, str, str, str])),
     Note.__name__: (Note, TypeAdapter(tuple[str, str | None, int, str, str])),
@@ -286,13 +197,8 @@ class Operators(ABC):
         CommandFailedError
             If the action was not carried out or not stored.
         """
-        answer = await self._carried_out(
-            self._alarms.owner(id_), AlarmCommand(id_, action), action.actor
-        )
-        if answer.state is CommandState.UNKNOWN:
-            raise LookupError(answer.words)
-        if answer.state is CommandState.REFUSED:
-            raise ActionRefusedError(answer.words)
+        command = AlarmCommand(id_, action)
+        await self._execute(self._alarms.owner(id_), command, action.actor, ActionRefusedError)
         self._alarms.take_stored(await asyncio.to_thread(self._store.alarms))
         return self._alarms.alarm(id_)
 
@@ -309,9 +215,7 @@ class Operators(ABC):
             If the action was not carried out or not stored.
         """
         command = BaselineCommand(place, action, actor, reason)
-        answer = await self._carried_out(place.unit, command, actor)
-        if answer.state is CommandState.REFUSED:
-            raise BaselineRefusedError(answer.words)
+        await self._execute(place.unit, command, actor, BaselineRefusedError)
 
     async def take_reference(self, command: TakeReference) -> SetVectorReference:
         """Store the newest 1× vectors of a bearing as reference, and return the reference.
@@ -323,25 +227,34 @@ class Operators(ABC):
         CommandFailedError
             If the command was not carried out or not stored.
         """
-        answer = await self._carried_out(command.unit, command, command.actor)
-        if answer.state is CommandState.REFUSED:
-            raise ReferenceRefusedError(answer.words)
+        await self._execute(command.unit, command, command.actor, ReferenceRefusedError)
         history = self._store.order1_references.history
         return (await asyncio.to_thread(history, command.unit, command.bearing))[0]
 
     async def add_note(self, note: Note) -> None:
         """Store an operator's note; raise `CommandFailedError` if it was not stored."""
-        await self._carried_out(note.unit, note, note.author)
+        await self._execute(note.unit, note, note.author)
 
-    async def _carried_out(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
+    async def _execute(
+        self,
+        unit: str,
+        command: OperatorCommand,
+        actor: str,
+        refusal: type[Exception] | None = None,
+    ) -> None:
+        """Send a command, and raise an error if it failed: `refusal` if the command is refused."""
         answer = await self.send(unit, command, actor)
+        if answer.state is CommandState.UNKNOWN:
+            raise LookupError(answer.words)
+        if answer.state is CommandState.REFUSED and refusal is not None:
+            raise refusal(answer.words)
         if answer.state in FAILED:
             words = answer.words or "not stored yet; check its result before you repeat it"
             raise CommandFailedError(FAILED[answer.state], f"unit {unit}: {words}")
-        return answer
 
 
 FAILED = {
+    CommandState.REFUSED: "Action not applied",
     CommandState.WITHDRAWN: "Action not applied",
     CommandState.INTERRUPTED: "Not stored",
     CommandState.TAKEN: "Not stored yet",

@@ -32,6 +32,11 @@ CATCH_UP_NS = 21 * DAY_NS
 """Length of the history from which decisions are computed, ns; a multiple of the longest mean."""
 
 
+def places_of(unit: str, rules: FilmRules) -> list[FilmPlace]:
+    """Return the monitored bearings of a unit with the estimators of their stiffness."""
+    return [FilmPlace(unit, bearing, each) for bearing, each in rules.estimators.items()]
+
+
 def in_force(
     store: FilmStore, place: FilmPlace, rules: FilmRules
 ) -> tuple[BearingBaseline | None, tuple[Decision, ...]]:
@@ -70,7 +75,7 @@ def resume_films(
     watch: FilmWatch,
 ) -> None:
     """Restore the film monitor ``watch`` of a unit from stored readings, decisions and response."""
-    places = [FilmPlace(unit, *item) for item in rules.estimators.items()]
+    places = places_of(unit, rules)
     start_ns = _newest_ns(store, places[0]) - TAIL_NS
     found = {
         place.bearing: store.history(FilmQuery(unit, place.bearing, place.estimator, start_ns))
@@ -205,7 +210,7 @@ class Learner:
         -------
         The response; None if there are too few readings at times common to all bearings.
         """
-        places = [FilmPlace(unit, *item) for item in rules.estimators.items()]
+        places = places_of(unit, rules)
         found = {p.bearing: self._readings(p, self.versions(p), now_ns) for p in places}
         rows = common_rows(found)
         histories = {bearing: film.history.where(rows[bearing]) for bearing, film in found.items()}

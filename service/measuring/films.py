@@ -2,7 +2,6 @@
 
 import asyncio
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import structlog
 
@@ -17,13 +16,22 @@ from core.change.settings import FilmRules
 from core.limits import Judgement
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
-from service.live.commands import BaselineAction, FilmPlace, baseline_step
-from service.measuring.baseline_learning import Learner, in_force, resume_films
+from service.live.commands import (
+    Accept,
+    BaselineAction,
+    BaselineRefusedError,
+    FilmPlace,
+    Freeze,
+    Reject,
+    Renew,
+    Thaw,
+)
+from service.measuring.baseline_learning import Learner, in_force, places_of, resume_films
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.core_values import film_rules_of
 from service.settings.films import FilmAlarmSettings
 from service.settings.plant import PlantFile
-from service.store.baselines import StoredStep, Versions
+from service.store.baselines import BaselineEntry, BaselineStep, StoredStep, Versions
 from service.store.films import FilmStore
 from service.store.port import StoreError
 
@@ -31,15 +39,6 @@ log = structlog.get_logger()
 
 MAX_LEARN_S = 900.0
 """Maximum duration of learning one bearing's baseline from its whole history, s."""
-
-
-@dataclass(frozen=True)
-class WatchedFilms:
-    """Films of a unit: rules, state, and newest reading with findings by bearing id."""
-
-    rules: FilmRules
-    watch: FilmWatch
-    newest: dict[str, FilmNews]
 
 
 class FilmMonitor:
@@ -60,11 +59,9 @@ class FilmMonitor:
         self._store, self._clock, self.settings = store, clock, settings
         self.learner = Learner(store, settings)
         self._acting = asyncio.Lock()  # each action depends on the previous one
-        self._films = {
-            unit: _watched(units[unit], found)
-            for unit, found in rules.items()
-            if isinstance(found, FilmRules)
-        }
+        self._rules = {unit: its for unit, its in rules.items() if isinstance(its, FilmRules)}
+        self._watches = {unit: _watch(units[unit], its) for unit, its in self._rules.items()}
+        self._newest: dict[tuple[str, str], FilmNews] = {}
 
     async def start(self) -> None:
         """Restore the state of all films from stored readings, before the first result.
@@ -73,31 +70,31 @@ class FilmMonitor:
         findings.
         """
         responses = await asyncio.to_thread(self._store.responses)
-        for unit, films in self._films.items():
-            how = (unit, films.rules, responses.get(unit), films.watch)
+        for unit, watch in self._watches.items():
+            how = (unit, self._rules[unit], responses.get(unit), watch)
             await asyncio.to_thread(resume_films, self._store, *how)
 
     def memory(self, unit: str) -> FilmMemory | None:
         """Return the state of a unit's films for another process; None if not monitored."""
-        return self._films[unit].watch.memory if unit in self._films else None
+        return self._watches[unit].memory if unit in self._watches else None
 
     def resume(self, unit: str, memory: FilmMemory | None) -> None:
         """Restore a unit's films from ``memory`` of another process; call it after `start`."""
-        if memory is not None and unit in self._films:
-            self._films[unit].watch.restore(memory)
+        if memory is not None and unit in self._watches:
+            self._watches[unit].restore(memory)
 
     def rules(self, unit: str) -> FilmRules | None:
         """Return the rules of a unit's films; None if they are not monitored."""
-        return self._films[unit].rules if unit in self._films else None
+        return self._rules.get(unit)
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
         """Return the newest film reading of a bearing with findings; None before the first."""
-        return self._films[unit].newest.get(bearing) if unit in self._films else None
+        return self._newest.get((unit, bearing))
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
         """Return the baseline in force for a bearing; None if no baseline is in force."""
-        films = self._films.get(unit)
-        return films.watch.judge.baseline(bearing) if films else None
+        watch = self._watches.get(unit)
+        return watch.judge.baseline(bearing) if watch else None
 
     def take(
         self, unit: str, assessments: Sequence[Assessment]
@@ -108,11 +105,11 @@ class FilmMonitor:
         -------
         The results with their operating conditions, and the new film readings with findings.
         """
-        films = self._films.get(unit)
-        if films is None or not assessments:
+        watch = self._watches.get(unit)
+        if watch is None or not assessments:
             return assessments, []
-        seen, news = films.watch.take(assessments)
-        films.newest.update({each.reading.bearing: each for each in news})
+        seen, news = watch.take(assessments)
+        self._newest |= {(unit, each.reading.bearing): each for each in news}
         return seen, news
 
     def conditions(self, news: Sequence[FilmNews]) -> dict[str, dict[str, Judgement]]:
@@ -137,11 +134,11 @@ class FilmMonitor:
 
     async def learn_due(self, pulse: Pulse = UNHEARD) -> None:
         """Learn all baselines that are due, and the shaft responses of their units."""
-        for unit, films in self._films.items():
+        for unit, rules in self._rules.items():
             pulse.beat(MAX_LEARN_S)
             due = [
                 place
-                for place in (FilmPlace(unit, *item) for item in films.rules.estimators.items())
+                for place in places_of(unit, rules)
                 if await asyncio.to_thread(self.learner.is_due, place, self._clock.now_ns())
             ]
             for place in due:
@@ -150,9 +147,9 @@ class FilmMonitor:
             if due:
                 pulse.beat(MAX_LEARN_S)
                 response = await asyncio.to_thread(
-                    self.learner.learn_response, unit, films.rules, self._clock.now_ns()
+                    self.learner.learn_response, unit, rules, self._clock.now_ns()
                 )
-                films.watch.judge.response = response
+                self._watches[unit].judge.response = response
 
     async def learn(self, place: FilmPlace, **why: str) -> BearingBaseline | None:
         """Learn a baseline of a bearing now; return None if there are too few readings.
@@ -169,13 +166,11 @@ class FilmMonitor:
                 bearing=place.bearing,
                 version=learned.origin.version,
             )
-            await self.put_in_force(place)
+            await self._put_in_force(place)
         return learned
 
-    async def act(
-        self, place: FilmPlace, action: BaselineAction, actor: str, reason: str
-    ) -> Versions:
-        """Apply an engineer's action to the baselines of a bearing; return their new state.
+    async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
+        """Apply an engineer's action to the baselines of a bearing.
 
         `actor` is the name of the engineer, `reason` the reason that the engineer gave.
 
@@ -189,29 +184,83 @@ class FilmMonitor:
         async with self._acting:
             step = await asyncio.to_thread(self._step, place, action, actor, reason)
             await asyncio.to_thread(self._store.add_steps, [step])
-            await self.put_in_force(place)
+            await self._put_in_force(place)
         log.info(f"baseline {step.step}", unit=place.unit, bearing=place.bearing, actor=actor)
-        return await asyncio.to_thread(self.learner.versions, place)
 
     def _step(
         self, place: FilmPlace, action: BaselineAction, actor: str, reason: str
     ) -> StoredStep:
-        entries = list(self._store.baselines(place.unit, place.bearing))
-        versions = self.learner.versions(place)
-        return baseline_step(action, place, versions, entries, actor, reason, self._clock.now_ns())
+        versions, now_ns = self.learner.versions(place), self._clock.now_ns()
+        entries = {each.version: each for each in self._store.baselines(place.unit, place.bearing)}
+        _require_possible(action, place, versions, entries, now_ns)
+        version: int | None = versions.in_force
+        from_ns: int | None = None
+        match action:
+            case Accept(version):
+                step = BaselineStep.ACCEPTED
+            case Reject(version):
+                is_in_force = version == versions.in_force
+                step = BaselineStep.WITHDRAWN if is_in_force else BaselineStep.REJECTED
+            case Freeze():
+                step = BaselineStep.FROZEN
+            case Thaw():
+                step = BaselineStep.THAWED
+            case Renew(from_ns):
+                step, version = BaselineStep.RENEWED, None
+        return StoredStep(place.unit, place.bearing, version, step, now_ns, actor, reason, from_ns)
 
-    async def put_in_force(self, place: FilmPlace) -> None:
+    async def _put_in_force(self, place: FilmPlace) -> None:
         """Load and use the baseline that is in force for a bearing according to the database."""
-        films = self._films[place.unit]
-        held = films.watch.judge.baseline(place.bearing)
-        found, decisions = await asyncio.to_thread(in_force, self._store, place, films.rules)
+        judge, rules = self._watches[place.unit].judge, self._rules[place.unit]
+        held = judge.baseline(place.bearing)
+        found, decisions = await asyncio.to_thread(in_force, self._store, place, rules)
         if found is None or held is None or found.origin != held.origin:
-            films.watch.judge.activate_baseline(place.bearing, found, decisions)
+            judge.activate_baseline(place.bearing, found, decisions)
 
 
-def _watched(unit: Unit, rules: FilmRules) -> WatchedFilms:
+def _require_possible(
+    action: BaselineAction,
+    place: FilmPlace,
+    versions: Versions,
+    entries: Mapping[int, BaselineEntry],
+    now_ns: int,
+) -> None:
+    """Raise `BaselineRefusedError` if an action does not fit the state of a bearing's baselines.
+
+    `entries` are all baselines of the bearing, by version; `now_ns` is the host time, ns.
+    """
+    version, renewed_ns, fault = versions.in_force, versions.renewed_ns, None
+    match action:
+        case Accept(wanted) | Reject(wanted) if wanted not in entries:
+            fault = f"version {wanted} does not exist; choose a listed version"
+        case Accept(wanted) if wanted == version:
+            fault = f"version {wanted} is already in force"
+        case Accept(wanted) if (estimator := entries[wanted].estimator) is not place.estimator:
+            fault = (
+                f"version {wanted} was learned with estimator {estimator};"
+                f" the plant file selects {place.estimator}"
+            )
+        case Accept(wanted) if entries[wanted].learned_from_ns < (renewed_ns or 0):
+            fault = f"version {wanted} is older than the last machine event; accept a later one"
+        case Reject(wanted) if wanted in versions.rejected:
+            fault = f"version {wanted} is already rejected"
+        case Freeze() if versions.is_frozen:
+            fault = f"the baseline of {place.bearing} is already frozen"
+        case Freeze() if version is None:
+            fault = f"{place.bearing} has no baseline in force; accept one"
+        case Thaw() if not versions.is_frozen:
+            fault = f"the baseline of {place.bearing} is not frozen"
+        case Renew(from_ns) if from_ns > now_ns:
+            fault = "the time of a machine event must not be in the future"
+        case Renew(from_ns) if from_ns < (renewed_ns or 0):
+            fault = "a later machine event exists; enter a time after it"
+    if fault is not None:
+        raise BaselineRefusedError(fault)
+
+
+def _watch(unit: Unit, rules: FilmRules) -> FilmWatch:
     brackets = {bearing.id: bearing.bracket_stiffness_n_per_m for bearing in unit.bearings}
-    return WatchedFilms(rules, FilmWatch(rules, FilmJudge(rules, brackets)), {})
+    return FilmWatch(rules, FilmJudge(rules, brackets))
 
 
 async def film_monitor(

@@ -58,7 +58,7 @@ class Plant:
         judged: bool = False,
     ) -> None:
         """Let days pass: readings are judged as the keeper does, if wanted; stored, learned."""
-        judge: FilmJudge = keeper._films["U1"].watch.judge
+        judge: FilmJudge = keeper._watches["U1"].judge
         for day in range(*days, every):
             today = self.film_news(days_of(history, day, min(day + every, days[1])))
             if judged:
@@ -152,10 +152,10 @@ async def test_a_restart_goes_on_with_the_same_baseline_and_decisions(plant, fil
     history = film_life(2, days=26)
     keeper = await plant.start(learn_every_days=100)
     await plant.live(keeper, history, (0, 25), judged=True)
-    before = keeper._films["U1"].watch.judge
+    before = keeper._watches["U1"].judge
 
     again = await plant.start(learn_every_days=100)
-    after = again._films["U1"].watch.judge
+    after = again._watches["U1"].judge
     for told_next in plant.film_news(days_of(history, 25, 26)):
         [went_on], [through] = (judge.judge([told_next.reading]) for judge in (after, before))
         assert went_on.findings == through.findings
