@@ -1,9 +1,6 @@
 """`LiveClient`: present state of the plant in the serving process, and operators' commands."""
 
-import asyncio
 from dataclasses import replace
-
-import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
@@ -16,10 +13,7 @@ from service.settings.core_values import chatter_rule_of, stale_after_s
 from service.settings.plant import PlantFile
 from service.store.access.audit_entries import acting
 from service.store.films import FilmStore
-from service.store.port import StoreError
 from service.store.sharing import Answer
-
-log = structlog.get_logger()
 
 
 class LiveClient:
@@ -55,20 +49,16 @@ class LiveClient:
         results of its unit tries again.
         """
         known = [each for each in report.units if each.unit in self.units.units]
-        fetched = {}
-        for each in known:
-            if each.snapshot is not None and not self.films.has(each.unit, each.snapshot):
-                try:
-                    found = await asyncio.to_thread(self.films.fetch, each.unit, each.snapshot)
-                except StoreError as error:
-                    log.error("baselines cannot be read", unit=each.unit, reason=str(error))
-                else:
-                    fetched[each.unit] = found
+        baselines = {
+            each.unit: await self.films.read_baselines(each.unit, each.snapshot)
+            for each in known
+            if each.snapshot is not None
+        }
         for each in known:
             if each.snapshot is not None:
                 self.units.set_results(each.unit, each.snapshot.bearings)
                 self.alarms.take(each.unit, each.snapshot)
-                self.films.take(each.unit, each.snapshot, fetched.get(each.unit))
+                self.films.take(each.unit, each.snapshot, baselines[each.unit])
             self.units.update(
                 each.unit, report.process, report.number, each.link, is_direct=is_direct
             )

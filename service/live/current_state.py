@@ -6,6 +6,8 @@ from collections.abc import Awaitable, Callable, Hashable, Iterable, Mapping, Se
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import structlog
+
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from core.baseline.baseline import BearingBaseline
@@ -30,6 +32,9 @@ from service.live.status import (
 from service.settings.core_values import film_rules_of
 from service.settings.plant import PlantFile
 from service.store.films import FilmStore
+from service.store.port import StoreError
+
+log = structlog.get_logger()
 
 MAX_DRIFT = 1e-3
 """Upper bound of the relative drift of two monotonic clocks."""
@@ -353,42 +358,30 @@ class LiveFilms:
         """Return the baseline in force for a bearing; None if no baseline is in force."""
         return self._baselines.get((unit, bearing))
 
-    def has(self, unit: str, state: UnitSnapshot) -> bool:
-        """Return whether the baselines in force of a unit snapshot are in memory."""
-        return len(self._held(unit, state)) == len(state.baselines)
+    async def read_baselines(self, unit: str, state: UnitSnapshot) -> Mapping[str, BearingBaseline]:
+        """Return the baselines in force of a unit snapshot by bearing id, new ones from the store.
 
-    def _held(self, unit: str, state: UnitSnapshot) -> dict[str, BearingBaseline]:
-        """Return the baselines in memory that a unit snapshot has in force, by bearing."""
-        found = {bearing: self.baseline(unit, bearing) for bearing in state.baselines}
-        return {
-            bearing: held
-            for bearing, held in found.items()
-            if held is not None and held.origin.version == state.baselines[bearing]
-        }
-
-    def fetch(self, unit: str, state: UnitSnapshot) -> Mapping[str, BearingBaseline]:
-        """Return the baselines in force of a unit snapshot from the store, by bearing id.
-
-        Blocks while the store is read. Baselines that the store does not have are left out.
-
-        Raises `StoreError` if a baseline cannot be read.
+        A baseline that the store does not have or that cannot be read is left out; the latter is
+        logged.
         """
-        found = {
-            bearing: self._store.baseline(unit, bearing, version)
-            for bearing, version in state.baselines.items()
-        }
-        return {bearing: baseline for bearing, baseline in found.items() if baseline is not None}
+        found = {}
+        for bearing, version in state.baselines.items():
+            baseline = self.baseline(unit, bearing)
+            if baseline is None or baseline.origin.version != version:
+                try:
+                    baseline = await asyncio.to_thread(self._store.baseline, unit, bearing, version)
+                except StoreError as error:
+                    log.error("baselines cannot be read", unit=unit, reason=str(error))
+                    continue
+            if baseline is not None:
+                found[bearing] = baseline
+        return found
 
     def take(
-        self, unit: str, state: UnitSnapshot, fetched: Mapping[str, BearingBaseline] | None
+        self, unit: str, state: UnitSnapshot, baselines: Mapping[str, BearingBaseline]
     ) -> None:
-        """Update the films of a unit from its snapshot.
-
-        `fetched` are the baselines in force, as returned by `fetch`; None keeps those in memory.
-        """
+        """Update the films of a unit from its snapshot and its baselines in force by bearing id."""
         self.n_taken += 1
         self._newest |= {(unit, bearing): news for bearing, news in state.films.items()}
-        if fetched is None:
-            fetched = self._held(unit, state)
         others = {key: held for key, held in self._baselines.items() if key[0] != unit}
-        self._baselines = others | {(unit, b): found for b, found in fetched.items()}
+        self._baselines = others | {(unit, b): found for b, found in baselines.items()}

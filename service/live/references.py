@@ -9,7 +9,7 @@ import structlog
 from acquisition.clock import Clock
 from core.machine.unit import Bearing, Unit
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.runtime.periodic import TroubleLog
+from service.runtime.periodic import TroubleLog, periodic
 from service.store.port import StoreError
 from service.store.references import GapReference
 from service.store.store import Store
@@ -80,10 +80,7 @@ class ReferencesInForce:
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Read the stored references periodically, until cancelled; `pulse` gets heartbeats."""
-        while True:
-            pulse.beat(LOOK_EVERY_S)
-            await self._clock.sleep(LOOK_EVERY_S)
-            await self.look()
+        await periodic(self.look, LOOK_EVERY_S, self._clock, pulse)
 
     async def look(self) -> None:
         """Read the stored references once; an error leaves the references in force unchanged."""
@@ -93,28 +90,28 @@ class ReferencesInForce:
             self._trouble.note(str(error))
             return
         self._trouble.note(None)
-        self._take(found)
-
-    def _take(self, found: Iterable[GapReference]) -> None:
-        news = {(r.unit, r.bearing): r for r in found if self._is_news(r)}
-        self._in_force |= news
-        for unit in {unit for unit, _ in news}:
+        for unit in {reference.unit for reference in found if self._take(reference)}:
             bearings = tuple(self.bearing(unit, each.id) for each in self._units[unit].bearings)
             self._on_change(replace(self._units[unit], bearings=bearings))
-        for (unit, bearing), reference in news.items():
-            log.info(
-                "reference in force",
-                unit=unit,
-                bearing=bearing,
-                gap_reference_um=reference.gap_reference_um,
-                author=reference.author,
-            )
 
-    def _is_news(self, reference: GapReference) -> bool:
-        key = (reference.unit, reference.bearing)
-        if key in self._bearings:
-            return self._in_force.get(key) != reference
-        if key not in self._unknown:
-            self._unknown.add(key)
-            log.warning("reference of an unknown bearing is ignored", unit=key[0], bearing=key[1])
-        return False
+    def _take(self, reference: GapReference) -> bool:
+        """Put a stored reference in force; return whether it was not in force before."""
+        unit, bearing = key = reference.unit, reference.bearing
+        if key not in self._bearings:
+            if key not in self._unknown:
+                self._unknown.add(key)
+                log.warning(
+                    "reference of an unknown bearing is ignored", unit=unit, bearing=bearing
+                )
+            return False
+        if self._in_force.get(key) == reference:
+            return False
+        self._in_force[key] = reference
+        log.info(
+            "reference in force",
+            unit=unit,
+            bearing=bearing,
+            gap_reference_um=reference.gap_reference_um,
+            author=reference.author,
+        )
+        return True
