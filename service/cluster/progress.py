@@ -192,7 +192,7 @@ class UnitProgress:
         """
         if self._clock.monotonic_s() - self._arrived_s <= after_s:
             return
-        is_connected = self._analyser.alarms.is_connected(self.unit)
+        is_connected = self._analyser.alarms.units[self.unit].is_connected
         if is_connected or self._live.status(self.unit).state in MAY_ARRIVE:
             silence = f"no block for {after_s:g} s; check that `padwatch acquire` is running"
             reason = trouble or self._why_refused or silence
@@ -253,7 +253,7 @@ class UnitProgress:
             self.sequence = sequence
             return
         # the link state is not yet known from the replay or from a stored alarm
-        is_known = self._analyser.alarms.is_connected(self.unit)
+        is_known = self._analyser.alarms.units[self.unit].is_connected
         if not is_known or self._live.status(self.unit).state is not LinkState.CONNECTED:
             connected = LinkNews(self.unit, LinkState.CONNECTED)
             take_news(connected, self._live, self._analyser)

@@ -15,8 +15,7 @@ from service.measuring.acquirer import LinkNews
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.analyser import Analyser
 from service.measuring.live_view import LiveView
-from service.measuring.reported_alarms import ReportedAlarms, identity_of
-from service.measuring.service_alarms import AT_ONCE
+from service.measuring.service_alarms import AT_ONCE, ReportedAlarms, identity_of
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import periodic
 from service.settings.units import UnitSettings

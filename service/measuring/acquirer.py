@@ -119,6 +119,7 @@ Publish = Callable[[SampleBlock], Awaitable[None]]
 """Coroutine function that receives a block; reading of the source waits until it returns."""
 
 
+@dataclass(frozen=True)
 class Acquirer:
     """Reader of the sources of all units; it reconnects after lost links.
 
@@ -133,48 +134,44 @@ class Acquirer:
         if its driver hangs.
     """
 
-    def __init__(
-        self,
-        units: Mapping[str, WatchedUnit],
-        live: LiveView,
-        clock: Clock,
-        publish: Publish,
-        report: Callable[[LinkNews], None],
-        beats: Heartbeats | None = None,
-    ) -> None:
-        self._units, self._live, self._clock = units, live, clock
-        self._publish, self._report = publish, report
-        self._gate = ConnectGate(CONNECTS_PER_S, clock)
-        self._beats = beats or Heartbeats(clock)
+    units: Mapping[str, WatchedUnit]
+    live: LiveView
+    clock: Clock
+    publish: Publish
+    report: Callable[[LinkNews], None]
+    beats: Heartbeats
 
     async def run(self) -> None:
         """Read until all sources have ended; an unexpected exception in one task ends all tasks."""
-        units = self._units.items()
-        loops = {f"acquire {unit}": partial(self._acquire, unit, its) for unit, its in units}
+        acquire = partial(self._acquire, ConnectGate(CONNECTS_PER_S, self.clock))
+        units = self.units.items()
+        loops = {f"acquire {unit}": partial(acquire, unit, its) for unit, its in units}
         async with asyncio.TaskGroup() as sources:
-            self._beats.start(loops, sources)
+            self.beats.start(loops, sources)
 
-    async def _acquire(self, unit: str, watched: WatchedUnit, pulse: Pulse) -> None:
+    async def _acquire(
+        self, gate: ConnectGate, unit: str, watched: WatchedUnit, pulse: Pulse
+    ) -> None:
         """Read one unit and reconnect after each lost link, until its recording ends."""
         while True:
             pulse.beat()
-            await self._gate.turn()
+            await gate.turn()
             try:
                 await self._read(unit, watched.source, pulse)
             except AcquisitionError as error:
-                if self._live.set_link(unit, LinkState.NOT_CONNECTED, str(error)):
+                if self.live.set_link(unit, LinkState.NOT_CONNECTED, str(error)):
                     log.warning("not connected", unit=unit, reason=str(error))
-                self._report(LinkNews(unit, LinkState.NOT_CONNECTED, str(error)))
+                self.report(LinkNews(unit, LinkState.NOT_CONNECTED, str(error)))
                 # devices that were lost together must not be reconnected at the same moment
                 wait_s = watched.retry_s * random.uniform(0.5, 1.0)  # noqa: S311  not a secret
                 if isinstance(error, ConfigError):
                     wait_s = CONFIG_RETRY_S
                 pulse.beat(wait_s)
-                await self._clock.sleep(wait_s)
+                await self.clock.sleep(wait_s)
             else:
-                self._live.set_link(unit, LinkState.ENDED, ENDED)
-                self._report(LinkNews(unit, LinkState.ENDED, ENDED))
-                self._beats.release(f"acquire {unit}")
+                self.live.set_link(unit, LinkState.ENDED, ENDED)
+                self.report(LinkNews(unit, LinkState.ENDED, ENDED))
+                self.beats.release(f"acquire {unit}")
                 return
 
     async def _read(self, unit: str, source: SampleSource, pulse: Pulse) -> None:
@@ -185,9 +182,9 @@ class Acquirer:
         resume()
         async with source.connect() as blocks:
             async for block in blocks:
-                if self._live.set_link(unit, LinkState.CONNECTED):
+                if self.live.set_link(unit, LinkState.CONNECTED):
                     log.info("connected", unit=unit)
-                    self._report(LinkNews(unit, LinkState.CONNECTED))
+                    self.report(LinkNews(unit, LinkState.CONNECTED))
                 pulse.rest()  # waiting for a full queue is not a fault of the source
-                await self._publish(block)
+                await self.publish(block)
                 resume()

@@ -1,6 +1,7 @@
 """Alarm engine: updates, announces and stores all alarms, and restores them after a restart."""
 
 import asyncio
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -8,6 +9,7 @@ from types import MappingProxyType
 import structlog
 
 from acquisition.clock import Clock
+from acquisition.delivery.arrival import Arrival
 from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmNews
 from core.alarms.board import AlarmBoard, AlarmMemory
 from core.alarms.judgements import VectorReference
@@ -22,9 +24,15 @@ from core.monitor.assessment import Assessment
 from core.samples.blocks import SampleBlock
 from service.live.alarm_list import AlarmCount, count_of, is_shared, reporting_unit
 from service.measuring.recorder import Findings
-from service.measuring.reported_alarms import RefusedMessages, ReportedAlarms
-from service.measuring.service_alarms import HealthProbe, HostTime, ServiceAlarms, service_rules_of
+from service.measuring.service_alarms import (
+    HealthProbe,
+    RefusedMessages,
+    ReportedAlarms,
+    ServiceAlarms,
+    service_rules_of,
+)
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.times import CLOCK_STEP_S
 from service.settings.alarm_kinds import MESSAGES_REFUSED
 from service.settings.core_values import (
     chatter_rule_of,
@@ -82,13 +90,12 @@ class AlarmEngine:
         chatter: ChatterRule | None = None,
         stream: RefusedMessages | None = None,
     ) -> None:
-        self._units, self._put, self._clock, self._listener = units, put, clock, listener
+        self.units, self._put, self._clock, self._listener = units, put, clock, listener
         self._service = service or ServiceAlarms()
         self._stream = stream
         self._reported: list[ReportedAlarms] = [] if stream is None else [stream]
-        self.chatter_rule = chatter or ChatterRule()
-        self._chatter = ChatterWatch(self.chatter_rule)
-        self._time = HostTime(clock)
+        self._chatter = ChatterWatch(chatter or ChatterRule())
+        self._looked = Arrival.now(clock)
         self._observer: Callable[[Sequence[AlarmNews]], None] | None = None
 
     def set_observer(self, observer: Callable[[Sequence[AlarmNews]], None]) -> None:
@@ -105,16 +112,13 @@ class AlarmEngine:
         `memories` are the states of the alarms by unit, only of units without missing samples since
         these states were saved.
         """
-        now_ns, found = self._clock.now_ns(), list(alarms)
-        for board in self._reported:
-            own = [alarm for alarm in found if alarm.identity.id in board]
-            self._publish(board.restore(own, now_ns))
-            found = [alarm for alarm in found if alarm.identity.id not in board]
-        for unit, of_unit in self._units.items():
-            own = [alarm for alarm in found if alarm.identity.unit == unit]
-            self._publish(of_unit.restore(own, now_ns, memories.get(unit)))
-        others = [alarm for alarm in found if alarm.identity.unit not in self._units]
-        self._publish(self._service.restore(others, now_ns))
+        stored: dict[AlarmBoard, list[Alarm]] = defaultdict(list)
+        for alarm in alarms:
+            stored[self._board_of(alarm.identity.id)].append(alarm)
+        kept: dict[AlarmBoard, AlarmMemory | None]
+        kept = {board: memories.get(unit) for unit, board in self.units.items()}
+        for board in self._boards:
+            self._publish(board.restore(stored[board], self._clock.now_ns(), kept.get(board)))
 
     def add_alarms(self, board: ReportedAlarms, stored: Iterable[Alarm]) -> None:
         """Add a board of alarms taken over from another process; `stored` are stored alarms."""
@@ -129,14 +133,6 @@ class AlarmEngine:
         """Raise a unit's alarm about a refused stream message; no effect without a stream."""
         if self._stream is not None:
             self._stream.refuse(unit, reason)
-
-    def is_connected(self, unit: str) -> bool:
-        """Return whether samples of a unit arrive, by the newest report on its link."""
-        return self._units[unit].is_connected
-
-    def memory(self, unit: str) -> AlarmMemory:
-        """Return the state of a unit's alarms, with which another process restores them."""
-        return self._units[unit].memory
 
     def recall(self, events: Iterable[AlarmEvent]) -> None:
         """Add past alarm events, oldest first, to the detection of chattering alarms."""
@@ -153,7 +149,7 @@ class AlarmEngine:
 
         `films` are the judgements for the film alarms, by alarm id and direction.
         """
-        own = self._units[block.unit]
+        own = self.units[block.unit]
         news = own.take(block, assessments, self._host_ns())
         news += own.films(films, block.stop_ns)
         self._announce(news)
@@ -163,7 +159,7 @@ class AlarmEngine:
 
     def link(self, unit: str, is_connected: bool, reason: str | None = None) -> None:
         """Update the link alarm of a unit; `reason` states why it is disconnected."""
-        self._publish(self._units[unit].link(is_connected, reason, self._host_ns()))
+        self._publish(self.units[unit].link(is_connected, reason, self._host_ns()))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Update the alarms that depend on time periodically, until cancelled."""
@@ -203,17 +199,13 @@ class AlarmEngine:
 
     def set_reference(self, reference: VectorReference) -> None:
         """Set the reference of a bearing's 1× vectors; references of unknown units are ignored."""
-        if reference.unit in self._units:
-            self._units[reference.unit].refer_to(reference)
+        if reference.unit in self.units:
+            self.units[reference.unit].refer_to(reference)
 
     @property
     def alarms(self) -> list[Alarm]:
         """All alarms of this process, active or not."""
         return [alarm for board in self._boards for alarm in board.alarms]
-
-    def alarms_of(self, unit: str) -> Sequence[Alarm]:
-        """Return the alarms of a unit, except `common_alarms`."""
-        return self._units[unit].alarms
 
     @property
     def common_alarms(self) -> list[Alarm]:
@@ -224,9 +216,9 @@ class AlarmEngine:
         """Return whether an alarm's condition is known; most kinds require a connected unit."""
         if alarm.identity.kind in WITHOUT_LINK:
             return True
-        if alarm.identity.unit not in self._units:
+        if alarm.identity.unit not in self.units:
             return alarm.condition.is_known
-        return alarm.condition.is_known and self.is_connected(alarm.identity.unit)
+        return alarm.condition.is_known and self.units[alarm.identity.unit].is_connected
 
     def count(self) -> AlarmCount:
         """Return the numbers of active, unacknowledged, hidden and unjudged alarms."""
@@ -234,11 +226,13 @@ class AlarmEngine:
 
     def _host_ns(self) -> int:
         """Return the host's time; pause the alarm delays if the clock was set."""
-        now_ns, was_set = self._time.look()
-        if was_set:
+        before, self._looked = self._looked, Arrival.now(self._clock)
+        step_s = self._looked.step_s_since(before)
+        if abs(step_s) > CLOCK_STEP_S:
+            log.warning("the clock of this host was set", by_s=round(step_s, 3))
             for board in self._boards:
                 board.pause()
-        return now_ns
+        return self._looked.host_ns
 
     def _publish(self, news: list[AlarmNews]) -> None:
         """Announce and store changes of alarms that were not caused by a block."""
@@ -260,13 +254,13 @@ class AlarmEngine:
 
     @property
     def _boards(self) -> list[AlarmBoard]:
-        return [*self._units.values(), self._service, *self._reported]
+        return [*self.units.values(), self._service, *self._reported]
 
     def _board_of(self, id_: str) -> AlarmBoard:
         for board in self._reported:
             if id_ in board:
                 return board
-        return self._units.get(id_.partition(":")[0], self._service)
+        return self.units.get(id_.partition(":")[0], self._service)
 
 
 @dataclass(frozen=True)

@@ -143,7 +143,7 @@ class Analyser:
         """Return the analysis state of a unit, from which another process continues."""
         return UnitMemory(
             self.monitors[unit].state,
-            self.alarms.memory(unit),
+            self.alarms.units[unit].memory,
             self._films.memory(unit),
             self._counts[unit].count,
         )
@@ -168,43 +168,40 @@ async def _yield() -> None:
 BUS_CAPACITY = 512
 
 
+@dataclass(frozen=True)
 class Runner:
     """Acquisition, analysis and storage in one process; an exception in one task ends all tasks."""
 
-    def __init__(
-        self,
-        units: Mapping[str, WatchedUnit],
-        live: LiveView,
-        analyser: Analyser,
-        recorder: Recorder,
-        bus: Bus,
-        beats: Heartbeats,
-        clock: Clock,
-    ) -> None:
-        self._analyser, self._recorder, self._clock = analyser, recorder, clock
-        self._bus, self._beats = bus, beats
-        self._acquirer = Acquirer(units, live, clock, bus.publish, analyser.note_link, beats)
+    units: Mapping[str, WatchedUnit]
+    live: LiveView
+    analyser: Analyser
+    recorder: Recorder
+    bus: Bus
+    beats: Heartbeats
+    clock: Clock
 
     async def run(self) -> None:
         """Run until all sources have ended and their results are stored, or the store fails."""
+        links = (self.bus.publish, self.analyser.note_link, self.beats)
+        acquirer = Acquirer(self.units, self.live, self.clock, *links)
         async with asyncio.TaskGroup() as tasks:
-            loops = {"record": self._recorder.run, "analyse": self._analyse}
-            recording, analysis = self._beats.start(loops, tasks)
-            await self._acquirer.run()
-            await self._bus.drained()
+            loops = {"record": self.recorder.run, "analyse": self._analyse}
+            recording, analysis = self.beats.start(loops, tasks)
+            await acquirer.run()
+            await self.bus.drained()
             analysis.cancel()
-            await self._recorder.settled()
+            await self.recorder.settled()
             recording.cancel()
-            self._beats.release("analyse", "record")  # they have finished
+            self.beats.release("analyse", "record")  # they have finished
 
     async def _analyse(self, pulse: Pulse) -> None:
         pulse.rest()
-        async for block in self._bus.blocks():
+        async for block in self.bus.blocks():
             pulse.beat()
             sampled_s = block.sampled_s
             if sampled_s is None:
-                sampled_s = self._clock.monotonic_s() - self._bus.oldest_wait_s
-            await self._analyser.take(block, sampled_s)
-            self._bus.done()
+                sampled_s = self.clock.monotonic_s() - self.bus.oldest_wait_s
+            await self.analyser.take(block, sampled_s)
+            self.bus.done()
             await asyncio.sleep(0)  # let other tasks run while blocks wait
             pulse.rest()

@@ -1,28 +1,25 @@
-"""Alarms about the service itself."""
+"""Alarms about the service itself, silent units and refused stream messages."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
-import structlog
-
-from acquisition.clock import Clock
-from acquisition.delivery.arrival import Arrival
 from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.board import AlarmBoard, AlarmMemory
-from core.alarms.kinds import watch
+from core.alarms.kinds import Watch, watch
 from core.alarms.rules import LimitRule, rule_of
 from core.condition.cells import NOWHERE_KNOWN
 from core.limits import WITHIN, AlarmLevel, Judgement, Limits
 from core.quality import Reading
 from core.samples.gaps import SampleAccount
 from core.units import NS_PER_S
-from service.runtime.times import CLOCK_STEP_S
 from service.settings.alarm_kinds import (
+    ANALYSIS_GONE,
     DANGER_KINDS,
     MESSAGES_REFUSED,
     SAMPLES_LOST,
     SERVICE_KINDS,
+    STREAM,
     UNIT,
 )
 from service.settings.alarms import AlarmSettings
@@ -64,26 +61,6 @@ class ServiceHealth:
 HealthProbe = Callable[[], ServiceHealth]
 
 
-log = structlog.get_logger()
-
-
-class HostTime:
-    """Wall clock of the host, with detection of steps against the monotonic clock."""
-
-    def __init__(self, clock: Clock) -> None:
-        self._clock = clock
-        self._seen: Arrival | None = None
-
-    def look(self) -> tuple[int, bool]:
-        """Return the time, ns since 1970 UTC, and whether the clock was set since the last call."""
-        before, self._seen = self._seen, Arrival.now(self._clock)
-        step_s = self._seen.step_s_since(before) if before else 0.0
-        was_set = abs(step_s) > CLOCK_STEP_S
-        if was_set:
-            log.warning("the clock of this host was set", by_s=round(step_s, 3))
-        return self._seen.host_ns, was_set
-
-
 FULL_SHARE = 0.9
 """Filled fraction of the queue above which the alarm is a danger: acquisition will soon wait."""
 
@@ -93,44 +70,29 @@ LOSS_MINUTES = 10
 AT_ONCE, STEADY = rule_of(0.0, 0.0), rule_of(5.0, 30.0)
 
 
-@dataclass(frozen=True)
-class ServiceRules:
-    """Rules of the alarms about the service.
-
-    Parameters
-    ----------
-    store_behind
-        Limit of the time for which results wait for the store, s.
-    waiting
-        Limits of the filled fraction of the queue to the analysis.
-    delay
-        Limit of the waiting time of samples in the queue, s.
-    loss
-        Limit of the fraction of lost samples of a unit in ten minutes.
-    at_once, steady, lasting
-        Rules without limits, with an on-delay and off-delay of 0 s and 0 s; 5 s and 30 s; 0 s and
-        ten minutes.
-    """
-
-    store_behind: LimitRule
-    waiting: LimitRule
-    delay: LimitRule
-    loss: LimitRule
-    at_once: AlarmRule = AT_ONCE
-    steady: AlarmRule = STEADY
-    lasting: AlarmRule = field(default_factory=lambda: rule_of(0.0, 60.0 * LOSS_MINUTES))
+ServiceRules = Mapping[str, AlarmRule | LimitRule]
+"""Rules of the alarms about the service by name."""
 
 
 def service_rules_of(alarms: AlarmSettings) -> ServiceRules:
-    """Return the service rules from the alarm settings of the plant file."""
+    """Return the rules of the alarms about the service from the alarm settings of the plant file.
+
+    `store_behind` limits the time for which results wait for the store, s; `waiting` the filled
+    fraction of the queue to the analysis; `delay` the waiting time of samples in the queue, s;
+    `loss` the fraction of lost samples of a unit in ten minutes. The other rules have no limits,
+    but an on-delay and off-delay of 0 s and 0 s; 5 s and 30 s; 0 s and ten minutes.
+    """
     share, delay_s = alarms.max_waiting_share, alarms.max_analysis_delay_s
     waiting = Limits(share, FULL_SHARE if share < FULL_SHARE else None, share / 5)
-    return ServiceRules(
-        store_behind=LimitRule(Limits(max(alarms.store_failing_after_s, 0.1)), AT_ONCE),
-        waiting=LimitRule(waiting, STEADY),
-        delay=LimitRule(Limits(delay_s, deadband=delay_s / 5), STEADY),
-        loss=LimitRule(Limits(alarms.max_samples_lost_share), AT_ONCE),
-    )
+    return {
+        "store_behind": LimitRule(Limits(max(alarms.store_failing_after_s, 0.1)), AT_ONCE),
+        "waiting": LimitRule(waiting, STEADY),
+        "delay": LimitRule(Limits(delay_s, deadband=delay_s / 5), STEADY),
+        "loss": LimitRule(Limits(alarms.max_samples_lost_share), AT_ONCE),
+        "at_once": AT_ONCE,
+        "steady": STEADY,
+        "lasting": rule_of(0.0, 60.0 * LOSS_MINUTES),
+    }
 
 
 def loss_key(unit: str) -> str:
@@ -211,7 +173,7 @@ class ServiceAlarms(AlarmBoard):
         subjects = {kind.name: (kind.subject, kind) for kind in self._judged} | subjects
         rules = rules or service_rules_of(AlarmSettings())
         self._watches = {
-            key: watch(AlarmIdentity(PLANT, subject, kind.name), getattr(rules, kind.rule), subject)
+            key: watch(AlarmIdentity(PLANT, subject, kind.name), rules[kind.rule], subject)
             for key, (subject, kind) in subjects.items()
         }
         super().__init__(self._watches.values())
@@ -288,3 +250,57 @@ class ServiceAlarms(AlarmBoard):
 
     def _compared(self, key: str, value: float) -> Judgement:
         return self._watches[key].judge(Reading(value), NOWHERE_KNOWN, self._held(key))
+
+
+class ReportedAlarms(AlarmBoard):
+    """Board of alarms with conditions that other components report, applied at the next update."""
+
+    def __init__(self, watches: Iterable[Watch]) -> None:
+        self._watches = {watch.id: watch for watch in watches}
+        super().__init__(self._watches.values())
+        self._found: dict[str, Judgement] = {}
+
+    def report(self, id_: str, condition: Judgement) -> None:
+        """Set the condition of the alarm with the id `id_` until the next report."""
+        self._found[id_] = condition
+
+    def tick(self, host_ns: int) -> list[AlarmNews]:
+        """Update the alarms from the reported conditions at the host time ``host_ns``, ns."""
+        for id_, condition in self._found.items():
+            self.update(self._watches[id_], condition, host_ns)
+        return super().tick(host_ns)
+
+
+def identity_of(unit: str) -> AlarmIdentity:
+    """Return the identity of the alarm about a unit that no process analyses."""
+    return AlarmIdentity(PLANT, unit, ANALYSIS_GONE)
+
+
+REFUSED_FOR_S = 600.0
+"""Duration of the alarm after the last refused message, s."""
+
+MAX_REASON = 200
+"""Maximum number of characters of a reason, which may contain text of a refused message."""
+
+
+class RefusedMessages(ReportedAlarms):
+    """Alarms about refused stream messages, one for each unit, from reports for one update each."""
+
+    def __init__(self, units: Iterable[str]) -> None:
+        rule = rule_of(0.0, REFUSED_FOR_S)
+        super().__init__(Watch(self._identity(unit), rule, STREAM) for unit in units)
+        self._found = dict.fromkeys(self._watches, WITHIN)
+
+    def refuse(self, unit: str, reason: str) -> None:
+        """Raise the alarm about a refused message of a unit, with the reason."""
+        words = "".join(c if c.isprintable() else "?" for c in reason[:MAX_REASON])
+        self.report(self._identity(unit).id, Judgement(AlarmLevel.ALERT, reason=words))
+
+    def tick(self, host_ns: int) -> list[AlarmNews]:
+        """Update the alarms at the host time ``host_ns``, ns; each report counts once."""
+        news = super().tick(host_ns)
+        self._found = dict.fromkeys(self._watches, WITHIN)
+        return news
+
+    def _identity(self, unit: str) -> AlarmIdentity:
+        return AlarmIdentity(unit, STREAM, MESSAGES_REFUSED)

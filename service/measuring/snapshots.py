@@ -66,7 +66,7 @@ class SnapshotBuilder:
     def _newest(self, unit: str) -> _Built:
         bearings, alarms = self._bearings.get(unit, []), self._alarms_of(unit)
         is_unit = unit in self._bearings
-        own = (self._live.revision(unit), self._alarms.is_connected(unit)) if is_unit else ()
+        own = (self._live.revision(unit), self._alarms.units[unit].is_connected) if is_unit else ()
         newest = {bearing: self._films.newest(unit, bearing) for bearing in bearings}
         films = {bearing: news for bearing, news in newest.items() if news}
         in_force = {bearing: self._films.baseline(unit, bearing) for bearing in bearings}
@@ -101,7 +101,7 @@ class SnapshotBuilder:
                     owner = SHARED if is_shared(alarm) else PLANT
                 owned[owner].append(alarm)
             self._common = common, owned
-        of_unit = self._alarms.alarms_of(unit) if unit in self._bearings else []
+        of_unit = self._alarms.units[unit].alarms if unit in self._bearings else []
         return [*of_unit, *self._common[1].get(unit, ())]
 
     def _link(self, unit: str) -> UnitLink:

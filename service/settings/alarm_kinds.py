@@ -78,7 +78,7 @@ SERVICE_KINDS = kind_table(
     AlarmKind("stream_away", "Stream unavailable", None, STREAM, "steady", "stream_trouble"),
     AlarmKind(ANALYSIS_GONE, "No process analyses this unit", None, UNIT, "at_once"),
 )
-"""Alarm kinds of the service. `rule` is a field of `ServiceRules`; `reading` is a key of
+"""Alarm kinds of the service. `rule` is a key of `service_rules_of`; `reading` is a key of
 `ServiceHealth.readings`, whose value is compared with limits or is the text of a fault."""
 
 DANGER_KINDS = frozenset(("stored_data_damaged", "stream_away"))

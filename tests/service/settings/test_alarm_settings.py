@@ -21,8 +21,9 @@ from core.machine.unit import Bearing
 from core.monitor.catalogue import CATALOGUE
 from service.app.analysis import Analysis
 from service.app.kept_files import captures_of
-from service.measuring.service_alarms import ServiceRules
+from service.measuring.service_alarms import service_rules_of
 from service.settings.alarm_kinds import ALARM_KINDS, SERVICE_KINDS
+from service.settings.alarms import AlarmSettings
 from service.settings.core_values import chatter_rule_of, references_of, rules_of
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
@@ -257,7 +258,7 @@ def test_every_kind_names_a_rule_and_a_reading_that_exist(rules):
         assert kind.rule in {*rules(""), *names_of(UnitRules)}, kind.name
         assert kind.reading is None or kind.reading in readings, kind.name
     for kind in SERVICE_KINDS.values():
-        assert kind.rule in names_of(ServiceRules), kind.name
+        assert kind.rule in service_rules_of(AlarmSettings()), kind.name
     parts = MagicMock()
     parts.bus.oldest_wait_s, parts.stream.behind_s = 0.0, 0.0
     assert set(Analysis.health(parts).readings) == {
@@ -268,7 +269,8 @@ def test_every_kind_names_a_rule_and_a_reading_that_exist(rules):
 
 @pytest.mark.parametrize("pattern", ["*.py", "*.js"])
 def test_no_other_module_of_the_service_lists_kinds_of_alarms(pattern):
-    other = {quantity.name for quantity in CATALOGUE} | names_of(Bearing, ServiceRules)
+    other = {quantity.name for quantity in CATALOGUE} | names_of(Bearing)
+    other |= service_rules_of(AlarmSettings()).keys()
     wanted = "|".join(ALARM_KINDS.keys() - other)
     for path in (ROOT / "service").rglob(pattern):
         if path.name != "alarm_kinds.py":

@@ -18,8 +18,12 @@ from service.cluster.silent_units import SILENT_AFTER_S, SilentUnits
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.live_view import LiveView
 from service.measuring.recorder import FILE, Findings, ParkedRows, Recorder
-from service.measuring.reported_alarms import identity_of
-from service.measuring.service_alarms import ServiceAlarms, ServiceHealth, service_rules_of
+from service.measuring.service_alarms import (
+    ServiceAlarms,
+    ServiceHealth,
+    identity_of,
+    service_rules_of,
+)
 from service.settings.alarms import AlarmSettings
 from service.store.port import AlarmQuery
 from service.store.sharing import UnitRow
