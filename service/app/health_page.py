@@ -3,7 +3,8 @@
 import asyncio
 import json
 import socket
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
@@ -20,6 +21,7 @@ ANSWERS_WITHIN_S = 5.0
 """Maximum time for a request, and for an answer of the event loop, s."""
 
 
+@dataclass(frozen=True)
 class HealthServer:
     """HTTP server of the health page; it runs in threads and gets the pages from the event loop.
 
@@ -35,33 +37,28 @@ class HealthServer:
         Function that returns further status texts by name, which do not affect readiness.
     """
 
-    def __init__(
-        self,
-        listener: socket.socket,
-        beats: Heartbeats,
-        live: Newest,
-        units: Iterable[str],
-        checks: Callable[[], Mapping[str, str | None]],
-        fill: Callable[[Families], None],
-        shown: Callable[[], Mapping[str, str]] = dict,
-    ) -> None:
-        self._listener, self._beats, self._live, self._units = listener, beats, live, list(units)
-        self._checks, self._fill, self._shown = checks, fill, shown
+    listener: socket.socket
+    beats: Heartbeats
+    live: Newest
+    units: Collection[str]
+    checks: Callable[[], Mapping[str, str | None]]
+    fill: Callable[[Families], None]
+    shown: Callable[[], Mapping[str, str]] = dict
 
     async def page(self, path: str) -> tuple[int, str, bytes]:
         """Return the HTTP status, content type and content of the page at a URL path."""
         status, shown = 200, {"event_loop": "turning"}
         if path == "/metrics":
             families = Families()
-            self._fill(families)
+            self.fill(families)
             families.include(ProcessCollector(registry=None))
             return 200, TEXT, families.text
         if path == "/readyz":
-            loops = {f"loop {name}": trouble for name, trouble in self._beats.look().items()}
-            checks = {**self._checks(), **loops}
+            loops = {f"loop {name}": trouble for name, trouble in self.beats.look().items()}
+            checks = {**self.checks(), **loops}
             status = 503 if any(checks.values()) else 200
-            shown = {f"unit {unit}": self._live.status(unit).state.value for unit in self._units}
-            shown |= self._shown()
+            shown = {f"unit {unit}": self.live.status(unit).state.value for unit in self.units}
+            shown |= self.shown()
             shown |= {name: trouble or "ok" for name, trouble in checks.items()}
         elif path != "/livez":
             return 404, "text/plain", b"pages: /livez, /readyz, /metrics\n"
@@ -99,7 +96,7 @@ class HealthServer:
 
         with ThreadingHTTPServer((HOST, 0), Handler, bind_and_activate=False) as server:
             server.socket.close()
-            server.socket = self._listener
+            server.socket = self.listener
             serving = asyncio.create_task(asyncio.to_thread(server.serve_forever, 0.1))
             try:
                 await asyncio.shield(serving)

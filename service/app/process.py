@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping
+from typing import Any
 
 import structlog
 
@@ -15,10 +16,6 @@ from service.runtime.service_manager import ServiceManager
 log = structlog.get_logger()
 
 LOOK_EVERY_S = 10.0
-
-
-async def _no_job() -> None:
-    """Do nothing."""
 
 
 class Supervision:
@@ -84,7 +81,7 @@ class Supervision:
     async def run_until_stopped(
         self,
         loops: Mapping[str, Loop],
-        job: Callable[[], Coroutine[None, None, None]] = _no_job,
+        job: Callable[[], Coroutine[Any, Any, None]] = lambda: asyncio.sleep(0),
         drain: Callable[[asyncio.Task[None]], Awaitable[None]] | None = None,
         *,
         ends: bool = False,

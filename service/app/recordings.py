@@ -3,7 +3,7 @@
 import threading
 from collections.abc import AsyncGenerator, AsyncIterator, Iterable
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from acquisition.clock import Clock
@@ -91,6 +91,7 @@ def replay_folder(plant: PlantFile, recordings: Iterable[Path], now_ns: int) -> 
     return Path(plant.service.data_folder) / REPLAYS / f"{name}-{compact(now_ns)}"
 
 
+@dataclass(frozen=True)
 class PlayedOut:
     """Source that reads a simulated DAQ, and ends when the recording that the DAQ plays ends.
 
@@ -100,10 +101,9 @@ class PlayedOut:
     exited, which also ends the blocks.
     """
 
-    def __init__(
-        self, source: SampleSource, over: threading.Event, gone: threading.Event | None = None
-    ) -> None:
-        self._source, self._over, self._gone = source, over, gone
+    source: SampleSource
+    over: threading.Event
+    gone: threading.Event | None = None
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
@@ -115,7 +115,7 @@ class PlayedOut:
         async with AsyncExitStack() as stack:
             blocks = None
             try:
-                blocks = await stack.enter_async_context(self._source.connect())
+                blocks = await stack.enter_async_context(self.source.connect())
             except LinkError:
                 if not self._is_over:
                     raise
@@ -135,4 +135,4 @@ class PlayedOut:
 
     @property
     def _is_over(self) -> bool:
-        return self._over.is_set() or (self._gone is not None and self._gone.is_set())
+        return self.over.is_set() or (self.gone is not None and self.gone.is_set())

@@ -3,6 +3,7 @@
 import asyncio
 import json
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
 
 from acquisition.clock import Clock
 from core.alarms.operation import ActionRefusedError
@@ -34,20 +35,16 @@ WITHIN_S = 10.0
 """Maximum wait for the store before a command is carried out, and until it is on the disk, s."""
 
 
+@dataclass(frozen=True)
 class CommandExecutor:
     """Executor of operators' commands; it answers `DONE` when the result is on the disk."""
 
-    def __init__(
-        self,
-        alarms: AlarmEngine,
-        films: FilmMonitor,
-        live: LiveView,
-        recorder: Recorder,
-        store: Store,
-        clock: Clock,
-    ) -> None:
-        self._alarms, self._films, self._live = alarms, films, live
-        self._recorder, self._store, self._clock = recorder, store, clock
+    alarms: AlarmEngine
+    films: FilmMonitor
+    live: LiveView
+    recorder: Recorder
+    store: Store
+    clock: Clock
 
     async def execute(self, command: OperatorCommand, who: Acting) -> Answer:
         """Execute a command of the actor `who`; return the answer once the result is stored."""
@@ -55,18 +52,18 @@ class CommandExecutor:
             with acting_as(who):
                 match command:
                     case AlarmCommand():
-                        self._alarms.alarm(command.alarm)  # before the store is tried
+                        self.alarms.alarm(command.alarm)  # before the store is tried
                         async with asyncio.timeout(WITHIN_S):
-                            await self._recorder.require_store()
-                        self._alarms.operate(command.alarm, command.action)
+                            await self.recorder.require_store()
+                        self.alarms.operate(command.alarm, command.action)
                         return await self._stored()
                     case BaselineCommand(place, action, actor, reason):
-                        await self._films.act(place, action, actor, reason)
+                        await self.films.act(place, action, actor, reason)
                     case TakeReference():
                         await self._take_reference(command)
                     case Note():
-                        added = note_action(command, self._clock.now_ns())
-                        await asyncio.to_thread(self._store.audit.record, [added])
+                        added = note_action(command, self.clock.now_ns())
+                        await asyncio.to_thread(self.store.audit.record, [added])
                 return DONE
         except LookupError:
             return Answer(CommandState.UNKNOWN, "the alarm does not exist")
@@ -84,20 +81,21 @@ class CommandExecutor:
     async def _stored(self) -> Answer:
         try:
             async with asyncio.timeout(WITHIN_S):
-                await self._recorder.stored()
+                await self.recorder.stored()
         except TimeoutError:
             words = "a restart now would undo the command; storing is retried until it succeeds"
             return Answer(CommandState.TAKEN, words)
         return DONE
 
     async def _take_reference(self, command: TakeReference) -> None:
-        current = self._live.current(command.unit, command.bearing)
+        current = self.live.current(command.unit, command.bearing)
         measured = measured_vectors(current.assessment if current.is_current else None)
-        found = SetVectorReference(measured, self._clock.now_ns(), command.actor, command.note)
-        await asyncio.to_thread(self._store.order1_references.add, found)
-        self._alarms.set_reference(measured)
+        found = SetVectorReference(measured, self.clock.now_ns(), command.actor, command.note)
+        await asyncio.to_thread(self.store.order1_references.add, found)
+        self.alarms.set_reference(measured)
 
 
+@dataclass
 class Questions:
     """Handler of the questions that the serving process asks the measuring process.
 
@@ -106,39 +104,35 @@ class Questions:
     token (None if an account exists) when requests are served for the first time.
     """
 
-    def __init__(
-        self,
-        executor: CommandExecutor,
-        live: LiveView,
-        integrity: IntegrityMonitor,
-        metrics: Callable[[], Awaitable[bytes]],
-        on_ready: Callable[[str, str | None], None] = lambda *_: None,
-    ) -> None:
-        self._executor, self._live, self._metrics = executor, live, metrics
-        self._integrity, self._on_ready, self._is_ready = integrity, on_ready, False
+    executor: CommandExecutor
+    live: LiveView
+    integrity: IntegrityMonitor
+    metrics: Callable[[], Awaitable[bytes]]
+    on_ready: Callable[[str, str | None], None] = lambda *_: None
+    _is_ready: bool = field(default=False, init=False)
 
     async def answer(self, question: Question) -> object:
         """Return the answer to a question: an `Answer` to a command, None to a reported fault."""
         match question.kind:
             case "blocks":
                 (unit,) = json.loads(question.document)
-                return self._live.blocks(unit)
+                return self.live.blocks(unit)
             case "result":
                 unit, bearing = json.loads(question.document)
-                return self._live.assessment(unit, bearing)
+                return self.live.assessment(unit, bearing)
             case "access":
-                (self._integrity.access_trouble,) = json.loads(question.document)
+                (self.integrity.access_trouble,) = json.loads(question.document)
                 return None
             case "metrics":
-                return await self._metrics()
+                return await self.metrics()
             case "ready":
                 if not self._is_ready:
                     self._is_ready = True
-                    self._on_ready(*json.loads(question.document))
+                    self.on_ready(*json.loads(question.document))
                 return None
         try:
             command = decoded(question.kind, question.document)
         except UnreadableCommandError as error:
             return Answer(CommandState.REFUSED, str(error))
         who = Acting(Source.API, question.peer, question.actor)
-        return await self._executor.execute(command, who)
+        return await self.executor.execute(command, who)

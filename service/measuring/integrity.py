@@ -7,7 +7,7 @@ import structlog
 from acquisition.clock import Clock
 from service.measuring.live_view import LiveView
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.runtime.periodic import periodic
+from service.runtime.periodic import TroubleLog, periodic
 from service.store.access.audit_entries import AuditAction
 from service.store.port import StoreError
 from service.store.seals import Place
@@ -41,7 +41,9 @@ class IntegrityMonitor:
         self.stored, self._audit = store.integrity, store.audit
         self._clock, self._live = clock, live
         self._reported: set[Place] = set()
-        self._no_file: str | None = None
+        self._file = TroubleLog(
+            "the database file is missing or replaced", "the database file is in place again"
+        )
         self.rolled_back: str | None = None
         self.access_trouble: str | None = None
 
@@ -50,7 +52,7 @@ class IntegrityMonitor:
         """Description of all integrity faults in one line; None without faults."""
         mark, n_damaged = self.stored.mark_error, self.stored.n_damaged
         faults = [
-            self._no_file,
+            self._file.trouble,
             self.rolled_back,
             mark and f"the high-water mark cannot be written: {mark}",
             self.access_trouble and f"accounts: {self.access_trouble}",
@@ -74,19 +76,16 @@ class IntegrityMonitor:
 
     async def _has_file(self) -> bool:
         """Return whether the database file exists and is the file that this process has open."""
-        before = self._no_file
+        before = self._file.trouble
         try:
             await asyncio.to_thread(self.stored.require_file)
         except StoreError as error:
-            self._no_file = self._live.store_error = str(error)
-            if before is None:
-                log.error("the database file is missing or replaced", reason=self._no_file)
+            self._live.store_error = str(error)
+            self._file.note(str(error))
             return False
-        self._no_file = None
-        if before is not None:
-            log.info("the database file is in place again")
-            if self._live.store_error == before:
-                self._live.store_error = None
+        self._file.note(None)
+        if before is not None and self._live.store_error == before:
+            self._live.store_error = None
         return True
 
     def _look(self) -> None:
