@@ -15,9 +15,8 @@ from service.app.listener import require_protected
 from service.app.notifications import receivers_of
 from service.app.process import Supervision
 from service.app.service_audit import ServiceTrail
-from service.app.serving_process import context_of, serve_requests
+from service.app.serving_process import access_desk, context_of, serve_requests
 from service.app.storage import open_access, open_store
-from service.app.web import access_desk
 from service.cluster.serving_side import DatabaseOperators, Feed, replica_receivers
 from service.live.client import LiveClient
 from service.live.metrics import add_alarms, add_films, add_units

@@ -10,10 +10,14 @@ import pickle
 import struct
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from importlib.metadata import version
 from typing import Any
 
 import structlog
 from pydantic import TypeAdapter, ValidationError
+
+from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 
 log = structlog.get_logger()
 
@@ -90,6 +94,42 @@ async def _write(writer: asyncio.StreamWriter, content: bytes) -> None:
         raise ConnectionResetError("the connection is closed")
     writer.writelines((LENGTH.pack(len(content)), content))
     await writer.drain()
+
+
+@dataclass(frozen=True)
+class Start:
+    """Plant and options with which the serving process starts.
+
+    With `is_demo`, local clients have the admin role without a login.
+    """
+
+    plant: PlantFile
+    origin: Origin
+    is_demo: bool
+
+
+def write_start(writer: asyncio.StreamWriter, start: Start) -> None:
+    """Write the version of padwatch and the start options, without waiting for the reader."""
+    content = version("padwatch").encode() + b"\n" + pickle.dumps(start, pickle.HIGHEST_PROTOCOL)
+    writer.writelines((LENGTH.pack(len(content)), content))
+
+
+async def read_start(reader: asyncio.StreamReader) -> Start:
+    """Read and return the start options that `write_start` wrote.
+
+    Raises `VersionError` if the measuring process is of another version, and `MeasuringGoneError`
+    if it has ended.
+    """
+    if (content := await _read(reader, MAX_REPORT_BYTES)) is None:
+        raise MeasuringGoneError("the measuring process has ended")
+    theirs, _, pickled = content.partition(b"\n")
+    if (own := version("padwatch").encode()) != theirs:
+        raise VersionError(
+            f"the serving process is padwatch {own.decode()}, the measuring process padwatch"
+            f" {theirs.decode()}: restart padwatch"
+        )
+    start: Start = pickle.loads(pickled)  # noqa: S301  own parent
+    return start
 
 
 class MeasuringEnd:

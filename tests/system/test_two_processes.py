@@ -4,6 +4,7 @@ import asyncio
 import os
 import signal
 import socket
+import struct
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,7 +16,7 @@ import httpx2
 import pytest
 
 from acquisition.clock import SystemClock
-from service.app import supervisor
+from service.app import measuring_process
 from service.app.serving_process import WRONG_VERSION
 from service.live import exchange
 from service.runtime import child
@@ -105,17 +106,17 @@ async def test_a_hanging_serving_process_is_killed_and_restarted(tmp_path, demo_
     (tmp_path / "deaf.py").write_text("import signal\nsignal.pause()\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setattr(child, "PROGRAM", "deaf")
-    monkeypatch.setattr(supervisor, "PAUSE_S", 0.0)
-    monkeypatch.setattr(supervisor, "STOPS_WITHIN_S", 0.1)
+    monkeypatch.setattr(measuring_process, "PAUSE_S", 0.0)
+    monkeypatch.setattr(measuring_process, "STOPS_WITHIN_S", 0.1)
     monkeypatch.setattr(exchange, "TAKEN_WITHIN_S", 0.1)
-    plant = supervisor.Start(load_plant_file(demo_file), Origin.LIVE, is_demo=False)
+    plant = exchange.Start(load_plant_file(demo_file), Origin.LIVE, is_demo=False)
 
     async def refuse(question: exchange.Question) -> None:
         raise AssertionError(question)
 
     with socket.create_server(("127.0.0.1", 0)) as listener:
         parts = (plant, listener, lambda _: bytes(1_000_000), refuse, SystemClock())
-        serving = supervisor.ServingChild(*parts)
+        serving = measuring_process.ServingChild(*parts)
         running = asyncio.create_task(serving.run(UNHEARD))
         while serving.process is None:
             await asyncio.sleep(0.01)
@@ -133,7 +134,7 @@ def test_a_serving_process_of_another_version_is_refused_with_both_named(tmp_pat
     ours, theirs = socket.socketpair()
     with ours, theirs, socket.create_server(("127.0.0.1", 0)) as listener:
         socket.send_fds(ours, [b"."], [listener.fileno()])
-        ours.sendall(b"0.0.1 3\nabc")
+        ours.sendall(struct.pack(">I", 9) + b"0.0.1\nabc")
         serving = subprocess.run(
             [sys.executable, "-m", SERVING, str(theirs.fileno())],
             pass_fds=[theirs.fileno()],

@@ -4,7 +4,7 @@ from typing import Any
 
 from service.api.app import GuardedApi
 from service.api.context import Context
-from service.app.web import application
+from service.app.serving_process import application
 from service.reports.routes import EvidenceService
 
 _DOCUMENTS: dict[frozenset[str], dict[str, Any]] = {}

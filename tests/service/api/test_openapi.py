@@ -13,7 +13,7 @@ from pydantic import BaseModel
 
 from service.api.answers import Answers
 from service.api.app import GuardedApi
-from service.app.web import application, server_of
+from service.app.serving_process import application, server_of
 from service.settings.storage import Origin
 
 Operations = list[tuple[str, dict[str, Any]]]

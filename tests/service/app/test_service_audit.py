@@ -16,7 +16,7 @@ from core.quality import GOOD
 from core.samples.blocks import DeviceClock, SampleBlock
 from service.app.recordings import PlayedOut, replay_folder, replayed_plant
 from service.app.service_audit import ServiceTrail
-from service.app.web import access_desk
+from service.app.serving_process import access_desk
 from service.settings.plant import PlantFile, load_plant_file
 from service.settings.processes import AccessSettings, TlsSettings
 from service.settings.storage import Origin

@@ -9,7 +9,7 @@ import httpx2
 import pytest
 from starlette.responses import PlainTextResponse
 
-from service.app.web import server_of
+from service.app.serving_process import server_of
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 
