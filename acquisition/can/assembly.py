@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import replace
 
 from acquisition.can.counters import JUMP_TOLERANCE, CounterFollower
 from acquisition.can.frame_sets import (
@@ -167,7 +166,7 @@ class FrameAssembler:
         for frame in placed:
             if part.counter is not None:
                 self._note(frame)
-            instant = self._sets.add(frame, self._epoch)
+            instant = self._sets.add(frame)
             if instant is not None:
                 self._held.append(instant)
                 self._next = instant.stop_index
@@ -258,7 +257,6 @@ class FrameAssembler:
         """Start a new epoch with the held samples, after the device had paused sampling."""
         self._axis.epochs.begin()
         self._epoch = self._axis.epoch
-        self._held = [replace(instant, epoch=self._epoch) for instant in self._held]
         self._begin_timing()
 
     def _lose_held(self) -> None:
@@ -273,4 +271,4 @@ class FrameAssembler:
 
     def _built(self, arrived_ns: int) -> list[SampleBlock]:
         held, self._held = self._held, []
-        return self._builder.blocks(held, arrived_ns)
+        return self._builder.blocks(self._epoch, held, arrived_ns)

@@ -66,8 +66,6 @@ class Instant:
 
     Parameters
     ----------
-    epoch
-        Epoch of the sample index.
     index
         Index of the first sample.
     n_samples
@@ -78,7 +76,6 @@ class Instant:
         Number of samples refused directly before the instant, by reason.
     """
 
-    epoch: int
     index: int
     n_samples: int
     frames: tuple[bytes, ...]
@@ -141,7 +138,7 @@ class FrameSets:
         self._n_lost += n_samples + n_dropped
         self.pending = {index + n_samples: found for index, found in self.pending.items()}
 
-    def add(self, frame: PlacedFrame, epoch: int) -> Instant | None:
+    def add(self, frame: PlacedFrame) -> Instant | None:
         """Store a frame in the set of its instant; return the instant if this completes it.
 
         Returns None otherwise, also for a frame without waveforms, and for a frame that is older
@@ -163,7 +160,7 @@ class FrameSets:
         pending.frames[wave] = data
         pending.is_spoilt |= n_samples != pending.n_samples
         if len(pending.frames) == self._plan.n_waves and not pending.is_spoilt:
-            return self._finished(epoch, index, pending)
+            return self._finished(index, pending)
         if len(self.pending) > MAX_PENDING:
             self._n_incomplete += self.pending.pop(min(self.pending)).n_samples
         return None
@@ -192,7 +189,7 @@ class FrameSets:
         again = index == next(reversed(seen), -1)
         self._refused[Refusal.DUPLICATE if again else Refusal.OUT_OF_ORDER] += 1
 
-    def _finished(self, epoch: int, index: int, complete: _Pending) -> Instant | None:
+    def _finished(self, index: int, complete: _Pending) -> Instant | None:
         """Return a complete instant and drop incomplete older sets, whose frames cannot arrive."""
         for earlier in [i for i in self.pending if i <= index]:
             given_up = self.pending.pop(earlier)
@@ -202,7 +199,7 @@ class FrameSets:
         rejected = self._rejected(index)
         self.stop = index + complete.n_samples
         frames = tuple(complete.frames[wave] for wave in range(self._plan.n_waves))
-        return Instant(epoch, index, complete.n_samples, frames, rejected)
+        return Instant(index, complete.n_samples, frames, rejected)
 
     def _rejected(self, index: int) -> dict[Refusal, int]:
         """Return the number of refused samples in the gap before an index, by reason."""

@@ -125,14 +125,16 @@ class BlockBuilder:
         self.side.clear()
         self._rejected.clear()
 
-    def blocks(self, instants: Sequence[Instant], arrived_ns: int) -> list[SampleBlock]:
+    def blocks(
+        self, epoch: int, instants: Sequence[Instant], arrived_ns: int
+    ) -> list[SampleBlock]:
         """Return the blocks of sample instants, given in index order and of one epoch.
 
         `arrived_ns` is the arrival of the last instant, ns since 1970 UTC.
         """
         blocks = []
         if instants:  # the last instant has the smallest delay
-            self._stamps.add(instants[-1].epoch, instants[-1].stop_index, arrived_ns)
+            self._stamps.add(epoch, instants[-1].stop_index, arrived_ns)
         for run in _runs(instants):
             first, stop = run[0].index, run[-1].stop_index
             self._rejected.update(run[0].rejected)
@@ -140,7 +142,7 @@ class BlockBuilder:
             cuts = [first, *self.side.cuts(first, stop), stop]
             for start, end in itertools.pairwise(cuts):
                 piece = samples[:, start - first : end - first]
-                block = self._block(run[0].epoch, start, piece)
+                block = self._block(epoch, start, piece)
                 if block is not None:
                     blocks.append(block)
             self.side.forget_before(stop)
@@ -191,7 +193,7 @@ def _runs(instants: Sequence[Instant]) -> Iterator[Sequence[Instant]]:
     begins = [
         n
         for n, (before, after) in enumerate(itertools.pairwise(instants), start=1)
-        if (after.epoch, after.index) != (before.epoch, before.stop_index) or after.rejected
+        if after.index != before.stop_index or after.rejected
     ]
     for start, stop in itertools.pairwise([0, *begins, len(instants)] if instants else []):
         yield instants[start:stop]

@@ -115,7 +115,7 @@ class CanSource:
     async def _next_blocks(self, reader: FrameReader) -> list[SampleBlock]:
         """Return the blocks that the next frames complete; held blocks too if no samples follow."""
         looked_s = self._clock.monotonic_s()
-        look_s = _PAUSE_S if self._delivery.holds_whole_cells else _LOOK_S
+        look_s = _PAUSE_S if self._delivery.n_whole else _LOOK_S
         batch = await reader.next_batch(min(look_s, self._stale_after_s - self._silent_s))
         found: list[SampleBlock] = []
         blocks: list[SampleBlock] = []

@@ -8,13 +8,7 @@ import numpy.typing as npt
 
 from acquisition.delivery.arrival import Arrival, ArrivalModel
 from core.samples.axis import ClockTolerance
-from core.samples.blocks import (
-    DeviceClock,
-    SampleBlock,
-    SideValues,
-    StampFault,
-    joined,
-)
+from core.samples.blocks import SampleBlock, SideValues, StampFault, joined
 from core.samples.calibration import UnitCalibration
 from core.units import NS_PER_S, ns_from_s
 
@@ -65,7 +59,10 @@ class BlockJoiner:
         return max(0, stop_index - stop_index % self._cell - self._parts[0].first_index)
 
     def release(self) -> list[SampleBlock]:
-        """Return the complete cells held so far, as at most one block; for a pause in the data."""
+        """Return the complete cells held so far, as at most one block.
+
+        For a pause of the device or a lost link.
+        """
         n_whole = self.n_whole
         if not n_whole:
             return []
@@ -134,8 +131,8 @@ class StampCheck:
         self._doubted: _Stamp | None = None
         self.n_faults = 0
 
-    def check(self, block: SampleBlock) -> tuple[SideValues, StampFault | None]:
-        """Return side values with corrected stamps, and the fault of the first wrong stamp or None.
+    def check(self, block: SampleBlock) -> SampleBlock:
+        """Return a block with corrected stamps, and with the fault of the first wrong stamp if any.
 
         A wrong stamp is replaced by the time that follows from the sample index.
         """
@@ -144,14 +141,15 @@ class StampCheck:
             self._epoch, self._rate_hz = block.epoch, block.rate_hz
             self._good, self._doubted = (block.first_index, block.start_ns), None
         if side.n_cells > 16 and self._all_fit(index, side.start_ns):  # arrays pay for many cells
-            return side, None
+            return block
         stamps = zip(index.tolist(), side.start_ns.tolist(), strict=True)
         found = [self._checked(stamp) for stamp in stamps]
         faults = [fault for _, fault in found if fault]
         if not faults:
-            return side, None
+            return block
         self.n_faults += len(faults)
-        return replace(side, start_ns=np.array([start_ns for start_ns, _ in found])), faults[0]
+        corrected = replace(side, start_ns=np.array([start_ns for start_ns, _ in found]))
+        return replace(block, side=corrected, stamp_fault=faults[0])
 
     def _checked(self, stamp: _Stamp) -> tuple[int, StampFault | None]:
         """Return the corrected time of a stamp, ns, and the fault of the stamp or None."""
@@ -189,8 +187,8 @@ class StampCheck:
         return None
 
 
-class BlockAssembler:
-    """Assembler of the blocks of a device to blocks of whole cells, with checked time stamps.
+class BlockAssembler(BlockJoiner):
+    """Joiner of the blocks of a device that checks their time stamps and estimates its clock.
 
     An adapter uses one assembler across all its connections, because the next connection may
     complete an unfinished block.
@@ -216,8 +214,7 @@ class BlockAssembler:
     ) -> None:
         self._stamped = stamped
         self._samples_when_asked = samples_when_asked
-        min_samples = min_block_s * calibration.rate_hz
-        self._joiner = BlockJoiner(calibration.block_samples, min_samples)
+        super().__init__(calibration.block_samples, min_block_s * calibration.rate_hz)
         self._stamps = StampCheck()
         self._arrivals = ArrivalModel(calibration.rate_hz)
         self._fault: StampFault | None = None
@@ -249,44 +246,19 @@ class BlockAssembler:
         """
         checked = [self._stamps.check(block) for block in blocks]
         if arrived is None:
-            return self._joiner.put(
-                replace(block, side=side, stamp_fault=fault) if fault else block
-                for block, (side, fault) in zip(blocks, checked, strict=True)
-            )
-        for block, (_, fault) in zip(blocks, checked, strict=True):
-            stop_ns = block.stop_ns if self._stamped and has_stamp and not fault else None
+            return self.put(checked)
+        for block in checked:
+            has_good_stamp = self._stamped and has_stamp and not block.stamp_fault
+            stop_ns = block.stop_ns if has_good_stamp else None
             self._arrivals.add(block.epoch, block.stop_index, stop_ns, arrived)
-        clock, found = self._clock(), []
-        n_after = sum(block.n_samples for block in blocks)
-        for block, (side, fault) in zip(blocks, checked, strict=True):
-            n_after -= block.n_samples
-            found.append(
-                replace(
-                    block,
-                    side=side,
-                    sampled_s=arrived.steady_s - held_s - n_after / block.rate_hz,
-                    stamp_fault=fault or self._fault,
-                    clock=clock,
-                )
-            )
-            self._fault = None
-        return self._joiner.put(found)
-
-    @property
-    def holds_whole_cells(self) -> bool:
-        """Whether `release` would return a block."""
-        return self._joiner.n_whole > 0
-
-    def release(self) -> list[SampleBlock]:
-        """Return the complete cells held so far; for a pause of the device or a lost link."""
-        return self._joiner.release()
-
-    def flush(self) -> list[SampleBlock]:
-        """Return all held samples, with an incomplete last cell; for the end of a recording."""
-        return self._joiner.flush()
-
-    def _clock(self) -> DeviceClock:
         clock = self._arrivals.device_clock(self._stamps.n_faults)
         if self._samples_when_asked:
-            return replace(clock, drift_ppm=None, u_drift_ppm=None)
-        return clock
+            clock = replace(clock, drift_ppm=None, u_drift_ppm=None)
+        found: list[SampleBlock] = []
+        n_after = sum(block.n_samples for block in blocks)
+        for block in checked:
+            n_after -= block.n_samples
+            sampled_s = arrived.steady_s - held_s - n_after / block.rate_hz
+            fault, self._fault = block.stamp_fault or self._fault, None
+            found.append(replace(block, sampled_s=sampled_s, stamp_fault=fault, clock=clock))
+        return self.put(found)

@@ -5,6 +5,7 @@ uses, until the name servers time out, even after its caller was cancelled.
 """
 
 import asyncio
+import concurrent.futures
 import ipaddress
 import socket
 import threading
@@ -18,7 +19,7 @@ class NameLookUp:
 
     def __init__(self, host: str, port: int) -> None:
         self._host, self._port = host, port
-        self._asking: asyncio.Future[list[str]] | None = None
+        self._asking: concurrent.futures.Future[list[str]] | None = None
 
     async def addresses(self) -> list[str]:
         """Return up to `MAX_ADDRESSES` IP addresses of the host, in the order in which to try them.
@@ -30,16 +31,15 @@ class NameLookUp:
         if _is_address(self._host):
             return [self._host]
         if self._asking is None or self._asking.done():
-            loop = asyncio.get_running_loop()
-            self._asking = loop.create_future()
-            self._asking.add_done_callback(_retrieve)
+            self._asking = concurrent.futures.Future()
+            self._asking.set_running_or_notify_cancel()  # cannot be cancelled by a caller
             threading.Thread(
                 target=_look_up,
-                args=(self._host, self._port, loop, self._asking),
+                args=(self._host, self._port, self._asking),
                 name=f"look up {self._host}",
                 daemon=True,  # must not delay the end of the program
             ).start()
-        return await asyncio.shield(self._asking)
+        return await asyncio.wrap_future(self._asking)
 
 
 class KnownAddresses:
@@ -66,34 +66,16 @@ class KnownAddresses:
         return self._found
 
 
-def _look_up(
-    host: str, port: int, loop: asyncio.AbstractEventLoop, answer: "asyncio.Future[list[str]]"
-) -> None:
-    found: list[str] | OSError
+def _look_up(host: str, port: int, answer: "concurrent.futures.Future[list[str]]") -> None:
     try:
         infos = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
-        found = list(dict.fromkeys(str(info[4][0]) for info in infos))[:MAX_ADDRESSES]
-    except (OSError, UnicodeError) as error:
-        found = error if isinstance(error, OSError) else OSError(f"{host} is not a valid host name")
-    try:
-        loop.call_soon_threadsafe(_answer, answer, found)
-    except RuntimeError:
-        return  # the event loop is closed at the end of the program
-
-
-def _answer(answer: "asyncio.Future[list[str]]", found: list[str] | OSError) -> None:
-    if answer.done():
-        return
-    if isinstance(found, OSError):
-        answer.set_exception(found)
+    except OSError as error:
+        answer.set_exception(error)
+    except UnicodeError:
+        answer.set_exception(OSError(f"{host} is not a valid host name"))
     else:
-        answer.set_result(found)
-
-
-def _retrieve(answer: "asyncio.Future[list[str]]") -> None:
-    """Retrieve the error of a cancelled caller; asyncio logs unretrieved errors."""
-    if not answer.cancelled():
-        answer.exception()
+        found = list(dict.fromkeys(str(info[4][0]) for info in infos))
+        answer.set_result(found[:MAX_ADDRESSES])
 
 
 def _is_address(host: str) -> bool:

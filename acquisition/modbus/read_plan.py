@@ -1,5 +1,6 @@
 """`ReadPlan`: requests that read all cells of a register map, as few as possible."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -97,10 +98,11 @@ def _plan(registers: RegisterMap, cells: Sequence[Cell], together: Sequence[Toge
         ]
         is_bits = function in BIT_FUNCTIONS
         most = registers.max_registers * (BITS_PER_REGISTER if is_bits else 1)
-        whole = _whole([*stretches, *_wanted(blocks, stretches, registers)])
+        # ranges that share a register are read in one request
+        whole = _merged([*stretches, *_wanted(blocks, stretches, registers)], max_gap=-1)
         spans += [
             Span(start, stop - start, function)
-            for start, stop in _packed(whole, registers.max_gap, most)
+            for start, stop in _merged(whole, registers.max_gap, most)
         ]
     return ReadPlan(tuple(spans), registers.base)
 
@@ -126,26 +128,17 @@ def _wanted(
     return [b for b in blocks if any(b[0] <= start < b[1] for start, _ in stretches)]
 
 
-def _whole(stretches: Iterable[Stretch]) -> list[Stretch]:
-    """Merge address ranges that share a register, so that they are read in one request."""
-    joined: list[Stretch] = []
-    for start, stop in sorted(stretches):
-        if joined and start < joined[-1][1]:
-            joined[-1] = (joined[-1][0], max(stop, joined[-1][1]))
-        else:
-            joined.append((start, stop))
-    return joined
-
-
-def _packed(stretches: Sequence[Stretch], max_gap: int, most: int) -> list[Stretch]:
+def _merged(stretches: Iterable[Stretch], max_gap: int, most: float = math.inf) -> list[Stretch]:
     """Merge ranges with gaps up to `max_gap` into ranges of up to `most` addresses.
 
-    Merging from the lowest address on gives the fewest requests.
+    Ranges that share a register have a gap of -1 or less. Merging from the lowest address on gives
+    the fewest ranges.
     """
-    packed: list[Stretch] = []
-    for start, stop in stretches:
-        if packed and start - packed[-1][1] <= max_gap and stop - packed[-1][0] <= most:
-            packed[-1] = (packed[-1][0], stop)
+    merged: list[Stretch] = []
+    for start, stop in sorted(stretches):
+        first, last = merged[-1] if merged else (start, start)
+        if merged and start - last <= max_gap and max(last, stop) - first <= most:
+            merged[-1] = (first, max(last, stop))
         else:
-            packed.append((start, stop))
-    return packed
+            merged.append((start, stop))
+    return merged

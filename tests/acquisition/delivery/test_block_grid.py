@@ -152,9 +152,9 @@ def test_a_pause_releases_whole_cells_and_keeps_the_rest(counting_feed, counts_c
     feed, delivery = counting_feed(), held(counts_calibration(2))
     assert delivery.release() == []
     assert delivery.take([feed.advance(40)], ARRIVED) == []
-    assert (delivery.holds_whole_cells, delivery.release()) == (False, [])
+    assert (delivery.n_whole, delivery.release()) == (0, [])
     assert delivery.take([feed.advance(70)], ARRIVED) == []
-    assert delivery.holds_whole_cells
+    assert delivery.n_whole == 100
     [block] = delivery.release()
     assert (block.first_index, block.n_samples, block.clock is None) == (0, 100, False)
     assert delivery.release() == []
