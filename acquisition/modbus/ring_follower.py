@@ -16,12 +16,11 @@ from acquisition.modbus.ring_profile import (
     RingLayout,
     Slot,
     SlotRecords,
-    damages_of,
     decode_header,
     decode_slots,
     slot_records,
 )
-from acquisition.modbus.timeline import US_PER_S, Refusal, Timeline, ahead
+from acquisition.modbus.timeline import Refusal, Timeline, ahead
 from core.samples.axis import Epochs
 from core.samples.blocks import Rejection, SampleBlock, SideValues
 from core.samples.calibration import UnitCalibration
@@ -32,24 +31,14 @@ _N_TRIES = 4
 
 
 class RingReader:
-    """Reader of the header and slots of one block ring; slots are not checked.
+    """Reader of the header and slots of one block ring by `client`; slots are not checked.
 
     The header begins at `base_address`; `function` is 3 (holding) or 4 (input registers).
     """
 
     def __init__(self, client: ModbusClient, base_address: int, function: int) -> None:
-        self._client = client
+        self.client = client
         self._header = Span(base_address, HEADER_REGISTERS, function)
-
-    @property
-    def where(self) -> str:
-        """Address of the device in error messages: host and port, or path of the serial port."""
-        return self._client.where
-
-    @property
-    def reads_ahead(self) -> bool:
-        """Whether slots are read together with the header, because requests need not wait."""
-        return self._client.requests_in_flight > 1
 
     async def header(self) -> RingHeader:
         """Read and decode the header.
@@ -62,13 +51,13 @@ class RingReader:
             If the device does not reply correctly, or the checksum is wrong in every read.
         """
         for _ in range(_N_TRIES):
-            content = await self._client.read_spans([self._header])
+            content = await self.client.read_spans([self._header])
             try:
                 return decode_header(content)
             except (ConfigError, FrameError) as error:
                 fault = error
         kind = ConfigError if isinstance(fault, ConfigError) else LinkError
-        raise kind(f"{self.where}: {fault}") from fault
+        raise kind(f"{self.client.where}: {fault}") from fault
 
     async def header_and_slots(
         self, layout: RingLayout, sequences: Sequence[int]
@@ -80,7 +69,7 @@ class RingReader:
         """
         spans = [self._header, *self._slot_spans(layout, sequences)]
         try:
-            content = await self._client.read_spans(spans)
+            content = await self.client.read_spans(spans)
             header = decode_header(content)
         except (ConfigError, FrameError):
             return await self.header(), None
@@ -95,7 +84,7 @@ class RingReader:
             Slot found at the ring position of each sequence number; it may be another slot.
         """
         spans = self._slot_spans(layout, sequences)
-        return slot_records(await self._client.read_spans(spans), layout)
+        return slot_records(await self.client.read_spans(spans), layout)
 
     def _slot_spans(self, layout: RingLayout, sequences: Sequence[int]) -> list[Span]:
         n_registers, starts, stops = layout.slot_registers, [], [-1]
@@ -157,7 +146,7 @@ class RingFollower:
         for (name, expected), value in zip(self._expected.items(), found, strict=True):
             if value != expected:
                 raise ConfigError(
-                    f"{self._reader.where}: block ring: {name} is {value}, expected {expected}"
+                    f"{self._reader.client.where}: block ring: {name} is {value}, expected {expected}"
                 )
         return header
 
@@ -198,10 +187,6 @@ class RingFollower:
             records = records[: len(wanted)]
         else:
             records = await self._reader.slots(header.layout, wanted)
-        block = self._block_of_sound(records, wanted, header)
-        if block is not None:
-            self._handled = wanted[-1]
-            return [block]
         records, slots = await self._reread(records, header.layout, wanted)
         self._handled = wanted[-1]
         return self._placed(records, list(zip(wanted, slots, strict=True)), header)
@@ -209,10 +194,11 @@ class RingFollower:
     def _due(self, now_s: float, max_read_s: float) -> list[int]:
         """Return the slots that may have been written by now, if they can be read with the header.
 
-        The header is read first: slots that it does not contain are not used. Where polls are
-        shorter than slots, only slots of the last header are due; others would be read in vain.
+        They can be if requests need not wait for replies. The header is read first: slots that it
+        does not contain are not used. Where polls are shorter than slots, only slots of the last
+        header are due; others would be read in vain.
         """
-        if self._header is None or not self._reader.reads_ahead:
+        if self._header is None or self._reader.client.requests_in_flight == 1:
             return []
         layout = self._header.layout
         n_new = (now_s - self._asked_s) / layout.slot_duration_s
@@ -220,32 +206,6 @@ class RingFollower:
         if n_due >= layout.n_slots:  # the oldest of them may be overwritten
             return []
         return [(self._handled + 1 + n) % U32 for n in range(_n_read(n_due, layout, max_read_s))]
-
-    def _block_of_sound(
-        self, records: SlotRecords, wanted: Sequence[int], header: RingHeader
-    ) -> SampleBlock | None:
-        """Return the block of slots that are all sound and continue the axis, as is the rule.
-
-        None if any slot needs `_judge`. Checking the slots together saves processor time.
-        """
-        heads, n_samples = records["head"].astype(np.int64), header.layout.samples_per_slot
-        indices = heads[0, 1] + np.arange(0, len(wanted) * n_samples, n_samples)
-        is_sound = (
-            (heads[:, 0] == wanted).all()
-            and (records["trailer"] == heads[:, 0] & 0xFFFF).all()
-            and ((heads[:, 1] - indices) % U32 == 0).all()
-            and (heads[:, 3] < US_PER_S).all()
-            and (heads[:, 5] == header.epoch).all()
-            and not any(damages_of(records))
-        )
-        index = None
-        if is_sound:
-            [newest] = decode_slots(records[-1:])
-            index = self._timeline.place_run(newest, len(wanted))
-        if index is None:
-            return None
-        rejected, self._rejected = self._rejected, Counter()
-        return self._block(self._epochs.number, index, rejected, records)
 
     async def _enter(self, header: RingHeader) -> None:
         """Set the read position at the start, after a restart, or if the sequence went back."""
@@ -277,7 +237,7 @@ class RingFollower:
         again = await self.header()
         if (again.epoch, again.layout) != (header.epoch, header.layout):
             raise LinkError(
-                f"{self._reader.where}: block ring: epoch or layout differ between two reads of"
+                f"{self._reader.client.where}: block ring: epoch or layout differ between two reads of"
                 " the header; if this recurs, check the device"
             )
 

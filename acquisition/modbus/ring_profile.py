@@ -18,7 +18,7 @@ The CRC-32 is that of IEEE 802.3 (`zlib.crc32`), computed over the register byte
 import struct
 import zlib
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -151,18 +151,11 @@ def decode_header(data: bytes) -> RingHeader:
     expected = zlib.crc32(data[: HEADER.size])
     if found != expected:
         raise FrameError(f"block ring: header checksum is {found:#x}, expected {expected:#x}")
-    layout = _possible_layout(
+    layout = RingLayout(
         n_channels, samples_per_slot, n_slots, rate_mhz, n_slow, ring_address, slot_stride
     )
-    return RingHeader(layout, epoch, newest)
-
-
-@lru_cache(maxsize=256)
-def _possible_layout(*fields: int) -> RingLayout:
-    """Return a checked layout; cached, because the fields are the same in every poll."""
-    layout = RingLayout(*fields)
     layout.require_possible()
-    return layout
+    return RingHeader(layout, epoch, newest)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from acquisition.modbus.ring_profile import U32, RingLayout, Slot
 from core.samples.axis import ClockTolerance, Epochs, signed_distance
 from core.units import NS_PER_S
 
-US_PER_S = 1_000_000
+_US_PER_S = 1_000_000
 _TOLERANCE = ClockTolerance()
 
 _MAX_MISCOUNTED = 8
@@ -59,7 +59,7 @@ class Timeline:
 
     def place(self, slot: Slot) -> int | Refusal:
         """Return the unwrapped index of a slot's first sample, or the reason for its refusal."""
-        if slot.microseconds >= US_PER_S:
+        if slot.microseconds >= _US_PER_S:
             return Refusal.IMPOSSIBLE_TIME
         if self._accepted is None:
             self.anchor(slot)
@@ -75,17 +75,6 @@ class Timeline:
             self._refused = slot
             return Refusal.INCONSISTENT_INDEX
         return self._accepted_index
-
-    def place_run(self, newest: Slot, n_slots: int) -> int | None:
-        """Accept `n_slots` consecutive slots that end with `newest`, if they continue the axis.
-
-        Returns the index of their first sample; None if each slot must be checked by `place`.
-        """
-        before = self._accepted
-        if before is None or not self._on_one_axis(before, newest):
-            return None
-        self._accept(newest, self._accepted_index + self._n_samples(before, newest))
-        return self._accepted_index - (n_slots - 1) * self._layout.samples_per_slot
 
     def repeats(self, slot: Slot) -> bool:
         """Return whether a slot is an older slot of this axis, delivered again.
