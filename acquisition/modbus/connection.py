@@ -132,10 +132,6 @@ class ReplyProtocol(asyncio.Protocol):
     def _take(self, received: bytes) -> int:
         """Store the complete replies in received bytes; return the number of bytes they occupy."""
         at, view = 0, memoryview(received)
-        if replies := self._framing.take_all(received, self._in_flight):
-            at = len(received)
-            self._replies += replies
-            self._in_flight.clear()
         while self._in_flight:
             found = self._framing.take(view[at:], self._in_flight[0])
             if found is None:

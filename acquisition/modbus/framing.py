@@ -5,7 +5,6 @@ stops at the first error, because the start of the next reply is then unknown.
 """
 
 import struct
-from collections.abc import Iterable
 from typing import NamedTuple, TypeAlias
 
 from acquisition.errors import FrameError
@@ -30,23 +29,6 @@ class TcpFraming:
         """Return the bytes of the frame that carries a request."""
         pdu = pending.request.pdu
         return _MBAP.pack(pending.transaction, 0, len(pdu) + 1, pending.unit) + pdu
-
-    def take_all(self, data: bytes, burst: Iterable[PendingRequest]) -> list[bytes]:
-        """Return the PDUs of the replies if the bytes are exactly the usual replies to a burst.
-
-        The list is empty if a reply must be extracted by `take`: if it is incomplete, wrong, an
-        exception, or of variable length.
-        """
-        pdus, at = [], 0
-        for request, unit, transaction in burst:
-            if not (n_bytes := request.n_reply_bytes):
-                return []
-            head = _MBAP.pack(transaction, 0, n_bytes + 1, unit) + request.reply_start
-            if not data.startswith(head, at):
-                return []
-            at += _MBAP.size + n_bytes
-            pdus.append(data[at - n_bytes : at])
-        return pdus if at == len(data) else []
 
     def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, bytes] | None:
         """Extract the reply to a request from received bytes.
@@ -83,10 +65,6 @@ class RtuFraming:
         """Return the bytes of the frame that carries a request."""
         body = bytes((pending.unit,)) + pending.request.pdu
         return body + crc16(body).to_bytes(2, "little")
-
-    def take_all(self, _data: bytes, _burst: Iterable[PendingRequest]) -> list[bytes]:
-        """Return an empty list, because replies are extracted one at a time by `take`."""
-        return []
 
     def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, bytes] | None:
         """Return the frame length in bytes and the PDU of a reply; None if it is incomplete.

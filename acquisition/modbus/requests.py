@@ -5,7 +5,7 @@ Requests and replies are PDUs: the bytes from the function code on, identical ov
 
 import struct
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkError
 
@@ -127,18 +127,6 @@ class ReadRequest:
         function, address, count = _SPAN_REQUEST.unpack(self.pdu)
         return f"a read of {count} at {address}, function {function}"
 
-    @cached_property
-    def n_reply_bytes(self) -> int:
-        """Length of the reply to a read of registers or bits; 0 for other requests."""
-        count = self.pdu[-2] << 8 | self.pdu[-1]
-        n_bytes = 2 * count if self.pdu[0] in REGISTER_FUNCTIONS else -(-count // 8)
-        return 2 + n_bytes if self.pdu[0] in SPAN_FUNCTIONS else 0
-
-    @cached_property
-    def reply_start(self) -> bytes:
-        """Function code and byte count of the reply to a read of registers or bits."""
-        return bytes((self.pdu[0], self.n_reply_bytes - 2))
-
     def min_bytes(self, reply: memoryview) -> int:
         """Return the minimum length of the reply in bytes, given the bytes received so far.
 
@@ -161,10 +149,11 @@ class ReadRequest:
             return _fifo_bytes(reply)
         if function == READ_IDENTIFICATION:
             return _identification_bytes(reply, self.pdu[1:3])
-        n_bytes = self.n_reply_bytes
-        if len(reply) > 1 and reply[1] != n_bytes - 2:
-            raise FrameError(f"byte count is {reply[1]}, expected {n_bytes - 2}")
-        return n_bytes
+        count = self.pdu[-2] << 8 | self.pdu[-1]
+        n_bytes = 2 * count if function in REGISTER_FUNCTIONS else -(-count // 8)
+        if len(reply) > 1 and reply[1] != n_bytes:
+            raise FrameError(f"byte count is {reply[1]}, expected {n_bytes}")
+        return 2 + n_bytes
 
 
 def _fifo_bytes(reply: memoryview) -> int:
