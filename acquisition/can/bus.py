@@ -76,15 +76,10 @@ def open_bus(settings: CanLinkSettings, ids: Iterable[int]) -> can.BusABC:
 
 
 def _opened(settings: CanLinkSettings, ids: list[int]) -> can.BusABC:
-    options: dict[str, Any] = dict(settings.options)
     if settings.interface == "slcan":
-        return SlcanBus(settings.channel, frozenset(ids), **_slcan_speed(settings), **options)
-    if settings.bitrate is not None:
-        options["bitrate"] = settings.bitrate
-    if settings.fd:
-        options["fd"] = True
-    if settings.data_bitrate is not None:
-        options["data_bitrate"] = settings.data_bitrate
+        return SlcanBus(settings.channel, frozenset(ids), **_slcan_options(settings))
+    speed = {"bitrate": settings.bitrate, "fd": settings.fd, "data_bitrate": settings.data_bitrate}
+    options: dict[str, Any] = {**settings.options, **{k: v for k, v in speed.items() if v}}
     if settings.interface in _FILTERED_BY_KERNEL:
         options["can_filters"] = [{"can_id": i, "can_mask": _ID_MASK} for i in ids]
     return can.Bus(
@@ -92,16 +87,15 @@ def _opened(settings: CanLinkSettings, ids: list[int]) -> can.BusABC:
     )
 
 
-def _slcan_speed(settings: CanLinkSettings) -> dict[str, Any]:
+def _slcan_options(settings: CanLinkSettings) -> dict[str, Any]:
     """Return the slcan options; listen-only by default, but some buses need acknowledgement."""
     SlcanBus.require_speed(settings.bitrate, settings.data_bitrate)
-    speed: dict[str, Any] = {}
-    if "listen_only" not in settings.options:
-        speed["listen_only"] = True
-    if "sleep_after_open" not in settings.options and "://" in settings.channel:
-        speed["sleep_after_open"] = 0.0
+    options: dict[str, Any] = {"listen_only": True}
+    if "://" in settings.channel:
+        options["sleep_after_open"] = 0.0
+    options |= settings.options
     if settings.data_bitrate is not None and settings.bitrate is not None:
-        speed["timing"] = can.BitTimingFd.from_sample_point(
+        options["timing"] = can.BitTimingFd.from_sample_point(
             f_clock=_SLCAN_CLOCK_HZ,
             nom_bitrate=settings.bitrate,
             nom_sample_point=_SAMPLE_POINT_PERCENT,
@@ -109,5 +103,5 @@ def _slcan_speed(settings: CanLinkSettings) -> dict[str, Any]:
             data_sample_point=_SAMPLE_POINT_PERCENT,
         )
     elif settings.bitrate is not None:
-        speed["bitrate"] = settings.bitrate
-    return speed
+        options["bitrate"] = settings.bitrate
+    return options

@@ -107,7 +107,7 @@ class ArrivalModel:
         self._origin: tuple[int, float] = (0, 0.0)
         self._newest: Arrival | None = None
         self._bin = -1
-        self._drift: tuple[float, float] | None = None
+        self._drift_ppm: tuple[float, float] | None = None
 
     def add(self, epoch: int, stop_index: int, stop_ns: int | None, arrived: Arrival) -> None:
         """Add the arrival of all samples before `stop_index`.
@@ -122,7 +122,7 @@ class ArrivalModel:
         number = int(host_s // _BIN_S)
         offset_ns = None if stop_ns is None else stop_ns - arrived.host_ns
         if number != self._bin:
-            self._drift = _slope(self._bins)
+            self._drift_ppm = _drift_ppm(self._bins)
             self._bin = number
             self._bins.append((host_s, delay_s, offset_ns))
         else:
@@ -138,13 +138,9 @@ class ArrivalModel:
         """
         offsets_ns = (bin_[2] for bin_ in reversed(self._bins) if bin_[2] is not None)
         offset_ns = max(islice(offsets_ns, _MIN_BINS), default=None)
-        drift = None if self._drift is None else -1e6 * self._drift[0]
-        return DeviceClock(
-            offset_s=None if offset_ns is None else offset_ns / NS_PER_S,
-            drift_ppm=drift,
-            u_drift_ppm=None if self._drift is None else 1e6 * self._drift[1],
-            n_faults=n_faults,
-        )
+        offset_s = None if offset_ns is None else offset_ns / NS_PER_S
+        drift_ppm, u_drift_ppm = self._drift_ppm or (None, None)
+        return DeviceClock(offset_s, drift_ppm, u_drift_ppm, n_faults)
 
     def _was_set(self, arrived: Arrival) -> bool:
         return self._newest is not None and abs(arrived.step_s_since(self._newest)) > _HOST_STEP_S
@@ -152,11 +148,11 @@ class ArrivalModel:
     def _begin(self, epoch: int, stop_index: int, arrived_s: float) -> None:
         self._epoch, self._origin, self._bin = epoch, (stop_index, arrived_s), -1
         self._bins.clear()
-        self._drift = None
+        self._drift_ppm = None
 
 
-def _slope(bins: deque[_Bin]) -> tuple[float, float] | None:
-    """Return the least-squares slope and its standard uncertainty; None with few points."""
+def _drift_ppm(bins: deque[_Bin]) -> tuple[float, float] | None:
+    """Return the drift by least squares and its standard uncertainty; None with few points."""
     if len(bins) < _MIN_BINS:
         return None
     host_s, delay_s = np.array([(host_s, delay_s) for host_s, delay_s, _ in bins]).T
@@ -164,7 +160,7 @@ def _slope(bins: deque[_Bin]) -> tuple[float, float] | None:
     spread = float(host_s @ host_s)
     slope = float(host_s @ delay_s) / spread
     rest = delay_s - delay_s.mean() - slope * host_s
-    return slope, float(np.sqrt(rest @ rest / (len(bins) - 2) / spread))
+    return -1e6 * slope, 1e6 * float(np.sqrt(rest @ rest / (len(bins) - 2) / spread))
 
 
 _MAX_SLEW = 200e-6

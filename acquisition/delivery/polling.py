@@ -63,19 +63,12 @@ def incommensurate_period_s(longest_s: float, slot_s: float) -> float:
     all polls see slots of the same age: a drifting device then appears not to drift until it has
     drifted by a whole slot, and then to jump.
     """
+    ratio = max(longest_s / slot_s, slot_s / longest_s)
+    whole = math.floor(ratio)
+    golden = [n + share for n in (whole - 1, whole, whole + 1) for share in _SHARES]
     if slot_s <= longest_s:
-        return slot_s * _golden_up_to(longest_s / slot_s)
-    return slot_s / _golden_from(slot_s / longest_s)
-
-
-def _golden_up_to(ratio: float) -> float:
-    whole = math.floor(ratio)
-    return max(n + share for n in (whole - 1, whole) for share in _SHARES if n + share <= ratio)
-
-
-def _golden_from(ratio: float) -> float:
-    whole = math.floor(ratio)
-    return min(n + share for n in (whole, whole + 1) for share in _SHARES if n + share >= ratio)
+        return slot_s * max(each for each in golden if each <= ratio)
+    return slot_s / min(each for each in golden if each >= ratio)
 
 
 class Freshness:
