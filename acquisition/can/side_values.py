@@ -125,9 +125,7 @@ class BlockBuilder:
         self.side.clear()
         self._rejected.clear()
 
-    def blocks(
-        self, epoch: int, instants: Sequence[Instant], arrived_ns: int
-    ) -> list[SampleBlock]:
+    def blocks(self, epoch: int, instants: Sequence[Instant], arrived_ns: int) -> list[SampleBlock]:
         """Return the blocks of sample instants, given in index order and of one epoch.
 
         `arrived_ns` is the arrival of the last instant, ns since 1970 UTC.

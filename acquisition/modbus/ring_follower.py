@@ -122,7 +122,8 @@ class RingFollower:
     """
 
     def __init__(self, reader: RingReader, calibration: UnitCalibration, begun_ns: int) -> None:
-        self._reader, self._calibration = reader, calibration
+        self._reader, self._client = reader, reader.client
+        self._calibration = calibration
         self._expected = {
             "n_channels": len(calibration.channels),
             "rate in mHz": round(calibration.rate_hz * 1000.0),
@@ -146,7 +147,7 @@ class RingFollower:
         for (name, expected), value in zip(self._expected.items(), found, strict=True):
             if value != expected:
                 raise ConfigError(
-                    f"{self._reader.client.where}: block ring: {name} is {value}, expected {expected}"
+                    f"{self._client.where}: block ring: {name} is {value}, expected {expected}"
                 )
         return header
 
@@ -198,7 +199,7 @@ class RingFollower:
         does not contain are not used. Where polls are shorter than slots, only slots of the last
         header are due; others would be read in vain.
         """
-        if self._header is None or self._reader.client.requests_in_flight == 1:
+        if self._header is None or self._client.requests_in_flight == 1:
             return []
         layout = self._header.layout
         n_new = (now_s - self._asked_s) / layout.slot_duration_s
@@ -237,7 +238,7 @@ class RingFollower:
         again = await self.header()
         if (again.epoch, again.layout) != (header.epoch, header.layout):
             raise LinkError(
-                f"{self._reader.client.where}: block ring: epoch or layout differ between two reads of"
+                f"{self._client.where}: block ring: epoch or layout differ between two reads of"
                 " the header; if this recurs, check the device"
             )
 

@@ -11,6 +11,7 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -135,7 +136,7 @@ def _recording(folder: Path, request: Mapping[str, Any]) -> Iterator[Message]:
         tables.parquet_file(folder / SAMPLES, samples, manifest.n_samples, ROWS_PER_GROUP) as file,
         tables.parquet_file(folder / BLOCKS, blocks, manifest.n_blocks, BLOCKS_PER_GROUP) as heads,
     ):
-        counts = _Counts(file, manifest) if request["samples"] else None
+        read = _counts_reader(file, manifest) if request["samples"] else None
         number = first_row = 0
         for rows, rejected in tables.read_heads(heads, len(manifest.slow_channels)):
             n_samples = rows["n_samples"]
@@ -144,7 +145,7 @@ def _recording(folder: Path, request: Mapping[str, Any]) -> Iterator[Message]:
                 yield blocks_message(
                     rows[start:end],
                     [(row - start, why, n) for row, why, n in rejected if start <= row < end],
-                    counts.read(begin, int(n_samples[start:end].sum())) if counts else None,
+                    read(begin, int(n_samples[start:end].sum())) if read else None,
                 )
             number, first_row = number + len(rows), first_row + int(n_samples.sum())
             if number >= stop:
@@ -160,30 +161,24 @@ def _pieces(n_samples: Any, start: int, stop: int) -> Iterator[tuple[int, int]]:
         yield from ((n, n + 1) for n in range(start, stop))
 
 
-class _Counts:
-    """Reader of samples by row number, with one row group in memory."""
+def _counts_reader(file: Any, manifest: Manifest) -> Callable[[int, int], RawArray]:
+    """Return a reader (first row, number of rows) of samples, with one row group in memory."""
+    group = lru_cache(maxsize=1)(partial(tables.read_counts, file))
 
-    def __init__(self, file: Any, manifest: Manifest) -> None:
-        self._file, self._n_rows = file, manifest.n_samples
-        self._group: int | None = None
-        self._held: RawArray = np.empty((len(manifest.channels), 0), dtype=manifest.sample_type)
-
-    def read(self, first_row: int, n_rows: int) -> RawArray:
-        if first_row + n_rows > self._n_rows:
+    def read(first_row: int, n_rows: int) -> RawArray:
+        stop = first_row + n_rows
+        if stop > manifest.n_samples:
             raise ConfigError(
-                f"the recording is damaged: its blocks have {first_row + n_rows} samples or more,"
-                f" but the samples file has {self._n_rows}"
+                f"the recording is damaged: its blocks have {stop} samples or more, but the"
+                f" samples file has {manifest.n_samples}"
             )
-        parts: list[Any] = []
-        while n_rows > 0:
-            group, offset = divmod(first_row, ROWS_PER_GROUP)
-            if group != self._group:
-                self._held, self._group = tables.read_counts(self._file, group), group
-            part = self._held[:, offset : offset + n_rows]
-            parts.append(part)
-            first_row += part.shape[1]
-            n_rows -= part.shape[1]
+        parts: list[Any] = [
+            group(n)[:, max(0, first_row - n * ROWS_PER_GROUP) : stop - n * ROWS_PER_GROUP]
+            for n in range(first_row // ROWS_PER_GROUP, (stop - 1) // ROWS_PER_GROUP + 1)
+        ]
         return np.concatenate(parts, axis=1)
+
+    return read
 
 
 if __name__ == "__main__":

@@ -38,11 +38,8 @@ class Selection:
     def of(self, block: SampleBlock) -> SampleBlock:
         """Return a recorded block reduced to the selected channels."""
         side, rows = block.side, list(self.channels)
-        if rows == list(range(len(block.counts))):
-            counts, is_ok = block.counts, side.ok
-        else:
-            counts, is_ok = block.counts[rows], side.ok[rows]
-        selected = replace(side, ok=is_ok, slow=side.slow[list(self.slow)])
+        selected = replace(side, ok=side.ok[rows], slow=side.slow[list(self.slow)])
+        counts = block.counts[rows]
         return replace(block, calibration=self.calibration, counts=counts, side=selected)
 
 
