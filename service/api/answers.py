@@ -45,8 +45,6 @@ ENCODINGS: dict[str, Callable[[bytes], bytes]] = {
 }
 """Content encodings, the preferred one first."""
 
-MAX_CACHE_BYTES = 16_000_000
-
 MAX_KNOWN = 4096
 """Number of answered requests that can be repeated without routing; ten for each open page."""
 
@@ -113,7 +111,7 @@ class Answers:
     remembered by caller, so that `Repetition` can answer them again.
     """
 
-    def __init__(self, max_bytes: int = MAX_CACHE_BYTES) -> None:
+    def __init__(self, max_bytes: int = 16_000_000) -> None:
         self.started = secrets.token_hex(4)
         """Identifier of this start of the process; revisions of other starts are not comparable."""
         self._max_bytes, self._n_bytes = max_bytes, 0

@@ -31,7 +31,7 @@ from service.api.problems import (
     problem_schemas,
     refuse_unknown_parameters,
 )
-from service.api.routes.alarm_rates import alarm_rate_router
+from service.api.routes.alarm_rates import alarm_rate_router, delivery_router
 from service.api.routes.alarms import alarm_router, operation_router
 from service.api.routes.audit import audit_router
 from service.api.routes.baselines import baseline_action_router, baseline_router
@@ -41,7 +41,6 @@ from service.api.routes.film_history import film_history_router
 from service.api.routes.films import film_router
 from service.api.routes.motion import motion_router, recorded_motion_router
 from service.api.routes.notes import note_router
-from service.api.routes.notifications import delivery_router
 from service.api.routes.overview import overview_router
 from service.api.routes.plant import plant_router
 from service.api.routes.recordings import recording_router

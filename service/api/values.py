@@ -1,7 +1,6 @@
 """API models used by several routes: quality, reading, uncertainty, window, condition."""
 
 import math
-from collections.abc import Iterable
 from typing import Annotated, Literal, cast
 
 import numpy as np
@@ -189,11 +188,6 @@ PlaceName = Literal["shaft_x", "shaft_y", "bearing_x", "bearing_y"]
 
 
 LEVEL_NAMES = {level: cast("LevelName", level.name.lower()) for level in Level}
-
-
-def level_names(levels: Iterable[Level | None]) -> list[LevelName | None]:
-    """Return the API's names of quality levels; None, an unknown level, remains None."""
-    return [None if level is None else LEVEL_NAMES[level] for level in levels]
 
 
 PLACES: dict[PlaceName, int] = {

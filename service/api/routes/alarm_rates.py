@@ -1,4 +1,4 @@
-"""Route for the performance figures of the alarm system, such as alarms per day."""
+"""Routes for the alarm system: figures such as alarms per day, and delivery of messages."""
 
 import asyncio
 from collections.abc import Iterable, Sequence
@@ -18,7 +18,9 @@ from service.api.parameters import Moment, OnlyUnit, ns_from_datetime, parameter
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.alarm_models import AlarmIdText, AlarmModel, alarm_model
 from service.api.values import ApiModel, Time
+from service.live.receivers import ReceiverView
 from service.settings.alarm_kinds import LEVEL_NAMES, AlarmLevelName
+from service.settings.storage import Origin
 from service.store.port import AlarmQuery
 from service.store.store import Store
 
@@ -85,6 +87,15 @@ class AlarmRatesModel(ApiModel):
 
     stale: list[AlarmModel]
     """Alarms active for more than a day, oldest first."""
+
+
+class DeliveryModel(ApiModel):
+    """State of all receivers of alarm messages; a replay sends no messages."""
+
+    origin: Origin
+
+    receivers: list[ReceiverView]
+    """Receivers in the order of the plant file, then receivers that are no longer in it."""
 
 
 MAX_RATED = 100_000
@@ -170,5 +181,17 @@ def alarm_rate_router(context: Context) -> APIRouter:
         shown = {*units, PLANT} if unit is None else {unit}
         stale = [a for a in stale_alarms(engine.alarms, now_ns) if a.identity.unit in shown]
         return AlarmRatesModel.of(stale=[alarm_model(engine, films, a) for a in stale], **found)
+
+    return router
+
+
+def delivery_router(context: Context) -> APIRouter:
+    """Return the router for the delivery of alarm messages."""
+    router = subject_router("", "alarms", reach=Reach.NO_UNIT)
+
+    @router.get("/delivery")
+    async def message_receivers() -> DeliveryModel:
+        """List the receivers of alarm messages with their waiting and failed messages."""
+        return DeliveryModel.of(context, receivers=await context.receivers())
 
     return router

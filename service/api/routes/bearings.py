@@ -270,9 +270,3 @@ def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
         uncertainty=UncertaintyModel.of(budget, low_95=low, high_95=high),
         lines=lines,
     )
-
-
-def no_result(unit: str, bearing: str) -> ProblemError:
-    """Return the error with status 409 for a bearing without a result."""
-    detail = f"unit {unit!r} bearing {bearing!r} has no result yet: no segment is complete"
-    return ProblemError(409, "No result yet", detail)

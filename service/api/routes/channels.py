@@ -229,7 +229,7 @@ def waveform_model(
     )
 
 
-NO_SAMPLES = {409: "The unit has no samples"}
+NO_SAMPLES = problem_responses(own={409: "The unit has no samples"})
 NEWEST = "Duration of the newest samples; limited to those in memory."
 
 MAX_NUMBERS = 200_000
@@ -248,9 +248,7 @@ def channel_router(context: Context) -> APIRouter:
         """
         return await channels_model(context.live, context.unit(unit))
 
-    @router.get(
-        "/waveform", responses=problem_responses(own=NO_SAMPLES), response_model=WaveformModel
-    )
+    @router.get("/waveform", responses=NO_SAMPLES, response_model=WaveformModel)
     async def newest_samples(
         unit: UnitId,
         channel: Annotated[

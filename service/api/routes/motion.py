@@ -17,7 +17,7 @@ from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import duration, parameter
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.channels import NEWEST, NO_SAMPLES, held_blocks, require_samples
-from service.api.routes.recordings import RecordingId, damaged_recording, entry_of, library_of
+from service.api.routes.recordings import RecordingId, entry_of, library_of, readable
 from service.api.values import ApiModel, BearingAnswer, SampleRange, Time, listed
 from service.live.samples import newest_blocks, sample_window
 from service.live.status import HELD_S
@@ -107,11 +107,7 @@ class MotionModel(SampleRange, BearingAnswer):
 DECIMALS = 3
 """Number of decimals of displacements in µm, finer than a tenth of a converter count."""
 
-SENSES: dict[int, Literal["x_to_y", "y_to_x", "straight"]] = {
-    1: "x_to_y",
-    -1: "y_to_x",
-    0: "straight",
-}
+SENSES = {1: "x_to_y", -1: "y_to_x", 0: "straight"}
 
 
 def motion_model(
@@ -183,9 +179,7 @@ def motion_router(context: Context) -> APIRouter:
     """Return the router for the newest motion."""
     router = subject_router("/units/{unit}/bearings", "bearing")
 
-    @router.get(
-        "/{bearing}/motion", responses=problem_responses(own=NO_SAMPLES), response_model=MotionModel
-    )
+    @router.get("/{bearing}/motion", responses=NO_SAMPLES, response_model=MotionModel)
     async def motion(
         unit: UnitId,
         bearing: BearingId,
@@ -228,15 +222,12 @@ def recorded_motion_router(context: Context) -> APIRouter:
         samples after the restart are omitted.
         """
         kept = await entry_of(context, recording)
-        unit = _unit_of(context, kept)
-        context.bearing(unit, bearing)
-        watched = context.references.bearing(unit, bearing)
-        if kept.manifest is not None:
-            _require_few(seconds, kept.manifest.rate_hz)
-        try:
+        with readable(recording):
+            unit, rate_hz = _described(context, kept)
+            context.bearing(unit, bearing)
+            watched = context.references.bearing(unit, bearing)
+            _require_few(seconds, rate_hz)
             return await rendered(lambda: _recorded(context, kept.name, watched, start_s, seconds))
-        except ConfigError as error:
-            raise damaged_recording(recording, error) from error
 
     return router
 
@@ -267,15 +258,18 @@ def _recorded(
     return motion_model(unit, bearing, found.motion, recording=name, recorded=found)
 
 
-def _unit_of(context: Context, kept: RecordingEntry) -> str:
+def _described(context: Context, kept: RecordingEntry) -> tuple[str, float]:
+    """Return unit and sampling rate, Hz, of a recording; raise `ConfigError` if they are unknown.
+
+    Raises a problem of status 409 if the unit is not in this plant.
+    """
     if kept.manifest is None:
-        raise damaged_recording(kept.name, ConfigError(kept.fault or "no manifest"))
-    if kept.manifest.unit not in context.units:
-        detail = (
-            f"recording {kept.name} is of unit {kept.manifest.unit!r}, which is not in this plant"
-        )
+        raise ConfigError(kept.fault or "no manifest")
+    unit = kept.manifest.unit
+    if unit not in context.units:
+        detail = f"recording {kept.name} is of unit {unit!r}, which is not in this plant"
         raise ProblemError(409, "No samples", detail)
-    return kept.manifest.unit
+    return unit, kept.manifest.rate_hz
 
 
 def _require_few(seconds: float, rate_hz: float) -> None:

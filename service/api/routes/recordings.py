@@ -1,7 +1,8 @@
 """Routes for recordings of samples: list, description and download of recordings."""
 
 import asyncio
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
 from typing import Annotated, Literal
 
 import structlog
@@ -205,10 +206,8 @@ def recording_router(context: Context) -> APIRouter:
     async def one_recording(recording: RecordingId) -> Response:
         """Check the files of a recording; return its channels, gaps, rejected samples and files."""
         kept = await entry_of(context, recording)
-        try:
+        with readable(recording):
             return await rendered(lambda: recording_info(library_of(context), kept))
-        except ConfigError as error:
-            raise damaged_recording(recording, error) from error
 
     @router.get(
         "/{recording}/files.zip",
@@ -245,10 +244,8 @@ async def _download(
     context: Context, recording: str, make: Callable[[str], Pieces], media_type: str, suffix: str
 ) -> StreamingResponse:
     await entry_of(context, recording)
-    try:
+    with readable(recording):
         pieces = await context.downloads.download(await asyncio.to_thread(make, recording))
-    except (ConfigError, OSError) as error:
-        raise damaged_recording(recording, error) from error
     return attachment(pieces, media_type, f"{recording}.{suffix}")
 
 
@@ -269,8 +266,12 @@ async def entry_of(context: Context, recording: str) -> RecordingEntry:
     return found
 
 
-def damaged_recording(recording: str, error: Exception) -> ProblemError:
-    """Log that a recording is damaged; return the error with status 410 for the request."""
-    log.error("a recording cannot be read", recording=recording, reason=str(error))
-    words = f"recording {recording} is damaged on the disk and cannot be read"
-    return ProblemError(410, "Damaged", words)
+@contextmanager
+def readable(recording: str) -> Iterator[None]:
+    """Log an error of reading a damaged recording; raise a problem of status 410 in its place."""
+    try:
+        yield
+    except (ConfigError, OSError) as error:
+        log.error("a recording cannot be read", recording=recording, reason=str(error))
+        words = f"recording {recording} is damaged on the disk and cannot be read"
+        raise ProblemError(410, "Damaged", words) from error

@@ -17,7 +17,6 @@ from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import TimeRange, at_most, parameter, several
 from service.api.problems import ProblemError, problem_responses
-from service.api.routes.bearings import no_result
 from service.api.values import (
     LEVEL_NAMES,
     PLACES,
@@ -205,7 +204,10 @@ def spectra_router(context: Context) -> APIRouter:
         async def newest() -> SpectrumModel:
             found = await context.live.assessment(unit, bearing)
             if found is None:
-                raise no_result(unit, bearing)
+                detail = (
+                    f"unit {unit!r} bearing {bearing!r} has no result yet: no segment is complete"
+                )
+                raise ProblemError(409, "No result yet", detail)
             return await asyncio.to_thread(spectrum_model, found, sense)
 
         return await context.answers.of(request, lambda: context.live.revision(unit), newest)

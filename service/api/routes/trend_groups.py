@@ -12,7 +12,7 @@ from core.condition.operating_state import OperatingState
 from core.monitor.catalogue import Quantity, quantity_named
 from core.units import NS_PER_S
 from service.api.problems import ProblemError
-from service.api.values import STATE_NAMES, ApiModel, LevelName, TimeNs, bounds, level_names
+from service.api.values import LEVEL_NAMES, STATE_NAMES, ApiModel, LevelName, TimeNs, bounds
 from service.runtime.models import SERVED
 from service.store.port import Trend, TrendQuery, TrendSeries, ValueRange
 from service.store.series import U_RANDOM, U_SYSTEMATIC
@@ -104,34 +104,15 @@ def _series(quantity: Quantity, columns: Mapping[str, TrendSeries]) -> QuantityT
     for suffix in (U_RANDOM, U_SYSTEMATIC):
         found = columns.get(quantity.name + suffix)
         uncertainties[suffix.lstrip(".")] = found and found.mean
-    levels = level_names(series["worst_level"])
+    levels = [LEVEL_NAMES.get(level) for level in series["worst_level"]]
     return QuantityTrend(quantity.unit, **series | uncertainties | {"worst_level": levels})
 
 
-@dataclass(frozen=True)
-class _Axis:
-    """Axis of eccentricity ratio or oil temperature, divided into bins of equal width.
-
-    Parameters
-    ----------
-    quantity
-        Name of the quantity, which is also the field of `TrendQuery` with the requested range.
-    width
-        Width of a bin, in the unit of the quantity.
-    """
-
-    quantity: str
-    width: float
-
-    def narrowed(self, query: TrendQuery, low: float, high: float) -> TrendQuery:
-        """Return the query limited to a bin: from `low`, included, to `high`, excluded."""
-        requested, below = getattr(query, self.quantity), math.nextafter(high, -math.inf)
-        within = ValueRange(
-            low if requested.low is None else max(low, requested.low),
-            below if requested.high is None else min(below, requested.high),
-        )
-        changed: dict[str, Any] = {self.quantity: within}
-        return replace(query, **changed)
+AXES: dict[GroupName, tuple[str, str]] = {
+    "eccentricity": ("eccentricity_ratio", "eccentricity_width"),
+    "oil_temperature": ("oil_temperature_c", "temperature_width_c"),
+}
+"""Grouping quantity, as in `TrendQuery`, and field of `CellGrid` with the width of its bins."""
 
 
 def trend_groups(
@@ -145,10 +126,9 @@ def trend_groups(
     """
     if by == "state":
         found = _by_state(store, query)
-    elif by == "eccentricity":
-        found = _by_cell(store, query, _Axis("eccentricity_ratio", grid.eccentricity_width))
     else:
-        found = _by_cell(store, query, _Axis("oil_temperature_c", grid.temperature_width_c))
+        quantity, width = AXES[by]
+        found = _by_cell(store, query, quantity, getattr(grid, width))
     return [group for group in found if group.time]
 
 
@@ -158,25 +138,38 @@ def _by_state(store: Store, query: TrendQuery) -> Iterator[TrendGroupModel]:
         yield TrendGroupModel.of(trend, name=STATE_NAMES[state], low=None, high=None)
 
 
-def _by_cell(store: Store, query: TrendQuery, axis: _Axis) -> Iterator[TrendGroupModel]:
-    for number in _bins(store, query, axis):
-        low, high = bounds(number, axis.width)
-        trend = columns_of(store.trend(axis.narrowed(query, low, high)))
+def _by_cell(
+    store: Store, query: TrendQuery, quantity: str, width: float
+) -> Iterator[TrendGroupModel]:
+    for number in _bins(store, query, quantity, width):
+        low, high = bounds(number, width)
+        trend = columns_of(store.trend(_narrowed(query, quantity, low, high)))
         yield TrendGroupModel.of(trend, name=f"{low:g} to {high:g}", low=low, high=high)
 
 
-def _bins(store: Store, query: TrendQuery, axis: _Axis) -> list[int]:
+def _narrowed(query: TrendQuery, quantity: str, low: float, high: float) -> TrendQuery:
+    """Return the query limited to a quantity from `low`, included, to `high`, excluded."""
+    requested, below = getattr(query, quantity), math.nextafter(high, -math.inf)
+    within = ValueRange(
+        low if requested.low is None else max(low, requested.low),
+        below if requested.high is None else min(below, requested.high),
+    )
+    changed: dict[str, Any] = {quantity: within}
+    return replace(query, **changed)
+
+
+def _bins(store: Store, query: TrendQuery, quantity: str, width: float) -> list[int]:
     """Return the numbers of the bins that may contain readings, from a coarse trend.
 
     These are the bins between the minimum and the maximum of each bucket of the trend.
     """
-    survey = replace(query, quantities=(axis.quantity,), max_points=SURVEY_POINTS)
-    series = store.trend(survey).series[axis.quantity]
+    survey = replace(query, quantities=(quantity,), max_points=SURVEY_POINTS)
+    series = store.trend(survey).series[quantity]
     bins: set[int] = set()
     for low, high in zip(series.minimum, series.maximum, strict=True):
         if low is not None and high is not None:
-            first = math.floor(low / axis.width - BIN_TOLERANCE)
-            last = math.floor(high / axis.width + BIN_TOLERANCE)
+            first = math.floor(low / width - BIN_TOLERANCE)
+            last = math.floor(high / width + BIN_TOLERANCE)
             bins |= set(range(first, min(last, first + MAX_GROUPS) + 1))
     if len(bins) > MAX_GROUPS:
         detail = f"more than {MAX_GROUPS} groups; request a narrower range"
