@@ -18,7 +18,7 @@ nitpicky = True
 # Equations are plain text, so that they read the same on a forge, on paper and without a network.
 myst_heading_anchors = 3
 suppress_warnings = [
-    "toc.not_included",  # a new page is found by search until somebody has given it its place
+    "toc.not_included",  # a new page may be outside the table of contents
 ]
 
 html_theme = "furo"

@@ -1,4 +1,4 @@
-"""PNG files of few colours: what a dashboard shows needs no more than 256."""
+"""PNG files with a palette: pictures of the dashboard need at most 256 colours."""
 
 import struct
 import zlib
@@ -38,7 +38,7 @@ def indexed_png(pixels: Pixels) -> bytes:
 
 
 def _chosen(colours: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
-    """Of colours, the most frequent first: one of each kind, so no small mark loses its own."""
+    """Return one colour of each kind, the most frequent first, so that small marks keep theirs."""
     kinds = (_parts(colours) >> 5) @ np.array([64, 8, 1], dtype=np.int32)
     _, first = np.unique(kinds, return_index=True)
     rest = np.setdiff1d(np.arange(len(colours)), first)
@@ -50,7 +50,7 @@ def _parts(packed: npt.NDArray[np.uint32]) -> npt.NDArray[np.int32]:
 
 
 def _nearest(colours: npt.NDArray[np.int32], kept: npt.NDArray[np.int32]) -> npt.NDArray[np.intp]:
-    """Index of the nearest kept colour for each, a thousand at a time."""
+    """Return the index of the nearest palette colour for each, a thousand at a time."""
     parts = np.array_split(colours, max(1, len(colours) // 1000))
     found = [((part[:, None] - kept[None]) ** 2).sum(-1).argmin(1) for part in parts]
     return np.concatenate(found)

@@ -1,4 +1,4 @@
-"""Which pictures of the dashboard there are: every page, and some dark or on a phone."""
+"""List of dashboard pictures: every page, some in the dark theme or on a phone."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,14 @@ BEARING = f"{UNIT}/bearings/UJB"
 
 @dataclass(frozen=True)
 class Picture:
-    """A page as somebody sees it.
+    """A picture of a page.
 
     Parameters
     ----------
     until
-        Selector of what must be there before it is taken.
+        Selector of an element that must exist before the picture is taken.
     is_remote
-        Whether it is asked for from elsewhere, where people must log in.
+        Whether the request comes from another computer, so that a login is required.
     """
 
     name: str
@@ -47,11 +47,11 @@ PAGES = (
 """All pages of a plant with an alarm, a recording, an account and a key."""
 
 TWENTY = Picture("twenty", "#/", "[data-unit=U20]")
-"""Of another plant."""
+"""Picture of the plant with twenty units."""
 
 
 def every_look(picture: Picture) -> list[Picture]:
-    """The same page light and dark, on a screen and on a phone."""
+    """Return a page in the light and the dark theme, on a screen and on a phone."""
     return [
         Picture(
             f"{picture.name}{'-phone' * is_phone}{'-dark' * is_dark}",
@@ -67,4 +67,4 @@ def every_look(picture: Picture) -> list[Picture]:
 
 
 IN_THE_GUIDE = frozenset(["unit-phone", *(picture.name for picture in (*PAGES, TWENTY))])
-"""Those that the documentation shows; the others are for whoever works on the dashboard."""
+"""Pictures in the documentation; the others are for development of the dashboard."""

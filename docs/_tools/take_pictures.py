@@ -55,7 +55,7 @@ async (png) => {
 
 
 def main() -> None:
-    """Take them."""
+    """Take all pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="only these pages, as overview")
     parser.add_argument("--url", help="of a service that runs")
@@ -78,14 +78,14 @@ def main() -> None:
 
 
 def looks_of(pages: list[Picture], options: argparse.Namespace) -> list[Picture]:
-    """Every look of some pages that is wanted."""
+    """Return all variants of the selected pages."""
     looks = [look for page in pages for look in every_look(page)]
     return [look for look in looks if not options.guide or look.name in IN_THE_GUIDE]
 
 
 @contextmanager
 def demo() -> Iterator[str]:
-    """Run the demo plant; yield where its dashboard is."""
+    """Run the demo plant; yield the address of its dashboard."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "service.cli.main", "demo", "--port", "0"]
         process = subprocess.Popen(  # noqa: S603 - our own program
@@ -101,7 +101,7 @@ def demo() -> Iterator[str]:
 
 @contextmanager
 def twenty_units() -> Iterator[str]:
-    """Run a plant of twenty units, simulated without any wire; yield where its dashboard is."""
+    """Run a plant of twenty units, simulated in process; yield the address of its dashboard."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "plant.toml")
         path.write_text(twenty_file(Path(folder)), encoding="utf-8")
@@ -110,7 +110,7 @@ def twenty_units() -> Iterator[str]:
 
 
 def twenty_file(folder: Path) -> str:
-    """The demo plant's second unit twenty times, sampled slowly: the picture shows no spectra."""
+    """Return a plant of twenty copies of a demo unit, sampled slowly to save time."""
     head, *units = plant_file(20, folder).split("[[unit]]\n")
     text = head.replace('"Benchmark"', '"Twenty units"') + QUICK_ANALYSIS
     for number, unit in enumerate(units, 1):
@@ -135,7 +135,7 @@ async def prepare(url: str) -> None:
 
 
 async def await_recording(service: APIRequestContext) -> None:
-    """Wait for those around the alert and the danger: the cause is named by then."""
+    """Wait for the samples around the alert and the danger; the cause is then known."""
     began_s = time.monotonic()
     while len((await (await service.get("recordings")).json())["recordings"]) < 2:
         if time.monotonic() - began_s > WAIT_S:
@@ -144,7 +144,7 @@ async def await_recording(service: APIRequestContext) -> None:
 
 
 async def take_all(url: str, looks: list[Picture]) -> None:
-    """Take some pictures."""
+    """Take the given pictures."""
     chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))))
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(executable_path=chromium)
@@ -160,7 +160,7 @@ async def take_all(url: str, looks: list[Picture]) -> None:
 
 
 async def taken(browser: Browser, url: str, picture: Picture) -> bytes:
-    """One page, once everything on it has been drawn."""
+    """Take a picture of one page when it is completely drawn."""
     width, height = PHONE if picture.is_phone else SCREEN
     page = await browser.new_page(
         viewport={"width": width, "height": height},
@@ -179,7 +179,7 @@ async def taken(browser: Browser, url: str, picture: Picture) -> bytes:
 
 
 async def pixels_of(painter: Page, png: bytes) -> Pixels:
-    """Red, green and blue of every pixel, as the browser itself decodes them."""
+    """Return red, green and blue of every pixel, as decoded by the browser."""
     width, height, text = await painter.evaluate(PIXELS, base64.b64encode(png).decode())
     values = np.frombuffer(base64.b64decode(text), dtype=np.uint8)
     return values.reshape(height, width, 4)[..., :3]

@@ -1,4 +1,4 @@
-"""Reference pages that are made of the program itself whenever the documentation is built.
+"""Reference pages that are generated from the program when the documentation is built.
 
 A page of `docs/reference` holds a heading, a word to the reader and a line such as
 ``<!-- made when built: configuration -->``; that line is replaced as the page is read. Nothing of
@@ -38,7 +38,7 @@ def further_alarms(page: str) -> str:
 
 
 def filled(page: str) -> str:
-    """Fill a page's places with what they stand for."""
+    """Replace the placeholders of a page by generated text."""
     for name, make in MADE.items():
         place = f"<!-- made when built: {name} -->"
         if place in page:
@@ -51,6 +51,6 @@ def _fill(_app: Sphinx, _name: str, source: list[str]) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Fill the places while Sphinx reads the pages."""
+    """Replace the placeholders while Sphinx reads the pages."""
     app.connect("source-read", _fill)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

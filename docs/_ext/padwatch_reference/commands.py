@@ -1,4 +1,4 @@
-"""The reference of commands: every command and option, from the command line itself."""
+"""Reference of commands and options, generated from the command line."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -12,12 +12,12 @@ OPTION_HEAD = "| Argument or option | Meaning |\n|---|---|"
 
 
 def commands_markdown() -> str:
-    """Every command with its arguments and options."""
+    """Return every command with its arguments and options."""
     return "\n\n".join(_chapter(*each) for each in commands()) + "\n"
 
 
 def commands() -> Iterator[tuple[str, Any, Any]]:
-    """Walk through the commands that do something: name, command, and its context."""
+    """Yield name, command and context of every command that is not a group."""
     yield from _below(typer.main.get_command(app), "padwatch", None)
 
 

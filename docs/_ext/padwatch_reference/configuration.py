@@ -1,4 +1,4 @@
-"""The reference of settings: every table, every key, from the models that check them."""
+"""Reference of settings, generated from the models that check them."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -13,12 +13,12 @@ HEAD = "| Key | Meaning | Type and limits | Default | Example |\n|---|---|---|--
 
 
 def plant_markdown() -> str:
-    """Every key of a plant file."""
+    """Return the reference of a plant file."""
     return schema_markdown(plant_file_schema())
 
 
 def import_markdown() -> str:
-    """Every key of a mapping file for imports."""
+    """Return the reference of a mapping file for imports."""
     return schema_markdown(ImportMapping.model_json_schema())
 
 
@@ -71,7 +71,7 @@ def _default(schema: Node, node: Node) -> str:
 
 
 def _example(schema: Node, model: str, key: str, node: Node, shown: Examples) -> str:
-    """An example; those that the meaning gives are not repeated."""
+    """Return an example, unless the description contains one."""
     if "xample" in str(node.get("description", "")):
         return "see meaning"
     if list(submodels(schema, node)):

@@ -1,4 +1,4 @@
-"""Values that keys have in the files that come with padwatch and in the guides."""
+"""Example values of keys from the shipped files and the guides."""
 
 import re
 import tomllib
@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[3]
 FENCE = re.compile(r"^```toml\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 FRAGMENTS = ("RegisterMapSettings", "BearingSettings", "UnitSettings", "ChannelSettings")
-"""Tables that stand alone: register maps in files of their own, excerpts in the guides."""
+"""Separate tables: register maps in their own files, excerpts in the guides."""
 
 Examples = dict[tuple[str, str], Any]
 """The first value found, by model and key."""

@@ -1,4 +1,4 @@
-"""What a JSON schema of settings says: its tables, and where in a TOML file they stand."""
+"""Tables of a JSON schema of settings, and their paths in a TOML file."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -52,7 +52,7 @@ def _collect(
 
 
 def submodels(schema: Node, node: Node, is_list: bool = False) -> Iterator[tuple[str, bool]]:
-    """Find the models that may stand under a key, and whether in a list."""
+    """Return the models that a key permits, and whether they are in a list."""
     if "$ref" in node:
         model = str(node["$ref"]).rsplit("/", 1)[-1]
         if "properties" in schema["$defs"][model]:

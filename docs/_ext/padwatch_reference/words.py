@@ -21,7 +21,7 @@ IDENTIFIER = TypeAdapter(Identifier).json_schema()["pattern"]
 
 
 def literal(value: object) -> str:
-    """Write a value as it stands in a TOML file."""
+    """Return a value in TOML notation."""
     if isinstance(value, Mapping):
         inside = ", ".join(f"{key} = {literal(item)}" for key, item in value.items())
         return f"{{ {inside} }}" if inside else "{}"
@@ -39,14 +39,14 @@ def code(text: str) -> str:
 
 
 def type_words(schema: Node, node: Node) -> str:
-    """Say what may stand under a key, with its limits; nothing about tables of their own."""
+    """Return the permitted types and limits of a key, without subtables."""
     if "$ref" in node:
         target = schema["$defs"][str(node["$ref"]).rsplit("/", 1)[-1]]
         return "" if "properties" in target else type_words(schema, target)
     options = [*node.get("anyOf", ()), *node.get("oneOf", ())]
     if options:
-        said = dict.fromkeys(type_words(schema, option) for option in options)
-        return " or ".join(words for words in said if words)
+        kinds = dict.fromkeys(type_words(schema, option) for option in options)
+        return " or ".join(words for words in kinds if words)
     if "const" in node:
         return code(literal(node["const"]))
     if "enum" in node:
