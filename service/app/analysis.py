@@ -21,7 +21,6 @@ from service.app import kept_files
 from service.app.notifications import receivers_of, router_of
 from service.app.storage import open_store
 from service.cluster.measuring_side import CommandWorker, Reporter
-from service.live.metrics import add_alarms, add_films, add_units
 from service.live.references import ReferencesInForce
 from service.live.snapshot import CaptureStatus, PlantSnapshot, SourceCounts
 from service.measuring.acquirer import Bus
@@ -267,23 +266,26 @@ class Analysis:
             continuous_trouble=self.tape.trouble,
             faults=dict(self.recordings.faults),
             receivers=self.deliveries.statuses,
-            sources={unit: counts_of(source) for unit, source in self._sources.items()},
+            sources={
+                unit: SourceCounts(source.statistics, dict(source.refused_frames))
+                for unit, source in self._sources.items()
+            },
         )
 
     async def metrics(self) -> bytes:
-        """Return all metrics of this process in the Prometheus text format."""
+        """Return the metrics of this process in the Prometheus text format.
+
+        The serving process adds those of units, films and alarms.
+        """
         try:
             receivers = await self.deliveries.look()
         except StoreError:
             receivers = None
         process, families = self.process, Families()
         live, now_ns = process.live, process.clock.now_ns()
-        units = {unit.id: [bearing.id for bearing in unit.bearing] for unit in process.plant.unit}
+        units = [unit.id for unit in process.plant.unit]
         families.add_program(process.store.kind)
         add_samples(families, live, units, self._sources, now_ns)
-        add_units(families, live, units)
-        add_films(families, live, self.films.newest, units)
-        add_alarms(families, self.alarms.alarms, self.alarms.count(), list(units))
         add_store(families, self.bus, self.recorder, live)
         add_integrity(families, self.soundness)
         add_disks(families, self.space)
@@ -292,11 +294,6 @@ class Analysis:
         add_deliveries(families, receivers, now_ns)
         families.include(ProcessCollector(registry=None))
         return families.text
-
-
-def counts_of(source: TimedSource) -> SourceCounts:
-    """Return the counts of polls and refused frames of a sample source."""
-    return SourceCounts(source.statistics, dict(source.refused_frames))
 
 
 EVIDENCE = {

@@ -67,8 +67,8 @@ async def run_acquire(
         return {"stream": publisher.trouble}
 
     fill = partial(add_publisher, publisher=publisher)
-    health = HealthServer(listener, beats, live, units, checks, fill)
-    supervision = Supervision(manager, beats, live, units, clock)
+    health = HealthServer(listener, beats, live.status, units, checks, fill)
+    supervision = Supervision(manager, beats, live.status, units, clock)
     supervision.announce(announce, url_of(listener))
     loops = {"publish": publisher.run, "health": health.run}
     await supervision.run_until_stopped(loops, acquirer.run, drain)
@@ -116,8 +116,9 @@ async def run_analyse(
         process = stack.enter_context(process_context(part, Origin.LIVE, clock))
         analysing = Analysing(plant, partition, settings, monitors, process)
         parts = (analysing.checks, analysing.add_metrics, analysing.shown)
-        health = HealthServer(listener, process.beats, process.live, monitors, *parts)
-        supervision = Supervision(manager, process.beats, process.live, monitors, clock)
+        status = process.live.status
+        health = HealthServer(listener, process.beats, status, monitors, *parts)
+        supervision = Supervision(manager, process.beats, status, monitors, clock)
         supervision.announce(announce, url_of(listener))
         try:
             await supervision.run_until_stopped({"health": health.run}, analysing.run)

@@ -10,7 +10,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 from prometheus_client.process_collector import ProcessCollector
 
-from service.live.metrics import Newest
+from service.live.status import UnitStatus
 from service.runtime.heartbeats import Heartbeats, Pulse
 from service.runtime.metrics import TEXT, Families
 
@@ -27,8 +27,8 @@ class HealthServer:
 
     Parameters
     ----------
-    beats, live, units
-        Heartbeats and unit states of the process, and the ids of its units.
+    beats, status, units
+        Heartbeats of the process, function that returns the link status of a unit, and unit ids.
     checks
         Function that returns, by name of each required part, its fault; None if the part works.
     fill
@@ -39,7 +39,7 @@ class HealthServer:
 
     listener: socket.socket
     beats: Heartbeats
-    live: Newest
+    status: Callable[[str], UnitStatus]
     units: Collection[str]
     checks: Callable[[], Mapping[str, str | None]]
     fill: Callable[[Families], None]
@@ -57,7 +57,7 @@ class HealthServer:
             loops = {f"loop {name}": trouble for name, trouble in self.beats.look().items()}
             checks = {**self.checks(), **loops}
             status = 503 if any(checks.values()) else 200
-            shown = {f"unit {unit}": self.live.status(unit).state.value for unit in self.units}
+            shown = {f"unit {unit}": self.status(unit).state.value for unit in self.units}
             shown |= self.shown()
             shown |= {name: trouble or "ok" for name, trouble in checks.items()}
         elif path != "/livez":

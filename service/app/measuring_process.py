@@ -182,7 +182,7 @@ async def run_service(
         audit = ServiceTrail(plant, origin, process.store.audit, clock)
         await audit.begin()
         held = [*(unit.id for unit in plant.unit), PLANT]
-        supervision = Supervision(manager, beats, live, units, clock)
+        supervision = Supervision(manager, beats, live.status, units, clock)
         reports = SocketReports([*held, SHARED], analysis.snapshots, analysis.snapshot, clock)
         ready = partial(supervision.announce, announce)
         questions = Questions(analysis.executor, live, analysis.soundness, analysis.metrics, ready)

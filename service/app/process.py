@@ -7,8 +7,7 @@ from typing import Any
 import structlog
 
 from acquisition.clock import Clock
-from service.live.metrics import Newest
-from service.live.status import LinkState
+from service.live.status import LinkState, UnitStatus
 from service.runtime.heartbeats import Heartbeats, Loop
 from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import ServiceManager
@@ -22,17 +21,18 @@ class Supervision:
     """Supervisor of loops that notifies the watchdog while all loops run, and logs dead loops.
 
     The supervisor runs on the event loop, so that a blocked event loop stops the notifications.
+    `status` returns the link status of a unit.
     """
 
     def __init__(
         self,
         manager: ServiceManager,
         beats: Heartbeats,
-        live: Newest,
+        status: Callable[[str], UnitStatus],
         units: Iterable[str],
         clock: Clock,
     ) -> None:
-        self._manager, self._beats, self._live, self._clock = manager, beats, live, clock
+        self._manager, self._beats, self._link, self._clock = manager, beats, status, clock
         self._units = tuple(units)
         self._logged: set[str] = set()
         half_s = LOOK_EVERY_S if manager.watchdog_s is None else manager.watchdog_s / 2.0
@@ -75,7 +75,7 @@ class Supervision:
             self._manager.notify(WATCHDOG="1", STATUS=self._status())
 
     def _status(self) -> str:
-        states = [self._live.status(unit).state for unit in self._units]
+        states = [self._link(unit).state for unit in self._units]
         return f"{states.count(LinkState.CONNECTED)} of {len(states)} units connected"
 
     async def run_until_stopped(

@@ -19,7 +19,7 @@ from service.app.serving_process import access_desk, context_of, serve_requests
 from service.app.storage import open_access, open_store
 from service.cluster.serving_side import DatabaseOperators, Feed, replica_receivers
 from service.live.client import LiveClient
-from service.live.metrics import add_alarms, add_films, add_units
+from service.live.metrics import add_plant
 from service.live.receivers import ReceiverView
 from service.notifications.metrics import add_deliveries
 from service.runtime.heartbeats import Heartbeats, Pulse
@@ -66,17 +66,14 @@ class Replica:
             views = await self.receivers()
         except StoreError:
             views = None
-        bearings = {unit.id: [each.id for each in unit.bearing] for unit in self._plant.unit}
-        families, live, units = Families(), self.live, self.live.units
+        families, units = Families(), self.live.units
         families.add_program(self._store.kind)
         families.declare(REPORTS)
         families.add("reports_readable", units.read_error is None)
-        for unit in bearings:
-            families.add("unit_analysed", units.is_alive(unit), unit=unit)
-            families.add("unit_silence_seconds", units.silence_s(unit), unit=unit)
-        add_units(families, units, bearings)
-        add_films(families, units, live.films.newest, bearings)
-        add_alarms(families, live.alarms.alarms, live.alarms.count(), list(bearings))
+        for unit in self._plant.unit:
+            families.add("unit_analysed", units.is_alive(unit.id), unit=unit.id)
+            families.add("unit_silence_seconds", units.silence_s(unit.id), unit=unit.id)
+        add_plant(families, self.live, self._plant)
         add_deliveries(families, views, self._clock.now_ns())
         families.include(ProcessCollector(registry=None))
         return families.text
@@ -119,7 +116,7 @@ async def run_serve(
         await replica.feed.start()
         audit = ServiceTrail(plant, Origin.LIVE, store.audit, clock)
         await audit.begin()
-        supervision = Supervision(manager, beats, replica.live.units, context.units, clock)
+        supervision = Supervision(manager, beats, replica.live.units.status, context.units, clock)
         ended, served = asyncio.Event(), asyncio.Event()
 
         async def ready(url: str, token: str | None) -> None:

@@ -38,6 +38,7 @@ from service.live.exchange import (
     VersionError,
     read_start,
 )
+from service.live.metrics import add_plant
 from service.live.receivers import with_backlogs
 from service.live.references import ReferencesInForce
 from service.live.snapshot import Report
@@ -45,6 +46,7 @@ from service.reports.archive import EvidenceArchive
 from service.reports.routes import EvidenceService, evidence_router
 from service.runtime.heartbeats import Heartbeats, Loop
 from service.runtime.listening import url_of
+from service.runtime.metrics import Families
 from service.runtime.periodic import periodic
 from service.runtime.process import (
     exempt_start,
@@ -248,10 +250,11 @@ async def serve_beside(
 
         async def metrics() -> bytes:
             try:
-                found: bytes = await exchange.ask("metrics", "[]")
+                measured: bytes = await exchange.ask("metrics", "[]")
             except MeasuringGoneError as error:
                 raise ProblemError(503, "No answer", str(error)) from error
-            return found
+            add_plant(families := Families(), live, plant)
+            return families.text + measured
 
         async def ready(url: str, token: str | None) -> None:
             with suppress(MeasuringGoneError):

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable, Collection, Iterable
 
 from acquisition.clock import Clock
-from service.live.commands import BaselineCommand, UnreadableCommandError, decoded
+from service.live.commands import BASELINE_ACTIONS
 from service.live.snapshot import UnitReport, link_document, snapshot_document
 from service.measuring.commands import CommandExecutor
 from service.measuring.snapshots import LINK_EVERY_S, SnapshotBuilder
@@ -127,21 +127,13 @@ class CommandWorker:
 
     async def _take_up(self, found: OpenCommand) -> None:
         command, commands = found.command, self._store.commands
-        answer: Answer | None = None
         if self._clock.now_ns() > command.expires_ns:
             answer = TOO_LATE
-        else:
-            try:
-                task = decoded(command.kind, command.document)
-            except UnreadableCommandError as error:
-                answer = Answer(CommandState.REFUSED, str(error))
-            else:
-                # baselines and answer are stored in separate transactions: the outcome is unknown
-                if isinstance(task, BaselineCommand) and found.taken_by is not None:
-                    answer = INTERRUPTED
-        if answer is None:
-            if not await asyncio.to_thread(commands.take, command.id, self._process):
-                return  # the sender has withdrawn the command
+        elif found.taken_by is not None and command.kind in BASELINE_ACTIONS:
+            answer = INTERRUPTED  # baselines and answer are stored in separate transactions
+        elif await asyncio.to_thread(commands.take, command.id, self._process):
             who = Acting(Source.API, command.peer, command.actor, command.id)
-            answer = await self._executor.execute(task, who)
+            answer = await self._executor.execute(command.kind, command.document, who)
+        else:
+            return  # the sender has withdrawn the command
         await asyncio.to_thread(commands.answer, command.id, answer, self._clock.now_ns())

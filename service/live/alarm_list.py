@@ -1,6 +1,6 @@
 """List of all alarms in the serving process, and numbers of alarms by state."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmState
@@ -59,6 +59,14 @@ def reporting_unit(identity: AlarmIdentity) -> str:
     return identity.subject if identity.kind == SAMPLES_LOST else identity.unit
 
 
+def owner_of(alarm: Alarm, units: Collection[str]) -> str:
+    """Return the one of `units` whose process updates an alarm; `SHARED` or `PLANT` without one."""
+    if is_shared(alarm):
+        return SHARED
+    unit = reporting_unit(alarm.identity)
+    return unit if unit in units else PLANT
+
+
 ShownAlarm = tuple[Alarm, bool, bool]
 """Alarm, whether its condition is known, and whether it is chattering."""
 
@@ -99,7 +107,7 @@ class LiveAlarms:
         """Update the alarms of a unit from its newest reported state."""
         self._judged[unit], self._chattering[unit] = state.judged, state.chattering
         # a process may still have alarms of units for which another process is now responsible
-        self._keep(alarm for alarm in state.alarms if self._owner(alarm) == unit)
+        self._keep(alarm for alarm in state.alarms if owner_of(alarm, self._units) == unit)
         self._show(unit)
 
     def take_stored(self, alarms: Iterable[Alarm]) -> None:
@@ -111,7 +119,7 @@ class LiveAlarms:
         """Keep alarms that are at least as new as those in memory; return their units."""
         units = set()
         for alarm in alarms:
-            units.add(unit := self._owner(alarm))
+            units.add(unit := owner_of(alarm, self._units))
             of_unit = self._alarms.setdefault(unit, {})
             held = of_unit.get(alarm.identity.id)
             if held is None or alarm.n_events >= held.n_events:
@@ -143,22 +151,16 @@ class LiveAlarms:
 
     def is_judged(self, alarm: Alarm) -> bool:
         """Return whether the condition of an alarm is known now according to the latest report."""
-        unit = self._owner(alarm)
+        unit = owner_of(alarm, self._units)
         return self._is_alive(unit) and alarm.identity.id in self._judged.get(unit, ())
 
     def is_chattering(self, alarm: Alarm) -> bool:
         """Return whether an alarm is chattering (changes too often) by the latest report."""
-        return alarm.identity.id in self._chattering.get(self._owner(alarm), ())
+        return alarm.identity.id in self._chattering.get(owner_of(alarm, self._units), ())
 
     def owner(self, id_: str) -> str:
         """Return the unit whose process updates an alarm; raise `LookupError` for an unknown id."""
-        return self._owner(self.alarm(id_))
-
-    def _owner(self, alarm: Alarm) -> str:
-        if is_shared(alarm):
-            return SHARED
-        unit = reporting_unit(alarm.identity)
-        return unit if unit in self._units else PLANT
+        return owner_of(self.alarm(id_), self._units)
 
     def count(self) -> AlarmCount:
         """Return the numbers of active, unacknowledged, hidden and unjudged alarms."""

@@ -117,6 +117,9 @@ _KINDS: dict[str, tuple[type[OperatorCommand], TypeAdapter[Any]]] = {
 """Class of the command, and adapter of its fields in their order, by kind."""
 
 
+BASELINE_ACTIONS = frozenset(kind.__name__ for kind in get_args(BaselineAction))
+"""Kinds of commands with an action on baselines."""
+
 OWN_VERSION = version_of("padwatch")
 
 

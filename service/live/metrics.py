@@ -3,7 +3,6 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Protocol
 
 from core.alarms.alarm import PLANT, Alarm
 from core.alarms.statistics import HIDDEN
@@ -12,27 +11,22 @@ from core.change.film_judge import FilmNews
 from core.limits import AlarmLevel
 from core.quality import Level
 from service.live.alarm_list import AlarmCount
-from service.live.status import CurrentBearing, LinkState, UnitStatus
+from service.live.client import LiveClient
+from service.live.current_state import LiveUnits
+from service.live.status import CurrentBearing, LinkState
 from service.runtime.metrics import Families
+from service.settings.plant import PlantFile
 
 Bearings = Mapping[str, Sequence[str]]
 """Bearing ids by unit id."""
 
 
-class Newest(Protocol):
-    """Source of the newest state of units: `LiveView`, or `LiveUnits` in a serving process."""
-
-    def status(self, unit: str) -> UnitStatus:
-        """Return the link status of a unit."""
-        ...
-
-    def data_age_s(self, unit: str) -> float | None:
-        """Return the age of the newest samples, s; None before the first."""
-        ...
-
-    def current(self, unit: str, bearing: str) -> CurrentBearing:
-        """Return the newest result of a bearing; its readings are missing if it is not current."""
-        ...
+def add_plant(families: Families, live: LiveClient, plant: PlantFile) -> None:
+    """Add the metrics of all units, films and alarms of a plant to `families`."""
+    bearings = {unit.id: [each.id for each in unit.bearing] for unit in plant.unit}
+    add_units(families, live.units, bearings)
+    add_films(families, live.units, live.films.newest, bearings)
+    add_alarms(families, live.alarms.alarms, live.alarms.count(), list(bearings))
 
 
 UNITS = {
@@ -51,7 +45,7 @@ UNITS = {
 UM_PER_M = 1e6
 
 
-def add_units(families: Families, newest: Newest, bearings: Bearings) -> None:
+def add_units(families: Families, newest: LiveUnits, bearings: Bearings) -> None:
     """Add the metrics of all units to `families`.
 
     These are the state of the link, the age and quality of each result, and all usable values.
@@ -104,7 +98,7 @@ FILMS = {
 
 def add_films(
     families: Families,
-    newest: Newest,
+    newest: LiveUnits,
     films: Callable[[str, str], FilmNews | None],
     bearings: Bearings,
 ) -> None:

@@ -22,7 +22,7 @@ from core.change.settings import FilmRules
 from core.limits import Judgement
 from core.monitor.assessment import Assessment
 from core.samples.blocks import SampleBlock
-from service.live.alarm_list import AlarmCount, count_of, is_shared, reporting_unit
+from service.live.alarm_list import is_shared, reporting_unit
 from service.measuring.recorder import Findings
 from service.measuring.service_alarms import (
     HealthProbe,
@@ -219,10 +219,6 @@ class AlarmEngine:
         if alarm.identity.unit not in self.units:
             return alarm.condition.is_known
         return alarm.condition.is_known and self.units[alarm.identity.unit].is_connected
-
-    def count(self) -> AlarmCount:
-        """Return the numbers of active, unacknowledged, hidden and unjudged alarms."""
-        return count_of(self.alarms, self.is_judged)
 
     def _host_ns(self) -> int:
         """Return the host's time; pause the alarm delays if the clock was set."""

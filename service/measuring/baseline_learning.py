@@ -160,12 +160,10 @@ class Learner:
         """Return the state of a bearing's baseline versions."""
         return versions_after(self._store.steps(place.unit, place.bearing))
 
-    def learn(
-        self, place: FilmPlace, now_ns: int, author: str = PADWATCH, reason: str = ""
-    ) -> BearingBaseline | None:
+    def learn(self, place: FilmPlace, now_ns: int) -> BearingBaseline | None:
         """Learn and store a baseline; put it in force if this is automatic and all checks pass.
 
-        `now_ns` is the host time, ns since 1970 UTC; `author` and `reason` are stored.
+        `now_ns` is the host time, ns since 1970 UTC.
 
         Returns
         -------
@@ -178,9 +176,8 @@ class Learner:
         is_healthy = healthy(found)
         entries = self._store.baselines(place.unit, place.bearing)
         version = 1 + max((entry.version for entry in entries), default=0)
-        origin = Origin(
-            place.unit, place.bearing, place.estimator.value, version, author, now_ns, reason
-        )
+        whose = (place.unit, place.bearing)
+        origin = Origin(*whose, place.estimator.value, version, PADWATCH, now_ns)
         baseline = learn(
             found.history,
             is_healthy,
@@ -192,12 +189,11 @@ class Learner:
         doubt = drifted(found.history, is_healthy, baseline, self._settings.alert_change)
         doubt = doubt or self._disagreement(baseline, versions)
         far = far_readings(found.history, is_healthy, baseline)
-        whose = (place.unit, place.bearing, version)
-        noticed = "; ".join(filter(None, (doubt, far))) or reason
-        steps = [StoredStep(*whose, BaselineStep.LEARNED, now_ns, author, noticed)]
+        noticed = "; ".join(filter(None, (doubt, far)))
+        made = partial(StoredStep, *whose, version, time_ns=now_ns, actor=PADWATCH)
+        steps = [made(step=BaselineStep.LEARNED, reason=noticed)]
         if self._settings.acceptance == "automatic" and doubt is None:
-            why = "no objection found"
-            steps.append(StoredStep(*whose, BaselineStep.ACCEPTED, now_ns, author, why))
+            steps.append(made(step=BaselineStep.ACCEPTED, reason="no objection found"))
         self._store.add_baseline(baseline, steps)
         return baseline
 

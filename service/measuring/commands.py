@@ -11,7 +11,6 @@ from service.live.commands import (
     AlarmCommand,
     BaselineCommand,
     BaselineRefusedError,
-    OperatorCommand,
     ReferenceRefusedError,
     TakeReference,
     UnreadableCommandError,
@@ -34,6 +33,9 @@ from service.store.store import Store
 WITHIN_S = 10.0
 """Maximum wait for the store before a command is carried out, and until it is on the disk, s."""
 
+REFUSALS = ActionRefusedError, BaselineRefusedError, ReferenceRefusedError, UnreadableCommandError
+"""Errors with which a command is refused; nothing is changed."""
+
 
 @dataclass(frozen=True)
 class CommandExecutor:
@@ -46,11 +48,14 @@ class CommandExecutor:
     store: Store
     clock: Clock
 
-    async def execute(self, command: OperatorCommand, who: Acting) -> Answer:
-        """Execute a command of the actor `who`; return the answer once the result is stored."""
+    async def execute(self, kind: str, document: str, who: Acting) -> Answer:
+        """Execute a command of the actor `who`; return the answer once the result is stored.
+
+        `kind` and `document` are those of `service.live.commands.encoded`.
+        """
         try:
             with acting_as(who):
-                match command:
+                match command := decoded(kind, document):
                     case AlarmCommand():
                         self.alarms.alarm(command.alarm)  # before the store is tried
                         async with asyncio.timeout(WITHIN_S):
@@ -67,7 +72,7 @@ class CommandExecutor:
                 return DONE
         except LookupError:
             return Answer(CommandState.UNKNOWN, "the alarm does not exist")
-        except (ActionRefusedError, BaselineRefusedError, ReferenceRefusedError) as error:
+        except REFUSALS as error:
             return Answer(CommandState.REFUSED, str(error))
         except NotStoredError as error:
             words = "the command was executed but not stored, and a restart undoes it"
@@ -130,9 +135,5 @@ class Questions:
                     self._is_ready = True
                     self.on_ready(*json.loads(question.document))
                 return None
-        try:
-            command = decoded(question.kind, question.document)
-        except UnreadableCommandError as error:
-            return Answer(CommandState.REFUSED, str(error))
         who = Acting(Source.API, question.peer, question.actor)
-        return await self.executor.execute(command, who)
+        return await self.executor.execute(question.kind, question.document, who)

@@ -143,7 +143,7 @@ class FilmMonitor:
             ]
             for place in due:
                 pulse.beat(MAX_LEARN_S)
-                await self.learn(place)
+                await self._learn(place)
             if due:
                 pulse.beat(MAX_LEARN_S)
                 response = await asyncio.to_thread(
@@ -151,14 +151,11 @@ class FilmMonitor:
                 )
                 self._watches[unit].judge.response = response
 
-    async def learn(self, place: FilmPlace, **why: str) -> BearingBaseline | None:
-        """Learn a baseline of a bearing now; return None if there are too few readings.
-
-        ``why`` are `author` and `reason`, stored with the baseline; default: "padwatch", no reason.
-        """
+    async def _learn(self, place: FilmPlace) -> None:
+        """Learn a baseline of a bearing now, if there are enough readings."""
         now_ns = self._clock.now_ns()
         async with self._acting:
-            learned = await asyncio.to_thread(self.learner.learn, place, now_ns, **why)
+            learned = await asyncio.to_thread(self.learner.learn, place, now_ns)
         if learned is not None:
             log.info(
                 "baseline learned",
@@ -167,7 +164,6 @@ class FilmMonitor:
                 version=learned.origin.version,
             )
             await self._put_in_force(place)
-        return learned
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
         """Apply an engineer's action to the baselines of a bearing.

@@ -1,13 +1,12 @@
 """Snapshots of units, built from the parts of the measuring process, and the reports on them."""
 
-from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
 
 from acquisition.clock import Clock
-from core.alarms.alarm import PLANT, Alarm
+from core.alarms.alarm import Alarm
 from core.monitor.assessment import Assessment
-from service.live.alarm_list import SHARED, is_shared, reporting_unit
+from service.live.alarm_list import owner_of
 from service.live.snapshot import (
     BearingSnapshot,
     PlantSnapshot,
@@ -35,13 +34,6 @@ def bearing_snapshot(assessment: Assessment) -> BearingSnapshot:
     return BearingSnapshot(**{name: getattr(assessment, name) for name in names})
 
 
-@dataclass(frozen=True)
-class _Built:
-    key: tuple[object, ...]
-    revision: int
-    snapshot: UnitSnapshot
-
-
 class SnapshotBuilder:
     """Builder of snapshots of units; it builds a snapshot again only after a change of the unit."""
 
@@ -55,54 +47,41 @@ class SnapshotBuilder:
     ) -> None:
         self._bearings = {unit.id: [each.id for each in unit.bearing] for unit in units}
         self._live, self._alarms, self._films, self._clock = live, alarms, films, clock
-        self._built: dict[str, _Built] = {}
-        self._common: tuple[Sequence[Alarm], Mapping[str, list[Alarm]]] = ([], {})
+        self._built: dict[str, tuple[object, int, UnitSnapshot | None]] = {}
 
     def report(self, unit: str) -> UnitReport:
         """Return the present state of a unit, or the alarms of `PLANT` or `SHARED`."""
-        built = self._newest(unit)
-        return UnitReport(unit, self._link(unit), built.revision, built.snapshot)
-
-    def _newest(self, unit: str) -> _Built:
         bearings, alarms = self._bearings.get(unit, []), self._alarms_of(unit)
         is_unit = unit in self._bearings
         own = (self._live.revision(unit), self._alarms.units[unit].is_connected) if is_unit else ()
-        newest = {bearing: self._films.newest(unit, bearing) for bearing in bearings}
-        films = {bearing: news for bearing, news in newest.items() if news}
+        read = {bearing: self._films.newest(unit, bearing) for bearing in bearings}
+        films = {bearing: news for bearing, news in read.items() if news}
         in_force = {bearing: self._films.baseline(unit, bearing) for bearing in bearings}
         versions = {bearing: found.origin.version for bearing, found in in_force.items() if found}
         round_ = self._clock.monotonic_s() // REBUILT_EVERY_S
         key = (own, alarms, films, versions, round_)
-        built = self._built.get(unit)
-        if built is not None and built.key == key:
-            return built
-        found = {bearing: self._live.assessment(unit, bearing) for bearing in bearings}
-        snapshot = UnitSnapshot(
-            bearings={b: bearing_snapshot(result) for b, result in found.items() if result},
-            alarms=tuple(alarms),
-            judged=frozenset(a.identity.id for a in alarms if self._alarms.is_judged(a)),
-            chattering=frozenset(a.identity.id for a in alarms if self._alarms.is_chattering(a)),
-            films=films,
-            baselines=versions,
-        )
-        if built is None or built.snapshot != snapshot:
-            built = _Built(key, 1 if built is None else built.revision + 1, snapshot)
-        self._built[unit] = built = replace(built, key=key)
-        return built
+        built_key, revision, snapshot = self._built.get(unit, (None, 0, None))
+        if snapshot is None or built_key != key:
+            found = {bearing: self._live.assessment(unit, bearing) for bearing in bearings}
+            judged, chattering = self._alarms.is_judged, self._alarms.is_chattering
+            newest = UnitSnapshot(
+                bearings={b: bearing_snapshot(result) for b, result in found.items() if result},
+                alarms=tuple(alarms),
+                judged=frozenset(a.identity.id for a in alarms if judged(a)),
+                chattering=frozenset(a.identity.id for a in alarms if chattering(a)),
+                films=films,
+                baselines=versions,
+            )
+            if newest != snapshot:
+                revision, snapshot = revision + 1, newest
+            self._built[unit] = key, revision, snapshot
+        return UnitReport(unit, self._link(unit), revision, snapshot)
 
     def _alarms_of(self, unit: str) -> list[Alarm]:
         """Return the alarms that a report on a unit contains."""
         common = self._alarms.common_alarms
-        if self._common[0] != common:
-            owned: dict[str, list[Alarm]] = defaultdict(list)
-            for alarm in common:
-                owner = reporting_unit(alarm.identity)
-                if owner not in self._bearings:
-                    owner = SHARED if is_shared(alarm) else PLANT
-                owned[owner].append(alarm)
-            self._common = common, owned
         of_unit = self._alarms.units[unit].alarms if unit in self._bearings else []
-        return [*of_unit, *self._common[1].get(unit, ())]
+        return [*of_unit, *(each for each in common if owner_of(each, self._bearings) == unit)]
 
     def _link(self, unit: str) -> UnitLink:
         """Return a unit's link state and data ages, if measured here, and the process's faults."""

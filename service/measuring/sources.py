@@ -38,16 +38,13 @@ def modbus_source(
     """Return the sample source of a Modbus device, of the kind in its settings."""
     ids = [channel.id for channel in unit.channels]
     match source:
-        case ModbusPolledSettings():
+        case ModbusPolledSettings() | ModbusVectorSettings():
             calibration = replace(calibration, rate_hz=source.rate_hz)
+            if isinstance(source, ModbusVectorSettings):
+                calibration = vector_calibration(calibration, ids, source.rows)
+                ids = [row.id for row in source.rows]
             settings = link_settings(PolledSettings, source)
             return PolledSource(settings, source.registers, ids, calibration, clock)
-        case ModbusVectorSettings():
-            calibration = replace(calibration, rate_hz=source.rate_hz)
-            calibration = vector_calibration(calibration, ids, source.rows)
-            rows = [row.id for row in source.rows]
-            settings = link_settings(PolledSettings, source)
-            return PolledSource(settings, source.registers, rows, calibration, clock)
         case ModbusRingSettings():
             return RingSource(link_settings(RingSettings, source), calibration, clock)
         case ModbusFifoSettings():

@@ -186,7 +186,8 @@ async def until_all_is_told(client: httpx2.AsyncClient, n_samples: float) -> Non
             offered = seen.value("padwatch_samples_offered_total", unit="U1")
             stored = seen.value("padwatch_store_commit_duration_seconds_count")
             waiting = seen.value("padwatch_store_waiting_findings")
-            if offered == n_samples and stored and waiting == 0.0:
+            told = seen.numbers("padwatch_result_age_seconds")
+            if offered == n_samples and stored and waiting == 0.0 and told:
                 return
             await asyncio.sleep(LOOK_EVERY_S)
 

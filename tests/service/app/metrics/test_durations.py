@@ -19,6 +19,7 @@ from core.change.film_judge import FilmFinding, FilmNews
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Estimator, Unit
 from core.samples.blocks import SampleBlock
+from service.live.alarm_list import count_of
 from service.live.metrics import add_alarms, add_films, add_units
 from service.live.receivers import ReceiverView, SenderState
 from service.live.status import LinkState
@@ -148,7 +149,7 @@ def test_an_alarm_counts_while_it_is_active_and_not_hidden(stepped_clock):
     units = ("U1", "U2")  # U9 is in the plant file no longer
 
     def told(name: str) -> dict[tuple[str, ...], float]:
-        return of(add_alarms, name, engine.alarms, engine.count(), units)
+        return of(add_alarms, name, engine.alarms, count_of(engine.alarms, engine.is_judged), units)
 
     assert told("alarms_active") == {}
 

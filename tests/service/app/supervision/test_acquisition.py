@@ -57,7 +57,7 @@ class Plant:
         units = {name: WatchedUnit(self._source(name), None) for name in ("U1", "U2")}
         acquirer = Acquirer(units, self.live, self.gates, self._publish, lambda _: None, self.beats)
         manager = ServiceManager(manager_socket.environment)
-        self.supervision = Supervision(manager, self.beats, self.live, units, self.gates)
+        self.supervision = Supervision(manager, self.beats, self.live.status, units, self.gates)
         self.running = asyncio.create_task(acquirer.run())
 
     def _source(self, name: str) -> TimedSource:

@@ -50,7 +50,7 @@ class Program:
         self.live = LiveView(["U1", "U2"], clock, 10.0)
         self.live.set_link("U1", LinkState.CONNECTED)
         manager = ServiceManager(manager_socket.environment)
-        self.supervision = Supervision(manager, self.beats, self.live, ["U1", "U2"], clock)
+        self.supervision = Supervision(manager, self.beats, self.live.status, ["U1", "U2"], clock)
         self.loops = {"record": Loop(), "alarms": Loop()}
         self.tasks = [
             asyncio.create_task(self.beats.tend(name, loop.run))
@@ -146,7 +146,7 @@ async def test_a_loop_may_be_silent_for_as_long_as_it_has_said(stepped_clock):
 
 async def test_a_blocked_event_loop_feeds_nothing(program, manager_socket):
     gates, manager = Gates(program.clock), ServiceManager(manager_socket.environment)
-    supervision = Supervision(manager, program.beats, program.live, ["U1", "U2"], gates)
+    supervision = Supervision(manager, program.beats, program.live.status, ["U1", "U2"], gates)
     running = asyncio.create_task(supervision.run())
     await asyncio.sleep(0)
     assert len(manager_socket.received) == 1
