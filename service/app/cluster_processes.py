@@ -1,17 +1,15 @@
 """`padwatch acquire` and `padwatch analyse`: acquisition and analysis in separate processes."""
 
 import asyncio
-import socket
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from functools import partial
 
-from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from core.monitor.monitor import UnitMonitor
 from service.app.analysis import Analysis, ProcessContext, process_context
 from service.app.health_page import HealthServer
-from service.app.process import Supervision
+from service.app.process import Host, Supervision
 from service.app.storage import database_path
 from service.cluster.consumer import Consumer, add_consumer
 from service.cluster.ownership import Holds, Leadership, Partition
@@ -27,7 +25,6 @@ from service.runtime.heartbeats import Heartbeats, Loop
 from service.runtime.listening import url_of
 from service.runtime.metrics import MEASURED, Families
 from service.runtime.periodic import periodic
-from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.core_values import stale_after_s
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
@@ -42,17 +39,13 @@ async def run_acquire(
     plant: PlantFile,
     settings: StreamSettings,
     units: Mapping[str, WatchedUnit],
-    listener: socket.socket,
-    clock: Clock,
-    announce: Callable[[str], None],
-    manager: ServiceManager = NO_MANAGER,
+    host: Host,
 ) -> None:
     """Acquire and publish the samples of units until SIGINT or SIGTERM.
 
-    The monitors of the units are not used. `listener` is the listening socket of the health page;
-    `announce` is called with its URL.
+    The monitors of the units are not used.
     """
-    beats = Heartbeats(clock)
+    clock, beats = host.clock, Heartbeats(host.clock)
     live = LiveView([unit.id for unit in plant.unit], clock, stale_after_s(plant))
     identities = {unit.id: identity_of(plant, unit) for unit in plant.unit if unit.id in units}
     publisher = Publisher(plant, settings, identities, clock)
@@ -67,9 +60,9 @@ async def run_acquire(
         return {"stream": publisher.trouble}
 
     fill = partial(add_publisher, publisher=publisher)
-    health = HealthServer(listener, beats, live.status, units, checks, fill)
-    supervision = Supervision(manager, beats, live.status, units, clock)
-    supervision.announce(announce, url_of(listener))
+    health = HealthServer(host.listener, beats, live.status, units, checks, fill)
+    supervision = Supervision(host, beats, live.status, units)
+    supervision.announce(url_of(host.listener))
     loops = {"publish": publisher.run, "health": health.run}
     await supervision.run_until_stopped(loops, acquirer.run, drain)
 
@@ -82,10 +75,7 @@ async def run_analyse(
     partition: Partition,
     settings: StreamSettings,
     monitors: Mapping[str, UnitMonitor],
-    listener: socket.socket,
-    clock: Clock,
-    announce: Callable[[str], None],
-    manager: ServiceManager = NO_MANAGER,
+    host: Host,
 ) -> None:
     """Analyse the units of a partition until SIGINT or SIGTERM.
 
@@ -97,10 +87,8 @@ async def run_analyse(
         Settings of the stream of sample blocks.
     monitors
         Monitors of the units of the partition, by unit id.
-    listener, announce
-        Listening socket of the health page, and the function that is called with its URL.
-    clock, manager
-        Host clock, and the service manager that is notified of start and stop.
+    host
+        Surroundings of the process, with the listening socket of the health page.
 
     Raises
     ------
@@ -113,13 +101,13 @@ async def run_analyse(
         if plant.store.postgresql is None:
             stack.enter_context(exclusive_use(database_path(plant)))
         part = partition.part_of(plant)
-        process = stack.enter_context(process_context(part, Origin.LIVE, clock))
+        process = stack.enter_context(process_context(part, Origin.LIVE, host.clock))
         analysing = Analysing(plant, partition, settings, monitors, process)
         parts = (analysing.checks, analysing.add_metrics, analysing.shown)
         status = process.live.status
-        health = HealthServer(listener, process.beats, status, monitors, *parts)
-        supervision = Supervision(manager, process.beats, status, monitors, clock)
-        supervision.announce(announce, url_of(listener))
+        health = HealthServer(host.listener, process.beats, status, monitors, *parts)
+        supervision = Supervision(host, process.beats, status, monitors)
+        supervision.announce(url_of(host.listener))
         try:
             await supervision.run_until_stopped({"health": health.run}, analysing.run)
         finally:

@@ -3,9 +3,9 @@
 import asyncio
 import socket
 import subprocess
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing, suppress
-from functools import partial
+from dataclasses import dataclass, field
 
 import structlog
 
@@ -13,11 +13,11 @@ from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from service.app.analysis import Analysis, process_context
 from service.app.listener import require_protected
-from service.app.process import Supervision
+from service.app.process import Host, Supervision
 from service.app.service_audit import ServiceTrail
 from service.app.storage import database_path, open_access
 from service.live.alarm_list import SHARED
-from service.live.exchange import MeasuringEnd, Question, Start, write_start
+from service.live.exchange import MeasuringEnd, Start, write_start
 from service.measuring.analyser import Runner
 from service.measuring.commands import Questions
 from service.measuring.live_view import LiveView
@@ -27,7 +27,6 @@ from service.runtime.child import Child, start_child
 from service.runtime.heartbeats import Loop, Pulse
 from service.runtime.polls import TimedSource
 from service.runtime.process import exempt_start
-from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.holds import exclusive_use
@@ -46,6 +45,7 @@ PAUSE_S = 1.0
 STOPS_WITHIN_S = 5.0
 
 
+@dataclass
 class ServingChild:
     """Supervisor of the serving process, which it starts again after an unexpected end.
 
@@ -54,39 +54,31 @@ class ServingChild:
     listener
         Listening socket of the HTTP server. It stays open while the child is started again, so
         that requests wait instead of being refused.
-    report, answer
-        Functions that make the reports to the serving process and answer its questions.
+    end
+        This process's end of the connection, which makes reports and answers questions.
     child
         Serving process that was started before; with None one is started.
     """
 
-    def __init__(
-        self,
-        start: Start,
-        listener: socket.socket,
-        report: Callable[[bool], object | None],
-        answer: Callable[[Question], Awaitable[object]],
-        clock: Clock,
-        child: Child | None = None,
-    ) -> None:
-        self._start, self._listener, self._clock, self._next = start, listener, clock, child
-        self._end = MeasuringEnd(report, answer, REPORT_EVERY_S)
-        self._is_stopping = False
-        self.process: subprocess.Popen[bytes] | None = None
-        self.n_restarts = 0
+    start: Start
+    listener: socket.socket
+    end: MeasuringEnd
+    clock: Clock
+    child: Child | None = None
+    process: subprocess.Popen[bytes] | None = field(default=None, init=False)
+    _is_stopping: bool = field(default=False, init=False)
 
     async def run(self, pulse: Pulse) -> None:
         """Keep the serving process running until cancelled; `pulse` gets heartbeats."""
         while True:
             pulse.rest()
-            since_s = self._clock.monotonic_s()
+            since_s = self.clock.monotonic_s()
             code = await self._run_once()
             if self._is_stopping:
                 return
-            self.n_restarts += 1
             log.error("the serving process has ended and is started again", code=code)
-            if self._clock.monotonic_s() - since_s < STEADY_S:
-                await self._clock.sleep(PAUSE_S)
+            if self.clock.monotonic_s() - since_s < STEADY_S:
+                await self.clock.sleep(PAUSE_S)
 
     async def stop(self) -> None:
         """Let the serving process finish its requests; kill it after `STOPS_WITHIN_S` seconds."""
@@ -97,14 +89,14 @@ class ServingChild:
         await asyncio.to_thread(_end_of, self.process)
 
     async def _run_once(self) -> int:
-        child, self._next = self._next or start_child(), None
+        child, self.child = self.child or start_child(), None
         self.process = child.process
         with suppress(ConnectionError):  # it has ended
-            socket.send_fds(child.connection, [b"."], [self._listener.fileno()])
+            socket.send_fds(child.connection, [b"."], [self.listener.fileno()])
         reader, writer = await asyncio.open_connection(sock=child.connection)
         try:
-            write_start(writer, self._start)
-            await self._end.serve(reader, writer)
+            write_start(writer, self.start)
+            await self.end.serve(reader, writer)
         except ConnectionError:
             pass  # it has ended
         finally:
@@ -125,10 +117,7 @@ def _end_of(process: subprocess.Popen[bytes]) -> int:
 async def run_service(
     plant: PlantFile,
     units: Mapping[str, WatchedUnit],
-    listener: socket.socket,
-    clock: Clock,
-    announce: Callable[[str], None],
-    manager: ServiceManager = NO_MANAGER,
+    host: Host,
     *,
     origin: Origin = Origin.LIVE,
     ends: bool = False,
@@ -142,13 +131,8 @@ async def run_service(
     ----------
     units
         Source and monitor of every unit of the plant.
-    listener
-        Listening socket, which the serving process inherits.
-    announce
-        Function that is called with the URL when requests are served, and with the set-up token if
-        there is no account.
-    manager
-        Service manager, notified when the service is ready, alive and stopping.
+    host
+        Surroundings of the process; the serving process inherits the listening socket.
     origin
         Origin, live or replay, of the data in the database and in the API responses.
     ends
@@ -167,6 +151,7 @@ async def run_service(
     ClosedError
         If the service would be reachable from other hosts without TLS or accounts.
     """
+    clock = host.clock
     with exclusive_use(database_path(plant)), process_context(plant, origin, clock) as process:
         with closing(open_access(plant, origin)) as access:
             require_protected(plant, access)
@@ -182,12 +167,12 @@ async def run_service(
         audit = ServiceTrail(plant, origin, process.store.audit, clock)
         await audit.begin()
         held = [*(unit.id for unit in plant.unit), PLANT]
-        supervision = Supervision(manager, beats, live.status, units, clock)
+        supervision = Supervision(host, beats, live.status, units)
         reports = SocketReports([*held, SHARED], analysis.snapshots, analysis.snapshot, clock)
-        ready = partial(supervision.announce, announce)
-        questions = Questions(analysis.executor, live, analysis.soundness, analysis.metrics, ready)
-        start = Start(plant, origin, is_demo)
-        serving = ServingChild(start, listener, reports.report, questions.answer, clock, child)
+        parts = (analysis.executor, live, analysis.soundness, analysis.metrics)
+        questions = Questions(*parts, supervision.announce)
+        end = MeasuringEnd(reports.report, questions.answer, REPORT_EVERY_S)
+        serving = ServingChild(Start(plant, origin, is_demo), host.listener, end, clock, child)
 
         async def run() -> None:
             await runner.run()

@@ -1,7 +1,9 @@
 """Supervision of the background loops of a process, and its run until a signal."""
 
 import asyncio
+import socket
 from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import structlog
@@ -10,11 +12,32 @@ from acquisition.clock import Clock
 from service.live.status import LinkState, UnitStatus
 from service.runtime.heartbeats import Heartbeats, Loop
 from service.runtime.process import stop_on_signals
-from service.runtime.service_manager import ServiceManager
+from service.runtime.service_manager import NO_MANAGER, ServiceManager
 
 log = structlog.get_logger()
 
 LOOK_EVERY_S = 10.0
+
+
+@dataclass(frozen=True)
+class Host:
+    """Surroundings of a process.
+
+    Parameters
+    ----------
+    listener
+        Listening socket of the API, or of the health page.
+    announce
+        Function that is called with the URL when requests are served, and with the set-up token if
+        there is no account.
+    manager
+        Service manager, notified when the process is ready, alive and stopping.
+    """
+
+    listener: socket.socket
+    clock: Clock
+    announce: Callable[[str], None]
+    manager: ServiceManager = NO_MANAGER
 
 
 class Supervision:
@@ -26,38 +49,38 @@ class Supervision:
 
     def __init__(
         self,
-        manager: ServiceManager,
+        host: Host,
         beats: Heartbeats,
         status: Callable[[str], UnitStatus],
         units: Iterable[str],
-        clock: Clock,
     ) -> None:
-        self._manager, self._beats, self._link, self._clock = manager, beats, status, clock
-        self._units = tuple(units)
+        self._host, self._beats, self._link, self._units = host, beats, status, tuple(units)
         self._logged: set[str] = set()
-        half_s = LOOK_EVERY_S if manager.watchdog_s is None else manager.watchdog_s / 2.0
-        self._every_s = min(LOOK_EVERY_S, half_s)
+        watchdog_s = host.manager.watchdog_s
+        self._every_s = LOOK_EVERY_S if watchdog_s is None else min(LOOK_EVERY_S, watchdog_s / 2.0)
 
     def ready(self) -> None:
         """Notify the service manager that the service is ready."""
-        self._manager.notify(READY="1", STATUS=self._status())
+        self._host.manager.notify(READY="1", STATUS=self._status())
 
-    def announce(self, write: Callable[[str], None], url: str, token: str | None = None) -> None:
-        """Notify the service manager; `write` the URL and, unless it is None, the set-up token."""
+    def announce(self, url: str, token: str | None = None) -> None:
+        """Notify the service manager; announce the URL and, unless it is None, the set-up token."""
         self.ready()
-        write(url)
+        self._host.announce(url)
         if token is not None:
-            write(f"token to create the first account, valid once within one hour: {token}")
+            self._host.announce(
+                f"token to create the first account, valid once within one hour: {token}"
+            )
 
     def stopping(self) -> None:
         """Notify the service manager that the service is stopping."""
-        self._manager.notify(STOPPING="1", STATUS="stopping")
+        self._host.manager.notify(STOPPING="1", STATUS="stopping")
 
     async def run(self) -> None:
         """Check the heartbeats of all loops periodically until cancelled."""
         while True:
             self.look()
-            await self._clock.sleep(self._every_s)
+            await self._host.clock.sleep(self._every_s)
 
     def look(self) -> None:
         """Check the heartbeats of all loops once; notify the watchdog, log loops that stopped."""
@@ -70,9 +93,9 @@ class Supervision:
             else:
                 log.info("all background tasks respond again")
         if words:
-            self._manager.notify(STATUS="; ".join(words))
+            self._host.manager.notify(STATUS="; ".join(words))
         else:
-            self._manager.notify(WATCHDOG="1", STATUS=self._status())
+            self._host.manager.notify(WATCHDOG="1", STATUS=self._status())
 
     def _status(self) -> str:
         states = [self._link(unit).state for unit in self._units]

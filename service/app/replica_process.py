@@ -1,8 +1,7 @@
 """`padwatch serve`: a serving process of a cluster, which reads reports from the database."""
 
 import asyncio
-import socket
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from functools import partial
 
@@ -13,7 +12,7 @@ from service.api.auth.authenticator import Authenticator
 from service.api.context import Context
 from service.app.listener import require_protected
 from service.app.notifications import receivers_of
-from service.app.process import Supervision
+from service.app.process import Host, Supervision
 from service.app.service_audit import ServiceTrail
 from service.app.serving_process import access_desk, context_of, serve_requests
 from service.app.storage import open_access, open_store
@@ -24,7 +23,6 @@ from service.live.receivers import ReceiverView
 from service.notifications.metrics import add_deliveries
 from service.runtime.heartbeats import Heartbeats, Pulse
 from service.runtime.metrics import Families
-from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.port import StoreError
@@ -91,16 +89,8 @@ class Replica:
         )
 
 
-async def run_serve(
-    plant: PlantFile,
-    listener: socket.socket,
-    clock: Clock,
-    announce: Callable[[str], None],
-    manager: ServiceManager = NO_MANAGER,
-) -> None:
+async def run_serve(plant: PlantFile, host: Host) -> None:
     """Serve the API from the database until SIGINT or SIGTERM.
-
-    `listener` is the listening socket; `announce` is called with the URL when requests are served.
 
     Raises
     ------
@@ -111,21 +101,22 @@ async def run_serve(
     """
     with closing(open_store(plant)) as store, closing(open_access(plant)) as access:
         require_protected(plant, access)
+        clock = host.clock
         replica, beats = Replica(plant, store, clock), Heartbeats(clock)
         context = replica.context(access_desk(plant, access, clock), beats)
         await replica.feed.start()
         audit = ServiceTrail(plant, Origin.LIVE, store.audit, clock)
         await audit.begin()
-        supervision = Supervision(manager, beats, replica.live.units.status, context.units, clock)
+        supervision = Supervision(host, beats, replica.live.units.status, context.units)
         ended, served = asyncio.Event(), asyncio.Event()
 
         async def ready(url: str, token: str | None) -> None:
-            supervision.announce(announce, url, token)
+            supervision.announce(url, token)
 
         async def serve(pulse: Pulse) -> None:
             pulse.rest()
             loops = {"feed": replica.feed.run}
-            await serve_requests(context, plant, listener, loops, ended, ready)
+            await serve_requests(context, plant, host.listener, loops, ended, ready)
             served.set()
 
         async def drain(_: asyncio.Task[None]) -> None:

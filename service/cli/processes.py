@@ -13,6 +13,7 @@ from acquisition.clock import SystemClock
 from service.app.health_page import HOST
 from service.app.listener import listener_of
 from service.app.measuring_process import run_service
+from service.app.process import Host
 from service.app.storage import open_store
 from service.cli.options import (
     DEMO,
@@ -50,9 +51,9 @@ def run_plant(
     child
         Serving process that was started before; with None one is started.
     """
-    clock, manager = SystemClock(), ServiceManager(os.environ)
-    parts = (plant, live_units(plant, clock), listener, clock, announce, manager)
-    run_to_its_end(run_service(*parts, is_demo=is_demo, child=child))
+    host = Host(listener, SystemClock(), announce, ServiceManager(os.environ))
+    units = live_units(plant, host.clock)
+    run_to_its_end(run_service(plant, units, host, is_demo=is_demo, child=child))
 
 
 def announce(url: str) -> None:
@@ -74,8 +75,8 @@ def serve(plant_file: PlantPath, port: PortOption = None) -> None:
     if plant.store.postgresql is None:
         fail(NEEDS_POSTGRESQL, 2)
     with listener_of(plant, plant.service.port if port is None else port) as listener:
-        clock, manager = SystemClock(), ServiceManager(os.environ)
-        run_to_its_end(run_serve(plant, listener, clock, announce, manager))
+        host = Host(listener, SystemClock(), announce, ServiceManager(os.environ))
+        run_to_its_end(run_serve(plant, host))
     leave()
 
 
@@ -97,11 +98,9 @@ def acquire(
             fail(f"unknown unit {id_!r}; known units: {', '.join(sorted(known))}", 2)
     wanted = set(unit or known)
     with listen(HOST, settings.acquire_port if port is None else port) as listener:
-        clock, manager = SystemClock(), ServiceManager(os.environ)
-        units = {id_: its for id_, its in live_units(plant, clock).items() if id_ in wanted}
-        run_to_its_end(
-            run_acquire(plant, settings, units, listener, clock, _announcer("acquire"), manager)
-        )
+        host = Host(listener, SystemClock(), _announcer("acquire"), ServiceManager(os.environ))
+        units = {id_: its for id_, its in live_units(plant, host.clock).items() if id_ in wanted}
+        run_to_its_end(run_acquire(plant, settings, units, host))
     leave()
 
 
@@ -129,10 +128,9 @@ def analyse(
         fail(str(error), 2)
     monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in units}
     with listen(HOST, settings.analyse_port if port is None else port) as listener:
-        clock, manager = SystemClock(), ServiceManager(os.environ)
-        parts = (plant, part, settings, monitors, listener, clock, _announcer("analyse"), manager)
+        host = Host(listener, SystemClock(), _announcer("analyse"), ServiceManager(os.environ))
         try:
-            run_to_its_end(run_analyse(*parts))
+            run_to_its_end(run_analyse(plant, part, settings, monitors, host))
         except ExceptionGroup as group:
             _, others = group.split((StoreError, StreamAnewError))
             if others is not None:

@@ -12,6 +12,7 @@ from acquisition.clock import SystemClock
 from acquisition.errors import LinkError
 from service.app.listener import listener_of
 from service.app.measuring_process import run_service
+from service.app.process import Host
 from service.app.recordings import (
     PlayedOut,
     recordings_by_unit,
@@ -60,7 +61,7 @@ def replay(
         listener_of(attached, port) as listener,
     ):
         service = run_service(
-            *(attached, watched, listener, SystemClock(), announce),
+            *(attached, watched, Host(listener, SystemClock(), announce)),
             origin=Origin.REPLAY,
             ends=not serve,
             at_end=None if json_output else partial(_print_stiffness, played),

@@ -115,8 +115,8 @@ async def test_a_hanging_serving_process_is_killed_and_restarted(tmp_path, demo_
         raise AssertionError(question)
 
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        parts = (plant, listener, lambda _: bytes(1_000_000), refuse, SystemClock())
-        serving = measuring_process.ServingChild(*parts)
+        end = exchange.MeasuringEnd(lambda _: bytes(1_000_000), refuse, period_s=0.5)
+        serving = measuring_process.ServingChild(plant, listener, end, SystemClock())
         running = asyncio.create_task(serving.run(UNHEARD))
         while serving.process is None:
             await asyncio.sleep(0.01)

@@ -22,6 +22,7 @@ from core.quality import Level, Quality, Reading, Reason, bad, missing
 from core.samples.blocks import DeviceClock, Rejection, SampleBlock
 from core.samples.gaps import SampleAccount
 from service.app.measuring_process import run_service
+from service.app.process import Host
 from service.live.status import LinkState
 from service.measuring.analyser import ASSESSMENTS
 from service.measuring.live_view import LiveView
@@ -163,7 +164,7 @@ async def told_by_a_service(folder: Path) -> Told:
     said: asyncio.Queue[str] = asyncio.Queue()
     url = asyncio.create_task(said.get())
     with listen("127.0.0.1", 0) as listener:
-        service = run_service(plant, units, listener, clock, said.put_nowait, ends=True)
+        service = run_service(plant, units, Host(listener, clock, said.put_nowait), ends=True)
         serving = asyncio.create_task(service)
         await asyncio.wait([serving, url], return_when=asyncio.FIRST_COMPLETED)
         if serving.done():

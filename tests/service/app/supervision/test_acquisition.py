@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock
-from service.app.process import Supervision
+from service.app.process import Host, Supervision
 from service.live.status import LinkState
 from service.measuring.acquirer import Acquirer
 from service.measuring.live_view import LiveView
@@ -56,8 +56,8 @@ class Plant:
         self.devices: dict[str, Device] = {}
         units = {name: WatchedUnit(self._source(name), None) for name in ("U1", "U2")}
         acquirer = Acquirer(units, self.live, self.gates, self._publish, lambda _: None, self.beats)
-        manager = ServiceManager(manager_socket.environment)
-        self.supervision = Supervision(manager, self.beats, self.live.status, units, self.gates)
+        host = Host(None, self.gates, print, ServiceManager(manager_socket.environment))
+        self.supervision = Supervision(host, self.beats, self.live.status, units)
         self.running = asyncio.create_task(acquirer.run())
 
     def _source(self, name: str) -> TimedSource:

@@ -11,7 +11,7 @@ import structlog
 
 from acquisition.clock import SystemClock
 from service.app.measuring_process import run_service
-from service.app.process import Supervision
+from service.app.process import Host, Supervision
 from service.live.status import LinkState
 from service.measuring.live_view import LiveView
 from service.measuring.sources import live_units
@@ -49,8 +49,8 @@ class Program:
         self.clock, self.beats = clock, Heartbeats(clock)
         self.live = LiveView(["U1", "U2"], clock, 10.0)
         self.live.set_link("U1", LinkState.CONNECTED)
-        manager = ServiceManager(manager_socket.environment)
-        self.supervision = Supervision(manager, self.beats, self.live.status, ["U1", "U2"], clock)
+        host = Host(None, clock, print, ServiceManager(manager_socket.environment))
+        self.supervision = Supervision(host, self.beats, self.live.status, ["U1", "U2"])
         self.loops = {"record": Loop(), "alarms": Loop()}
         self.tasks = [
             asyncio.create_task(self.beats.tend(name, loop.run))
@@ -145,8 +145,9 @@ async def test_a_loop_may_be_silent_for_as_long_as_it_has_said(stepped_clock):
 
 
 async def test_a_blocked_event_loop_feeds_nothing(program, manager_socket):
-    gates, manager = Gates(program.clock), ServiceManager(manager_socket.environment)
-    supervision = Supervision(manager, program.beats, program.live.status, ["U1", "U2"], gates)
+    gates = Gates(program.clock)
+    host = Host(None, gates, print, ServiceManager(manager_socket.environment))
+    supervision = Supervision(host, program.beats, program.live.status, ["U1", "U2"])
     running = asyncio.create_task(supervision.run())
     await asyncio.sleep(0)
     assert len(manager_socket.received) == 1
@@ -193,8 +194,8 @@ async def test_every_task_of_the_program_has_a_pulse(tmp_path, plant_text, monke
     stopped = asyncio.Event()
     monkeypatch.setattr("service.app.process.stop_on_signals", lambda: stopped)
     listener = socket.create_server(("127.0.0.1", 0))
-    parts = (settings, live_units(settings, clock), listener, clock, said.put_nowait)
-    service = asyncio.create_task(run_service(*parts), name="the service")
+    host, units = Host(listener, clock, said.put_nowait), live_units(settings, clock)
+    service = asyncio.create_task(run_service(settings, units, host), name="the service")
     url = await asyncio.wait_for(said.get(), 60)
     async with httpx2.AsyncClient(base_url=url, trust_env=False, timeout=60.0) as client:
         answer = await client.get("/readyz")
