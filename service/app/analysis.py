@@ -165,7 +165,7 @@ class Analysis:
             alarms.set_observer(self.evidence.see)
             captures.set_listener(self.evidence.captured)
         await self.references.look()  # before the first result
-        self.analyser = Analyser(monitors, live, recorder, alarms, films)
+        self.analyser = Analyser(monitors, live, alarms, films)
         self.executor = CommandExecutor(alarms, films, live, recorder, store, clock)
         self.snapshots = SnapshotBuilder(plant.unit, live, alarms, films, clock)
 

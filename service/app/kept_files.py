@@ -35,17 +35,21 @@ from service.settings.core_values import analysis_of, film_rules_of
 from service.settings.plant import PlantFile
 from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.storage import BYTES_PER_GB, Origin
+from service.settings.units import UnitSettings
 from service.store.store import Store
 from service.store.waveforms import WaveformKind
+
+
+def _sampled_units(plant: PlantFile, origin: Origin) -> list[UnitSettings]:
+    """Return the units whose samples may be recorded: no vector racks, and none of a replay."""
+    units = plant.unit if origin is Origin.LIVE else ()
+    return [unit for unit in units if not isinstance(unit.source, ModbusVectorSettings)]
 
 
 def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
     """Return the recorder of captures (samples around alarms); with a replay it records nothing."""
     found = plant.capture
-    kept = origin is Origin.LIVE and found.samples == "kept"
-    # a vector rack has no samples
-    waveforms = [u for u in plant.unit if not isinstance(u.source, ModbusVectorSettings)]
-    units = waveforms if kept else []
+    units = _sampled_units(plant, origin) if found.samples == "kept" else []
     watched = [u for u in units if not isinstance(film_rules_of(u, plant.films), str)]
     analysis = analysis_of(plant.analysis)
     n_samples = analysis.segment_samples + (analysis.n_segments - 1) * analysis.hop_samples
@@ -65,14 +69,8 @@ def tape_of(
 ) -> ContinuousRecorder:
     """Return the continuous recorder of a plant; `press` returns a reason to pause, or None."""
     found = plant.recording
-    units = {
-        unit.id: recorded_unit(unit)
-        for unit in plant.unit
-        # a vector rack has no samples; a replay is not recorded again
-        if found.keeps(unit.id)
-        and origin is Origin.LIVE
-        and not isinstance(unit.source, ModbusVectorSettings)
-    }
+    sampled = _sampled_units(plant, origin)
+    units = {unit.id: recorded_unit(unit) for unit in sampled if found.keeps(unit.id)}
     settings = SegmentSettings(60.0 * found.length_min, found.sync_s)
     owned = [unit.id for unit in plant.unit] if origin is Origin.LIVE else []
     return ContinuousRecorder(recordings_folder(plant), units, settings, clock, press, owned)

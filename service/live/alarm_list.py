@@ -33,18 +33,6 @@ class AlarmCount:
     """Number of alarms that are neither active nor hidden and whose condition is unknown."""
 
 
-def count_of(alarms: Sequence[Alarm], is_judged: Callable[[Alarm], bool]) -> AlarmCount:
-    """Count alarms by state; `is_judged` returns whether the condition of an alarm is known now."""
-    shown = [alarm for alarm in alarms if alarm.state not in HIDDEN]
-    return AlarmCount(
-        n_active=sum(alarm.level is not None for alarm in shown),
-        n_danger=sum(alarm.level is AlarmLevel.DANGER for alarm in shown),
-        n_unacknowledged=sum(not alarm.is_acknowledged for alarm in shown),
-        n_hidden=len(alarms) - len(shown),
-        n_unjudged=sum(a.level is None and not is_judged(a) for a in shown),
-    )
-
-
 SHARED = "shared work"
 """Name used instead of a unit in reports and commands about shared alarms; not a valid unit id."""
 
@@ -164,4 +152,12 @@ class LiveAlarms:
 
     def count(self) -> AlarmCount:
         """Return the numbers of active, unacknowledged, hidden and unjudged alarms."""
-        return count_of(self.shown, self.is_judged)
+        listed = self.shown
+        visible = [alarm for alarm in listed if alarm.state not in HIDDEN]
+        return AlarmCount(
+            n_active=sum(alarm.level is not None for alarm in visible),
+            n_danger=sum(alarm.level is AlarmLevel.DANGER for alarm in visible),
+            n_unacknowledged=sum(not alarm.is_acknowledged for alarm in visible),
+            n_hidden=len(listed) - len(visible),
+            n_unjudged=sum(a.level is None and not self.is_judged(a) for a in visible),
+        )

@@ -9,7 +9,7 @@ import asyncio
 import pickle
 import struct
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
 
@@ -132,6 +132,7 @@ async def read_start(reader: asyncio.StreamReader) -> Start:
     return start
 
 
+@dataclass
 class MeasuringEnd:
     """Measuring process's end of the socket, which sends reports and answers questions.
 
@@ -146,14 +147,12 @@ class MeasuringEnd:
         Time between two calls of `report`, s.
     """
 
-    def __init__(
-        self,
-        report: Callable[[bool], object | None],
-        answer: Callable[[Question], Awaitable[object]],
-        period_s: float,
-    ) -> None:
-        self._report, self._answer, self._period_s = report, answer, period_s
-        self._places = asyncio.Semaphore(MAX_QUESTIONS)
+    report: Callable[[bool], object | None]
+    answer: Callable[[Question], Awaitable[object]]
+    period_s: float
+    _places: asyncio.Semaphore = field(
+        default_factory=lambda: asyncio.Semaphore(MAX_QUESTIONS), init=False
+    )
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Send reports and answers until the other end closes the connection or stops reading."""
@@ -179,7 +178,7 @@ class MeasuringEnd:
         is_first = True
         while True:
             # a slow reader delays the next report, which then has all changes
-            if (found := self._report(is_first)) is not None:
+            if (found := self.report(is_first)) is not None:
                 content = pickle.dumps(found, pickle.HIGHEST_PROTOCOL)
                 try:
                     async with asyncio.timeout(TAKEN_WITHIN_S):
@@ -190,12 +189,12 @@ class MeasuringEnd:
                 except ConnectionError:
                     return  # it has ended
             is_first = False
-            await asyncio.sleep(self._period_s)
+            await asyncio.sleep(self.period_s)
 
     async def _reply(self, writer: asyncio.StreamWriter, question: Question) -> None:
         try:
             try:
-                reply = Reply(question.number, await self._answer(question), None)
+                reply = Reply(question.number, await self.answer(question), None)
             except Exception as error:
                 log.exception("a question of the serving process failed", kind=question.kind)
                 reply = Reply(question.number, None, str(error) or type(error).__name__)

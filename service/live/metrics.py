@@ -2,15 +2,15 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
-from core.alarms.alarm import PLANT, Alarm
+from core.alarms.alarm import PLANT
 from core.alarms.statistics import HIDDEN
 from core.change.decision import JUDGED, Verdict
 from core.change.film_judge import FilmNews
 from core.limits import AlarmLevel
 from core.quality import Level
-from service.live.alarm_list import AlarmCount
+from service.live.alarm_list import LiveAlarms
 from service.live.client import LiveClient
 from service.live.current_state import LiveUnits
 from service.live.status import CurrentBearing, LinkState
@@ -26,7 +26,7 @@ def add_plant(families: Families, live: LiveClient, plant: PlantFile) -> None:
     bearings = {unit.id: [each.id for each in unit.bearing] for unit in plant.unit}
     add_units(families, live.units, bearings)
     add_films(families, live.units, live.films.newest, bearings)
-    add_alarms(families, live.alarms.alarms, live.alarms.count(), list(bearings))
+    add_alarms(families, live.alarms, list(bearings))
 
 
 UNITS = {
@@ -130,20 +130,19 @@ ALARMS = {
 }
 
 
-def add_alarms(
-    families: Families, alarms: Iterable[Alarm], count: AlarmCount, units: Sequence[str]
-) -> None:
+def add_alarms(families: Families, alarms: LiveAlarms, units: Sequence[str]) -> None:
     """Add the numbers of alarms by unit and level; alarms of unknown units count as `plant`."""
     families.declare(ALARMS)
     found = Counter(
         (alarm.identity.unit if alarm.identity.unit in units else PLANT, alarm.level)
-        for alarm in alarms
+        for alarm in alarms.alarms
         if alarm.level is not None and alarm.state not in HIDDEN
     )
     for unit in (*units, PLANT):
         for level in AlarmLevel:
             priority = level.name.lower()
             families.add("alarms_active", found[unit, level], unit=unit, priority=priority)
+    count = alarms.count()
     families.add("alarms_unacknowledged", count.n_unacknowledged)
     families.add("alarms_hidden", count.n_hidden)
     families.add("alarms_unjudged", count.n_unjudged)

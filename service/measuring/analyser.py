@@ -48,8 +48,6 @@ class UnitMemory:
     version: int = VERSION
 
 
-NOTHING = Findings()
-
 TURNS = 3
 """Iterations of the event loop between the analysis of two bearings, for waiting requests."""
 
@@ -87,24 +85,13 @@ class Analyser:
         self,
         monitors: Mapping[str, UnitMonitor],
         live: LiveView,
-        recorder: Recorder,
         alarms: AlarmEngine,
         films: FilmMonitor,
     ) -> None:
-        self.monitors, self._live, self._recorder = monitors, live, recorder
-        self.alarms, self._films = alarms, films
+        self.monitors, self._live, self.alarms, self._films = monitors, live, alarms, films
         self._counts = {unit: Counts() for unit in monitors}
         for unit in monitors:
             ASSESSMENTS.labels(unit)  # a unit without results has a count of zero
-
-    async def take(self, block: SampleBlock, sampled_s: float) -> None:
-        """Analyse a block and queue its findings for the store.
-
-        ``sampled_s`` is the monotonic time of the block's last sample, s.
-        """
-        findings = await self.analyse(block, sampled_s)
-        if findings != NOTHING:
-            self._recorder.put(findings)
 
     async def analyse(self, block: SampleBlock, sampled_s: float) -> Findings:
         """Analyse a block, last sampled at the monotonic time ``sampled_s``; return findings."""
@@ -122,7 +109,7 @@ class Analyser:
         news = self.alarms.take(block, assessments, self._films.conditions(films))
         if assessments or gaps or news:
             return Findings(assessments, gaps, news, films)
-        return NOTHING
+        return Findings()
 
     async def replay(
         self, block: SampleBlock, sampled_s: float, account: SampleAccount | None = None
@@ -201,7 +188,7 @@ class Runner:
             sampled_s = block.sampled_s
             if sampled_s is None:
                 sampled_s = self.clock.monotonic_s() - self.bus.oldest_wait_s
-            await self.analyser.take(block, sampled_s)
+            self.recorder.put(await self.analyser.analyse(block, sampled_s))
             self.bus.done()
             await asyncio.sleep(0)  # let other tasks run while blocks wait
             pulse.rest()

@@ -1,7 +1,7 @@
 """Snapshots of units, built from the parts of the measuring process, and the reports on them."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 from acquisition.clock import Clock
 from core.alarms.alarm import Alarm
@@ -95,6 +95,7 @@ class SnapshotBuilder:
         return UnitLink(live.status(unit), live.data_age_s(unit), known, *faults, stored=stored)
 
 
+@dataclass
 class SocketReports:
     """Builder of reports for the serving process, on the changes since the previous report.
 
@@ -102,26 +103,21 @@ class SocketReports:
     of the measuring process.
     """
 
-    def __init__(
-        self,
-        units: Sequence[str],
-        builder: SnapshotBuilder,
-        plant: Callable[[], PlantSnapshot],
-        clock: Clock,
-    ) -> None:
-        self._units, self._builder = units, builder
-        self._plant, self._clock = plant, clock
-        self._n_reports = 0
-        self._sent: dict[str, tuple[int, object, float]] = {}
-        self._sent_plant: PlantSnapshot | None = None
+    units: Sequence[str]
+    builder: SnapshotBuilder
+    plant: Callable[[], PlantSnapshot]
+    clock: Clock
+    _n_reports: int = field(default=0, init=False)
+    _sent: dict[str, tuple[int, object, float]] = field(default_factory=dict, init=False)
+    _sent_plant: PlantSnapshot | None = field(default=None, init=False)
 
     def report(self, is_first: bool) -> Report | None:
         """Return a report on all changes, or on everything if `is_first`; None without changes."""
         if is_first:
             self._sent, self._sent_plant = {}, None
-        now_s = self._clock.monotonic_s()
-        found = [each for unit in self._units if (each := self._unit(unit, now_s)) is not None]
-        plant = self._plant()
+        now_s = self.clock.monotonic_s()
+        found = [each for unit in self.units if (each := self._unit(unit, now_s)) is not None]
+        plant = self.plant()
         is_new = plant != self._sent_plant
         if not found and not is_new:
             return None
@@ -129,7 +125,7 @@ class SocketReports:
         return Report("measuring", self._n_reports, tuple(found), plant if is_new else None)
 
     def _unit(self, unit: str, now_s: float) -> UnitReport | None:
-        newest = self._builder.report(unit)
+        newest = self.builder.report(unit)
         status, link = newest.link.status, newest.link
         state = (status.state, status.reason, status.last_sample_ns, link.stored, link.store_error)
         sent_revision, sent_state, sent_s = self._sent.get(unit, (0, None, 0.0))

@@ -161,7 +161,8 @@ async def single_process(plant_file: Path, sent: Sequence[Sent]) -> Path:
                 analysis.analyser.note_link(message)
             else:
                 analysis.analyser.note_link(LinkNews(unit, LinkState.CONNECTED))
-                await analysis.analyser.take(message, time.monotonic())
+                found = await analysis.analyser.analyse(message, time.monotonic())
+                analysis.recorder.put(found)
                 await analysis.recorder.flush()
     finally:
         await analysis.close()

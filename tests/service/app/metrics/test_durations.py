@@ -11,17 +11,20 @@ import pytest
 from prometheus_client.registry import Collector
 
 from acquisition.clock import Clock
+from core.alarms.alarm import PLANT
 from core.alarms.operation import Shelve
 from core.alarms.rules import UnitRules
+from core.alarms.statistics import ChatterRule
 from core.alarms.unit_alarms import UnitAlarms
 from core.change.decision import Verdict
 from core.change.film_judge import FilmFinding, FilmNews
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Estimator, Unit
 from core.samples.blocks import SampleBlock
-from service.live.alarm_list import count_of
+from service.live.alarm_list import LiveAlarms
 from service.live.metrics import add_alarms, add_films, add_units
 from service.live.receivers import ReceiverView, SenderState
+from service.live.snapshot import UnitSnapshot
 from service.live.status import LinkState
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.analyser import ASSESSMENTS, timed
@@ -149,7 +152,12 @@ def test_an_alarm_counts_while_it_is_active_and_not_hidden(stepped_clock):
     units = ("U1", "U2")  # U9 is in the plant file no longer
 
     def told(name: str) -> dict[tuple[str, ...], float]:
-        return of(add_alarms, name, engine.alarms, count_of(engine.alarms, engine.is_judged), units)
+        judged = frozenset(a.identity.id for a in engine.alarms if engine.is_judged(a))
+        listed = LiveAlarms(units, lambda _: True, ChatterRule())
+        for unit in (*units, PLANT):
+            found = UnitSnapshot({}, tuple(engine.alarms), judged, frozenset(), {}, {})
+            listed.take(unit, found)
+        return of(add_alarms, name, listed, units)
 
     assert told("alarms_active") == {}
 

@@ -193,7 +193,7 @@ class Plant:
         for unit in watched.values():
             unit.monitor.go_on(reach)
         monitors = {name: unit.monitor for name, unit in watched.items()}
-        analyser = Analyser(monitors, self.live, self.recorder, self.alarms, self.films)
+        analyser = Analyser(monitors, self.live, self.alarms, self.films)
         bus, beats = Bus(BUS_CAPACITY, self.clock), Heartbeats(self.clock)
         return Runner(watched, self.live, analyser, self.recorder, bus, beats, self.clock)
 
