@@ -10,8 +10,6 @@ from acquisition.modbus.polled_source import PolledSettings, PolledSource, vecto
 from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.modbus.slow_values import JoinedSource, PolledSlowValues, only_slow, without_slow
 from acquisition.source import SampleSource
-from core.machine.unit import Unit
-from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
 from core.samples.calibration import UnitCalibration
 from core.spectra.polls import PollTransform
@@ -24,49 +22,10 @@ from service.settings.sources.devices import (
     ModbusFifoSettings,
     ModbusPolledSettings,
     ModbusRingSettings,
-    ModbusSettings,
     ModbusVectorSettings,
     SimulatedSettings,
-    SourceSettings,
 )
 from service.settings.units import UnitSettings
-
-
-def modbus_source(
-    source: ModbusSettings, unit: Unit, calibration: UnitCalibration, clock: Clock
-) -> SampleSource:
-    """Return the sample source of a Modbus device, of the kind in its settings."""
-    ids = [channel.id for channel in unit.channels]
-    match source:
-        case ModbusPolledSettings() | ModbusVectorSettings():
-            calibration = replace(calibration, rate_hz=source.rate_hz)
-            if isinstance(source, ModbusVectorSettings):
-                calibration = vector_calibration(calibration, ids, source.rows)
-                ids = [row.id for row in source.rows]
-            settings = link_settings(PolledSettings, source)
-            return PolledSource(settings, source.registers, ids, calibration, clock)
-        case ModbusRingSettings():
-            return RingSource(link_settings(RingSettings, source), calibration, clock)
-        case ModbusFifoSettings():
-            fifo = link_settings(FifoSettings, source)
-            return FifoSource(fifo, source.fifo_layout(len(ids)), calibration, clock)
-
-
-def monitor_for(source: SourceSettings, unit: Unit, settings: AnalysisSettings) -> UnitMonitor:
-    """Return the monitor of a unit that matches the kind of its source.
-
-    With kind "modbus_polled" a poll is a sample; with "modbus_vector" it is a set of vectors.
-    """
-    match source:
-        case ModbusVectorSettings():
-            unit = replace(unit, rate_hz=source.rate_hz)
-            transform = PollTransform(unit, source.rows, settings, source.averaging)
-            return UnitMonitor(unit, settings, transform)
-        case ModbusPolledSettings():
-            return UnitMonitor(replace(unit, rate_hz=source.rate_hz), settings)
-        case _:
-            return UnitMonitor(unit, settings)
-
 
 DEFAULT_RETRY_S = 0.5
 """Retry period of sources that are not polled, s."""
@@ -100,8 +59,21 @@ def watched_units(
 
 
 def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> UnitMonitor:
-    """Return the monitor of a unit from its settings in the plant file."""
-    return monitor_for(unit.source, machine_of(unit), analysis_of(analysis))
+    """Return the monitor of a unit from its settings in the plant file.
+
+    With source kind "modbus_polled" a poll is a sample; with "modbus_vector" it is a set of
+    vectors.
+    """
+    machine, settings = machine_of(unit), analysis_of(analysis)
+    match unit.source:
+        case ModbusVectorSettings() as source:
+            machine = replace(machine, rate_hz=source.rate_hz)
+            transform = PollTransform(machine, source.rows, settings, source.averaging)
+            return UnitMonitor(machine, settings, transform)
+        case ModbusPolledSettings() as source:
+            return UnitMonitor(replace(machine, rate_hz=source.rate_hz), settings)
+        case _:
+            return UnitMonitor(machine, settings)
 
 
 def live_units(plant: PlantFile, clock: Clock) -> dict[str, WatchedUnit]:
@@ -131,6 +103,7 @@ def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:
 
 
 def _main_source(unit: UnitSettings, calibration: UnitCalibration, clock: Clock) -> SampleSource:
+    ids = [channel.id for channel in unit.channel]
     match unit.source:
         case CanSettings() as source:
             from acquisition.can.source import CanSource  # slow imports, only for such a plant
@@ -142,5 +115,15 @@ def _main_source(unit: UnitSettings, calibration: UnitCalibration, clock: Clock)
             from service.measuring.simulated_sources import simulated_feed
 
             return SimulatedSource(simulated_feed(unit, clock), calibration, clock)
-        case source:
-            return modbus_source(source, machine_of(unit), calibration, clock)
+        case ModbusPolledSettings() | ModbusVectorSettings() as source:
+            calibration = replace(calibration, rate_hz=source.rate_hz)
+            if isinstance(source, ModbusVectorSettings):
+                calibration = vector_calibration(calibration, ids, source.rows)
+                ids = [row.id for row in source.rows]
+            settings = link_settings(PolledSettings, source)
+            return PolledSource(settings, source.registers, ids, calibration, clock)
+        case ModbusRingSettings() as source:
+            return RingSource(link_settings(RingSettings, source), calibration, clock)
+        case ModbusFifoSettings() as source:
+            fifo = link_settings(FifoSettings, source)
+            return FifoSource(fifo, source.fifo_layout(len(ids)), calibration, clock)

@@ -29,11 +29,11 @@ from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.app.simulated_daq import modbus_device, modbus_server
 from service.measuring.simulated_sources import simulated_feed
-from service.measuring.sources import modbus_source, monitor_for, retry_s
+from service.measuring.sources import monitor_of, retry_s, source_of
 from service.settings.adapter_values import link_settings
 from service.settings.can_values import can_daq_of, can_settings_of, can_shape_of
 from service.settings.core_values import calibration_of, machine_of
-from service.settings.plant import load_plant_file
+from service.settings.plant import AnalysisModel, load_plant_file
 from service.settings.sources.can import CanSettings
 from service.settings.sources.devices import (
     MappedDeviceSettings,
@@ -63,6 +63,10 @@ def settings() -> UnitSettings:
 @pytest.fixture
 def unit(settings: UnitSettings) -> Unit:
     return machine_of(settings)
+
+
+def read_by(settings: UnitSettings, plan: Any, **endpoint: Any) -> UnitSettings:
+    return settings.model_copy(update={"source": plan.model_copy(update=endpoint)})
 
 
 def address(n: int) -> dict[str, Any]:
@@ -104,10 +108,8 @@ async def test_a_rack_agrees_with_the_waveforms(settings, unit, stepped_clock):
     device.produce(12)
     found = {}
     async with served(device) as endpoint:
-        source = modbus_source(
-            plan.model_copy(update=endpoint), unit, calibration_of(settings), stepped_clock
-        )
-        monitor = monitor_for(plan, unit, AnalysisSettings())
+        source = source_of(read_by(settings, plan, **endpoint), stepped_clock)
+        monitor = monitor_of(read_by(settings, plan), AnalysisModel())
         async with source.connect() as stream:
             while not found:
                 found = {a.bearing: a.readings for a in monitor.ingest(await anext(stream))}
@@ -122,14 +124,12 @@ async def test_a_rack_agrees_with_the_waveforms(settings, unit, stepped_clock):
     assert compared >= 4
 
 
-async def test_queues_bring_the_very_counts(settings, unit, stepped_clock):
+async def test_queues_bring_the_very_counts(settings, stepped_clock):
     plan = ModbusFifoSettings(kind="modbus_fifo", host="127.0.0.1", addresses=(7,), timeout_s=5.0)
     feed = simulated_feed(settings, stepped_clock)
     blocks: list[SampleBlock] = []
     async with served(modbus_device(settings, plan, feed)) as endpoint:
-        source = modbus_source(
-            plan.model_copy(update=endpoint), unit, calibration_of(settings), stepped_clock
-        )
+        source = source_of(read_by(settings, plan, **endpoint), stepped_clock)
         async with source.connect() as stream:
             while not blocks or blocks[-1].stop_index < 600:
                 blocks.append(await anext(stream))
@@ -144,15 +144,15 @@ async def test_polled_registers_show_the_newest_sample(settings, unit, stepped_c
     values = [{"channel": id_} | address(n) for n, id_ in enumerate(ids)]
     given = {"kind": "modbus_polled", "poll_period_s": 0.01, "host": "127.0.0.1"}
     plan = ModbusPolledSettings.model_validate(given | {"map": {"value": values}})
-    clock, calibration = stepped_clock, calibration_of(settings)
+    clock = stepped_clock
     feed = simulated_feed(settings, clock)
     device = modbus_device(settings, plan, feed)
     async with served(device) as endpoint:
-        source = modbus_source(plan.model_copy(update=endpoint), unit, calibration, clock)
+        source = source_of(read_by(settings, plan, **endpoint), clock)
         async with source.connect() as stream:
             block = await anext(stream)
 
-    monitor = monitor_for(plan, unit, AnalysisSettings())
+    monitor = monitor_of(read_by(settings, plan), AnalysisModel())
     assert block.rate_hz == monitor.unit.rate_hz == 100.0
     assert block.n_samples == settings.block_samples
     probe = block.samples[[c.id for c in unit.channels].index("ujb_shaft_x")]
