@@ -242,7 +242,7 @@ class Analysis:
             unstored_reason=live.unstored_reason,
             n_recordings_damaged=self.recordings.n_lost,
             readings={
-                "waiting_share": bus.depth / bus.capacity,
+                "waiting_share": bus.qsize() / bus.maxsize,
                 "analysis_delay_s": max(bus.oldest_wait_s, stream.behind_s if stream else 0.0),
                 "captures_error": self.captures.trouble,
                 "recording_error": self.recording_error,
@@ -338,7 +338,7 @@ class Pressure:
         share = CAUGHT_UP if self._is_behind else 1.0
         self._is_behind = (
             self._bus.oldest_wait_s > share * BEHIND_S
-            or self._bus.depth > share * BEHIND_SHARE * self._bus.capacity
+            or self._bus.qsize() > share * BEHIND_SHARE * self._bus.maxsize
         )
         if self._is_behind:
             return DropReason.ANALYSIS_BEHIND

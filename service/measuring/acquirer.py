@@ -3,7 +3,7 @@
 import asyncio
 import random
 from collections import deque
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -40,7 +40,7 @@ class LinkNews:
         return self.state is LinkState.CONNECTED
 
 
-class Bus:
+class Bus(asyncio.Queue[SampleBlock]):
     """Queue of sample blocks between acquisition and analysis in one process.
 
     Publishers wait while the queue is full: the device buffers samples in its ring, and if the ring
@@ -49,16 +49,9 @@ class Bus:
     """
 
     def __init__(self, capacity: int, clock: Clock) -> None:
-        self._queue: asyncio.Queue[SampleBlock] = asyncio.Queue(capacity)
+        super().__init__(capacity)
         self._clock = clock
         self._published_s: deque[float] = deque()
-        self.capacity = capacity
-        self.n_published = 0
-
-    @property
-    def depth(self) -> int:
-        """Number of blocks that wait for the analysis."""
-        return self._queue.qsize()
 
     @property
     def oldest_wait_s(self) -> float:
@@ -67,25 +60,15 @@ class Bus:
             return 0.0
         return self._clock.monotonic_s() - self._published_s[0]
 
-    async def publish(self, block: SampleBlock) -> None:
+    async def put(self, item: SampleBlock) -> None:
         """Add a block; wait while the queue is full."""
-        await self._queue.put(block)
+        await super().put(item)
         self._published_s.append(self._clock.monotonic_s())
-        self.n_published += 1
 
-    async def blocks(self) -> AsyncIterator[SampleBlock]:
-        """Yield blocks in the order in which they were published."""
-        while True:
-            yield await self._queue.get()
-
-    def done(self) -> None:
-        """Mark the oldest block that `blocks` has yielded as analysed."""
-        self._queue.task_done()
+    def task_done(self) -> None:
+        """Mark the oldest block that was taken from the queue as analysed."""
+        super().task_done()
         self._published_s.popleft()
-
-    async def drained(self) -> None:
-        """Wait until all published blocks are analysed."""
-        await self._queue.join()
 
 
 class ConnectGate:

@@ -169,13 +169,13 @@ class Runner:
 
     async def run(self) -> None:
         """Run until all sources have ended and their results are stored, or the store fails."""
-        links = (self.bus.publish, self.analyser.note_link, self.beats)
+        links = (self.bus.put, self.analyser.note_link, self.beats)
         acquirer = Acquirer(self.units, self.live, self.clock, *links)
         async with asyncio.TaskGroup() as tasks:
             loops = {"record": self.recorder.run, "analyse": self._analyse}
             recording, analysis = self.beats.start(loops, tasks)
             await acquirer.run()
-            await self.bus.drained()
+            await self.bus.join()
             analysis.cancel()
             await self.recorder.settled()
             recording.cancel()
@@ -183,12 +183,13 @@ class Runner:
 
     async def _analyse(self, pulse: Pulse) -> None:
         pulse.rest()
-        async for block in self.bus.blocks():
+        while True:
+            block = await self.bus.get()
             pulse.beat()
             sampled_s = block.sampled_s
             if sampled_s is None:
                 sampled_s = self.clock.monotonic_s() - self.bus.oldest_wait_s
             self.recorder.put(await self.analyser.analyse(block, sampled_s))
-            self.bus.done()
+            self.bus.task_done()
             await asyncio.sleep(0)  # let other tasks run while blocks wait
             pulse.rest()

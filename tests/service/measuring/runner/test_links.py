@@ -138,24 +138,22 @@ async def test_a_full_bus_makes_the_publisher_wait_and_drops_nothing(block):
 
     async def publish() -> None:
         for number in range(20):
-            await bus.publish(block(number))
-            assert bus.depth <= bus.capacity
+            await bus.put(block(number))
+            assert bus.qsize() <= bus.maxsize
 
     publishing = asyncio.create_task(publish())
     async with asyncio.timeout(30):
-        while bus.depth < bus.capacity:
+        while not bus.full():
             await asyncio.sleep(0)
-        assert bus.n_published == 3
-        async for found in bus.blocks():
+        assert bus.qsize() == 3
+        while len(taken) < 20:
+            found = await bus.get()
             taken.append(found.first_index // 128)
-            bus.done()
-            if len(taken) == 20:
-                break
+            bus.task_done()
         await publishing
-        await bus.drained()
+        await bus.join()
 
     assert taken == list(range(20))
-    assert bus.n_published == 20
 
 
 def _noting(plant: Any, seen: list[Any], sleep: Any) -> Any:

@@ -198,25 +198,25 @@ def plant() -> Plant:
 
 
 async def test_blocks_that_wait_long_come_before_recording_until_they_wait_no_more(plant):
-    await plant.bus.publish(counted_block(0))
+    await plant.bus.put(counted_block(0))
     plant.clock.s = pressure.BEHIND_S
     assert plant.pressure.look() is None
     plant.clock.s += 0.1
     assert plant.pressure.look() is DropReason.ANALYSIS_BEHIND
 
-    await anext(plant.bus.blocks())
-    plant.bus.done()
-    await plant.bus.publish(counted_block(1))
+    await plant.bus.get()
+    plant.bus.task_done()
+    await plant.bus.put(counted_block(1))
     plant.clock.s += 0.5 * pressure.BEHIND_S
     assert plant.pressure.look() is DropReason.ANALYSIS_BEHIND  # not well enough yet
-    await anext(plant.bus.blocks())
-    plant.bus.done()
+    await plant.bus.get()
+    plant.bus.task_done()
     assert plant.pressure.look() is None
 
 
 async def test_a_queue_that_fills_does_as_well(plant):
     for number in range(26):
-        await plant.bus.publish(counted_block(number))
+        await plant.bus.put(counted_block(number))
     assert plant.pressure.look() is DropReason.ANALYSIS_BEHIND
 
 
