@@ -15,16 +15,13 @@ from acquisition.modbus.ring_profile import (
     RingHeader,
     RingLayout,
     Slot,
-    SlotRecords,
     decode_header,
     decode_slots,
-    slot_records,
 )
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
 from core.samples.axis import Epochs
 from core.samples.blocks import Rejection, SampleBlock, SideValues
 from core.samples.calibration import UnitCalibration
-from core.units import NS_PER_S
 
 _N_TRIES = 4
 """Maximum number of attempts to read a valid header; the device may be writing the header."""
@@ -61,7 +58,7 @@ class RingReader:
 
     async def header_and_slots(
         self, layout: RingLayout, sequences: Sequence[int]
-    ) -> tuple[RingHeader, SlotRecords | None]:
+    ) -> tuple[RingHeader, list[Slot] | None]:
         """Read the header and then slots of a known layout in one exchange; see `slots`.
 
         The slots are None if the header is invalid or the device has no such registers; the header
@@ -73,18 +70,12 @@ class RingReader:
             header = decode_header(content)
         except (ConfigError, FrameError):
             return await self.header(), None
-        return header, slot_records(content[self._header.n_bytes :], layout)
+        return header, decode_slots(content[self._header.n_bytes :], layout)
 
-    async def slots(self, layout: RingLayout, sequences: Sequence[int]) -> SlotRecords:
-        """Read the slots at the ring positions of sequence numbers, without checking the slots.
-
-        Returns
-        -------
-        (n_sequences,)
-            Slot found at the ring position of each sequence number; it may be another slot.
-        """
+    async def slots(self, layout: RingLayout, sequences: Sequence[int]) -> list[Slot]:
+        """Read the slots at the ring positions of sequence numbers; each may be another slot."""
         spans = self._slot_spans(layout, sequences)
-        return slot_records(await self.client.read_spans(spans), layout)
+        return decode_slots(await self.client.read_spans(spans), layout)
 
     def _slot_spans(self, layout: RingLayout, sequences: Sequence[int]) -> list[Span]:
         n_registers, starts, stops = layout.slot_registers, [], [-1]
@@ -171,26 +162,26 @@ class RingFollower:
     async def _blocks(
         self, now_s: float, due: Sequence[int], max_read_s: float
     ) -> list[SampleBlock]:
-        before, records = self._header, None
+        before, slots = self._header, None
         self._asked_s = now_s
         if before is not None and due:
-            found, records = await self._reader.header_and_slots(before.layout, due)
+            found, slots = await self._reader.header_and_slots(before.layout, due)
             header = self._required(found)
-            records = records if header.layout == before.layout else None
+            slots = slots if header.layout == before.layout else None
         else:
             header = await self.header()
         await self._enter(header)
         wanted = self._unread(header, max_read_s)
         if not wanted:
             return []
-        if records is not None and due[0] == wanted[0]:
+        if slots is not None and due[0] == wanted[0]:
             wanted = wanted[: len(due)]
-            records = records[: len(wanted)]
+            slots = slots[: len(wanted)]
         else:
-            records = await self._reader.slots(header.layout, wanted)
-        records, slots = await self._reread(records, header.layout, wanted)
+            slots = await self._reader.slots(header.layout, wanted)
+        await self._reread(slots, header.layout, wanted)
         self._handled = wanted[-1]
-        return self._placed(records, list(zip(wanted, slots, strict=True)), header)
+        return self._placed(list(zip(wanted, slots, strict=True)), header)
 
     def _due(self, now_s: float, max_read_s: float) -> list[int]:
         """Return the slots that may have been written by now, if they can be read with the header.
@@ -259,32 +250,25 @@ class RingFollower:
         return [(header.newest - n_there + 1 + n) % U32 for n in range(n_wanted)]
 
     async def _newest_slot(self, header: RingHeader) -> Slot | None:
-        wanted = [header.newest]
-        records = await self._reader.slots(header.layout, wanted)
-        _, [slot] = await self._reread(records, header.layout, wanted)
+        slots = await self._reader.slots(header.layout, [header.newest])
+        await self._reread(slots, header.layout, [header.newest])
+        [slot] = slots
         known = slot.epoch == header.epoch and slot.sequence == header.newest
         return slot if known and slot.whole and not slot.blank else None
 
-    async def _reread(
-        self, records: SlotRecords, layout: RingLayout, wanted: Sequence[int]
-    ) -> tuple[SlotRecords, list[Slot]]:
-        """Repeat the read of inconsistent slots, which the device may be writing; return all."""
-        records, slots = records.copy(), decode_slots(records)
+    async def _reread(self, slots: list[Slot], layout: RingLayout, wanted: Sequence[int]) -> None:
+        """Repeat the read of inconsistent slots, which the device may be writing."""
         for n, sequence in enumerate(wanted):
             for _ in range(_N_REREADS):
                 if not _doubtful(slots[n], sequence, layout):
                     break
-                records[n : n + 1] = await self._reader.slots(layout, [sequence])
-                [slots[n]] = decode_slots(records[n : n + 1])
-        return records, slots
+                [slots[n]] = await self._reader.slots(layout, [sequence])
 
-    def _placed(
-        self, records: SlotRecords, found: Sequence[tuple[int, Slot]], header: RingHeader
-    ) -> list[SampleBlock]:
+    def _placed(self, found: Sequence[tuple[int, Slot]], header: RingHeader) -> list[SampleBlock]:
         """Return the accepted slots, with consecutive slots joined to one block."""
-        runs: list[tuple[int, int, Counter[Refusal], list[int]]] = []
+        runs: list[tuple[int, int, Counter[Refusal], list[Slot]]] = []
         n_samples, follows = header.layout.samples_per_slot, (-1, -1)
-        for row, (sequence, slot) in enumerate(found):
+        for sequence, slot in found:
             index = self._judge(sequence, slot, header)
             if isinstance(index, Refusal):
                 self._rejected[index] += n_samples
@@ -293,12 +277,9 @@ class RingFollower:
                 if self._rejected or (epoch, index) != follows:
                     runs.append((epoch, index, self._rejected, []))
                     self._rejected = Counter()
-                runs[-1][-1].append(row)
+                runs[-1][-1].append(slot)
                 follows = (epoch, index + n_samples)
-        return [
-            self._block(epoch, index, rejected, records[rows])
-            for epoch, index, rejected, rows in runs
-        ]
+        return [self._block(*run) for run in runs]
 
     def _judge(self, sequence: int, slot: Slot, header: RingHeader) -> int | Refusal | None:
         """Return the index of a slot's first sample, or the reason for refusing the slot.
@@ -318,22 +299,20 @@ class RingFollower:
         return self._timeline.place(slot)
 
     def _block(
-        self, epoch: int, index: int, rejected: Counter[Refusal], records: SlotRecords
+        self, epoch: int, index: int, rejected: Counter[Refusal], slots: Sequence[Slot]
     ) -> SampleBlock:
-        n_slots, n_channels, n_samples = records["counts"].shape
-        counts = np.empty((n_channels, n_slots, n_samples), dtype=np.int16)
-        counts[:] = records["counts"].transpose(1, 0, 2)
-        heads = records["head"].astype(np.int64)
+        counts = np.concatenate([slot.counts for slot in slots], axis=1)
+        ok_bits = np.array([slot.ok_bits for slot in slots])
         return SampleBlock(
             calibration=self._calibration,
             epoch=epoch,
             first_index=index,
-            counts=counts.reshape(n_channels, -1),
+            counts=counts,
             side=SideValues(
-                starts=np.arange(0, n_slots * n_samples, n_samples),
-                start_ns=heads[:, 2] * NS_PER_S + heads[:, 3] * 1000,
-                ok=(heads[:, 4] >> np.arange(n_channels)[:, np.newaxis] & 1).astype(np.bool_),
-                slow=records["slow"].T.astype(np.float64),
+                starts=np.arange(0, counts.shape[1], slots[0].counts.shape[1]),
+                start_ns=np.array([slot.start_ns for slot in slots]),
+                ok=(ok_bits >> np.arange(len(counts))[:, np.newaxis] & 1).astype(np.bool_),
+                slow=np.array([slot.slow for slot in slots]).T,
             ),
             rejected=tuple(Rejection(str(reason), n) for reason, n in rejected.items()),
         )

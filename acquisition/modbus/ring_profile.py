@@ -19,18 +19,14 @@ import struct
 import zlib
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.requests import ADDRESS_SPACE
 from core.arrays import CountArray
 from core.units import NS_PER_S
-
-SlotRecords: TypeAlias = npt.NDArray[np.void]
-"""(n_slots,) slots as read, of type `RingLayout.slot_type`."""
 
 MAGIC = 0x5057
 VERSION = 2
@@ -212,28 +208,16 @@ class Slot:
         return not self.torn and not self.damage
 
 
-def slot_records(content: bytes, layout: RingLayout) -> SlotRecords:
-    """Return the registers of consecutive slots as records of `RingLayout.slot_type`, unchecked."""
-    return np.frombuffer(content, layout.slot_type)
-
-
-def damages_of(records: SlotRecords) -> list[int]:
-    """Return the exclusive-or of stored and computed checksum of each slot; 0 if equal."""
-    n_bytes, content = records.itemsize, records.tobytes()
-    view = memoryview(content)
-    starts = range(0, len(content), n_bytes)
-    return [
-        zlib.crc32(view[start : start + n_bytes - 2 * _CRC_REGISTERS]) ^ crc
-        for start, crc in zip(starts, records["crc"].tolist(), strict=True)
-    ]
-
-
-def decode_slots(records: SlotRecords) -> list[Slot]:
-    """Return the decoded slots of records as read; checksums are not checked."""
-    counts, damages = records["counts"].astype(np.int16), damages_of(records)
-    heads, slow, trailers = (records[name].tolist() for name in ("head", "slow", "trailer"))
+def decode_slots(content: bytes, layout: RingLayout) -> list[Slot]:
+    """Return the slots in the registers of consecutive slots; checksums are not checked."""
+    records = np.frombuffer(content, layout.slot_type)
+    n_bytes, counts = records.itemsize, records["counts"].astype(np.int16)
+    heads, slow, trailers, crcs = (
+        records[name].tolist() for name in ("head", "slow", "trailer", "crc")
+    )
     slots = []
     for n, (sequence, first_index, seconds, microseconds, ok_bits, epoch) in enumerate(heads):
+        data = content[n * n_bytes : (n + 1) * n_bytes]
         slots.append(
             Slot(
                 sequence,
@@ -245,8 +229,8 @@ def decode_slots(records: SlotRecords) -> list[Slot]:
                 trailers[n],
                 epoch,
                 slow=tuple(slow[n]),
-                damage=damages[n],
-                blank=not any(records[n].tobytes()),
+                damage=zlib.crc32(data[: -2 * _CRC_REGISTERS]) ^ crcs[n],
+                blank=not any(data),
             )
         )
     return slots

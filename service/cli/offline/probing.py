@@ -16,7 +16,7 @@ from acquisition.modbus.polled_source import MapReader
 from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.requests import Span
 from acquisition.modbus.ring_follower import RingReader
-from acquisition.modbus.ring_profile import RingHeader, Slot, decode_slots
+from acquisition.modbus.ring_profile import RingHeader, Slot
 from acquisition.modbus.transport import Identification, LinkSettings
 from service.settings.adapter_values import link_settings
 from service.settings.sources.modbus import ModbusLinkSettings
@@ -248,7 +248,7 @@ async def read_ring_once(
     reader = RingReader(client, base_address, function)
     async with client.connected():
         header = await reader.header()
-        [slot] = decode_slots(await reader.slots(header.layout, [header.newest]))
+        [slot] = await reader.slots(header.layout, [header.newest])
         return header, slot
 
 

@@ -16,7 +16,6 @@ from acquisition.modbus.ring_profile import (
     Slot,
     decode_header,
     decode_slots,
-    slot_records,
 )
 from acquisition.simulated.devices.register_image import encode_header, encode_slot
 
@@ -80,7 +79,7 @@ def test_a_slot_keeps_epoch_slow_values_and_damage(numbers, trailer, counts, epo
     slot = Slot(*numbers, counts=counts, trailer=trailer, epoch=epoch, slow=slow, damage=damage)
     data = encode_slot(slot)
     assert len(data) == 2 * LAYOUT.slot_registers
-    _, read = decode_slots(slot_records(data + data, LAYOUT))
+    _, read = decode_slots(data + data, LAYOUT)
     np.testing.assert_array_equal(read.counts, counts)
     assert equal_slots(read, slot)
 
@@ -93,16 +92,16 @@ def test_a_slot_keeps_epoch_slow_values_and_damage(numbers, trailer, counts, epo
 )
 def test_a_slot_with_changed_bytes_is_not_whole(counts, flips):
     data = bytearray(encode_slot(Slot(3, 12, 5, 6, 7, counts, 3, epoch=1, slow=(1.0, 2.0))))
-    assert decode_slots(slot_records(bytes(data), LAYOUT))[0].whole
+    assert decode_slots(bytes(data), LAYOUT)[0].whole
     for position, flip in flips.items():
         data[position] ^= flip
-    assert not decode_slots(slot_records(bytes(data), LAYOUT))[0].whole
+    assert not decode_slots(bytes(data), LAYOUT)[0].whole
 
 
 def test_a_slot_of_zeros_is_blank_and_a_written_one_is_not():
-    assert decode_slots(slot_records(bytes(2 * LAYOUT.slot_registers), LAYOUT))[0].blank
+    assert decode_slots(bytes(2 * LAYOUT.slot_registers), LAYOUT)[0].blank
     first = Slot(0, 0, 0, 0, 0, np.ones((3, 4), np.int16), 0, epoch=0, slow=(0.0, 0.0))
-    assert not decode_slots(slot_records(encode_slot(first), LAYOUT))[0].blank
+    assert not decode_slots(encode_slot(first), LAYOUT)[0].blank
 
 
 def test_samples_lie_channel_by_channel_behind_slow_values_and_before_a_checksum():

@@ -9,7 +9,7 @@ from rigs.modbus import transport_of
 
 from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
-from acquisition.modbus.ring_profile import decode_header, decode_slots, slot_records
+from acquisition.modbus.ring_profile import decode_header, decode_slots
 from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.simulated.devices import ring_faults as faults
 from acquisition.simulated.devices.modbus_device import RegisterMemory
@@ -133,7 +133,7 @@ async def test_another_modbus_client_reads_the_same_registers_and_changes_none(p
 
 def slot_in(device: RingDevice, sequence: int):
     data = device.memory.read(device.layout.slot_address(sequence), device.layout.slot_registers)
-    return decode_slots(slot_records(data, device.layout))[0]
+    return decode_slots(data, device.layout)[0]
 
 
 def test_header_slow_values_and_slots_lie_where_the_header_says(counting_feed):
