@@ -1,7 +1,7 @@
 """Sample index of frames with counters; a counter jump must be confirmed by a second frame."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from acquisition.can.frame_sets import DuplicateSenderDetector, PlacedFrame
 from acquisition.can.plan import Part, Plan, Refusal, RefusalCounts
@@ -19,8 +19,7 @@ JUMP_TOLERANCE = ClockTolerance(step_s=0.5, drift=0.05)
 larger one is a restart or a pause of the device. The drift allows for a wrong sampling rate."""
 
 
-@dataclass(frozen=True)
-class _CountedFrame:
+class _CountedFrame(NamedTuple):
     """Frame with its counter in samples, 0 to ``modulus - 1``."""
 
     part: Part
@@ -77,11 +76,6 @@ class CounterFollower:
             return []
         counter, modulus = int(part.counter(data)) * part.counter_step, part.modulus
         epoch = int(part.epoch(data)) if part.epoch else None
-        fits = epoch is None or epoch == self._epoch
-        if fits and not self._doubted:
-            index = self._near_index(counter, modulus, arrived_ns)
-            if index is not None:
-                return [PlacedFrame(part, data, index)]
         frame = _CountedFrame(part, data, counter, modulus, epoch, arrived_ns)
         if self._axis.index is None:
             return self._first(frame)
@@ -91,7 +85,7 @@ class CounterFollower:
             self._refused[Refusal.IMPOSSIBLE_COUNTER] += 1
             self._senders.note(contrary=True)
         self._doubted.clear()
-        index = self._near_index(counter, modulus, arrived_ns) if fits else None
+        index = self._near_index(frame) if epoch in (None, self._epoch) else None
         if index is None:
             self._doubted.append(frame)
             return []
@@ -107,22 +101,17 @@ class CounterFollower:
         self._axis.stand_at(frame.counter, frame.arrived_ns)
         return [PlacedFrame(frame.part, frame.data, frame.counter)]
 
-    def _near_index(self, counter: int, modulus: int, arrived_ns: int) -> int | None:
+    def _near_index(self, frame: _CountedFrame) -> int | None:
         """Return the sample index of a frame close to the newest frame; None for other frames."""
-        axis, half = self._axis, modulus // 2
-        if axis.index is None:
+        axis, newest, half = self._axis, self._axis.index or 0, frame.modulus // 2
+        if axis.elapsed(frame.arrived_ns) > min(_SILENCE_S * self._rate_hz, half):
             return None
-        if arrived_ns != axis.at_ns:
-            silence = axis.elapsed(arrived_ns)
-            if silence > min(_SILENCE_S * self._rate_hz, half):
-                return None
-        ahead = (counter - axis.index) % modulus
+        ahead = axis.forward(frame.counter, frame.modulus)
         if ahead <= min(self._near_samples, half):
-            index = axis.index + ahead
-            axis.stand_at(index, arrived_ns)
-            return index
-        behind = modulus - ahead
-        return axis.index - behind if behind <= min(self._near_samples, half // 2) else None
+            axis.stand_at(newest + ahead, frame.arrived_ns)
+            return newest + ahead
+        behind = frame.modulus - ahead
+        return newest - behind if behind <= min(self._near_samples, half // 2) else None
 
     def _confirms(self, frame: _CountedFrame) -> bool:
         """Return whether a frame confirms the last held frame by following it closely."""
