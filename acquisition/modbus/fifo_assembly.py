@@ -290,7 +290,7 @@ class ChannelAssembly:
             if sample.epoch != self._epoch:
                 self.forget()
                 self._epoch, self._next = sample.epoch, sample.first_index
-            self._add(0, range(sample.first_index, sample.stop_index), sample.counts[0])
+            self._add(0, sample.first_index, sample.counts[0])
             self._newest = sample.stop_index
         for channel, piece in enumerate(others, start=1):
             self._add_other(channel, piece)
@@ -305,12 +305,11 @@ class ChannelAssembly:
                 f"FIFO: channels 0 and {channel} are {abs(apart)} samples apart, at most"
                 f" {_MAX_APART} are accepted"
             )
-        start = self._newest + apart
-        self._add(channel, range(start, start + piece.n_samples), piece.counts[0])
+        self._add(channel, self._newest + apart, piece.counts[0])
 
-    def _add(self, channel: int, index: range, counts: CountArray) -> None:
-        fresh = zip(index, counts.tolist(), strict=True)
-        self._waiting[channel].update((i, count) for i, count in fresh if i >= self._next)
+    def _add(self, channel: int, start: int, counts: CountArray) -> None:
+        found = enumerate(counts.tolist(), start)
+        self._waiting[channel].update((i, count) for i, count in found if i >= self._next)
 
     def _common(self) -> list[PlacedSamples]:
         """Return the samples that all channels have; drop them and all older samples.
@@ -323,7 +322,8 @@ class ChannelAssembly:
         )
         newest = max((max(waiting) for waiting in self._waiting if waiting), default=0)
         self._next = shared[-1] + 1 if shared else max(self._next, newest - _MAX_APART)
-        for waiting in self._waiting:
-            for index in [i for i in waiting if i < self._next]:
-                del waiting[index]
+        self._waiting = [
+            {i: count for i, count in waiting.items() if i >= self._next}
+            for waiting in self._waiting
+        ]
         return list(_joined([SamplePlace(self._epoch, i) for i in shared], counts))

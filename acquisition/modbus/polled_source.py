@@ -163,18 +163,18 @@ class PolledSource:
                 yield block
 
     def _block(self, reading: MapReading, index: int, start_ns: int) -> SampleBlock:
-        samples = [
-            _sample(float(reading.values[n]), reading.states[n], full_scale)
-            for n, full_scale in zip(self._rows, self._full_scale, strict=True)
-        ]
-        is_ok = [reading.states[n] is not ValueState.FLAGGED for n in self._rows]
+        """Return a poll as a block of one sample: NaN if invalid, full scale if clipped."""
+        values, states = reading.values[self._rows], np.array(reading.states)[self._rows]
+        limits = np.where(values >= 0.0, self._full_scale, np.negative(self._full_scale))
+        samples = np.where(states == ValueState.CLIPPED, limits, values)
+        samples[(states == ValueState.INVALID) | ~(np.abs(values) <= _LARGEST)] = np.nan
         slow = [math.nan if n is None else slow_number(reading, n) for n in self._slow]
         return SampleBlock(
             calibration=self._calibration,
             epoch=self._ticks.epoch,
             first_index=index,
-            counts=np.array(samples, dtype=np.float32)[:, np.newaxis],
-            side=SideValues.of(start_ns, is_ok, slow),
+            counts=samples.astype(np.float32)[:, np.newaxis],
+            side=SideValues.of(start_ns, states != ValueState.FLAGGED, slow),
         )
 
 
@@ -213,12 +213,3 @@ def slow_number(reading: MapReading, position: int) -> float:
     """Return the value with an index in the register map; NaN unless its state is OK."""
     is_ok = reading.states[position] is ValueState.OK
     return float(reading.values[position]) if is_ok else math.nan
-
-
-def _sample(value: float, state: ValueState, full_scale: float) -> float:
-    """Return a value as input of the calibration: NaN if invalid, full scale if clipped."""
-    if state is ValueState.INVALID or not abs(value) <= _LARGEST:
-        return math.nan
-    if state is ValueState.CLIPPED:
-        return full_scale if value >= 0.0 else -full_scale
-    return value
