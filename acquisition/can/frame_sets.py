@@ -154,9 +154,7 @@ class FrameSets:
         n_samples = self._plan.samples_per_frame
         if part.n_samples is not None:
             n_samples = min(n_samples, int(part.n_samples(data)))
-        pending = self.pending.get(index)
-        if pending is None:
-            pending = self.pending[index] = _Pending(n_samples)
+        pending = self.pending.setdefault(index, _Pending(n_samples))
         pending.frames[wave] = data
         pending.is_spoilt |= n_samples != pending.n_samples
         if len(pending.frames) == self._plan.n_waves and not pending.is_spoilt:

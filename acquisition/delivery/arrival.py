@@ -187,7 +187,7 @@ class HostStamps:
         self._index = 0
         self._ns = 0
         self._slope = 1.0
-        self._least_delay_ns: int | None = None
+        self._least_delay_ns = math.inf
 
     def add(self, epoch: int, stop_index: int, arrived_ns: int) -> None:
         """Add the arrival of the samples before `stop_index`, at `arrived_ns` (ns since 1970 UTC).
@@ -197,31 +197,26 @@ class HostStamps:
         """
         delay_ns = arrived_ns - self.start_ns(stop_index)
         if epoch != self._epoch or delay_ns < -_STEP_NS:
-            self._begin(epoch, stop_index, arrived_ns)
+            self._lay(epoch, stop_index, arrived_ns)
             return
-        if self._least_delay_ns is None or delay_ns < self._least_delay_ns:
-            self._least_delay_ns = delay_ns
+        self._least_delay_ns = min(self._least_delay_ns, delay_ns)
         if stop_index - self._index < self._bin_samples:
             return
         if self._least_delay_ns > _STEP_NS:
-            self._begin(epoch, stop_index, arrived_ns)
+            self._lay(epoch, stop_index, arrived_ns)
         else:
-            self._bend(stop_index, self._least_delay_ns)
+            share = self._least_delay_ns / (_BIN_S * NS_PER_S)
+            slope = 1.0 + min(max(share, -_MAX_SLEW), _MAX_SLEW)
+            self._lay(epoch, stop_index, self.start_ns(stop_index), slope)
 
     def start_ns(self, index: int) -> int:
         """Return the time of a sample, UTC ns since 1970; it increases within an epoch."""
         return self._ns + round((index - self._index) * self._period_ns * self._slope)
 
-    def _begin(self, epoch: int, index: int, at_ns: int) -> None:
-        self._epoch, self._slope = epoch, 1.0
-        self._index, self._ns, self._least_delay_ns = index, at_ns, None
-
-    def _bend(self, index: int, late_ns: int) -> None:
-        """Change the slope so that the line reaches the smallest delay in ten seconds."""
-        at_ns = self.start_ns(index)
-        share = late_ns / (_BIN_S * NS_PER_S)
-        self._slope = 1.0 + min(max(share, -_MAX_SLEW), _MAX_SLEW)
-        self._index, self._ns, self._least_delay_ns = index, at_ns, None
+    def _lay(self, epoch: int, index: int, at_ns: int, slope: float = 1.0) -> None:
+        """Continue the line, or lay it anew, from the time of a sample index on."""
+        self._epoch, self._slope = epoch, slope
+        self._index, self._ns, self._least_delay_ns = index, at_ns, math.inf
 
 
 _MAX_INTERFACE_DRIFT = 100e-6

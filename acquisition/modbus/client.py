@@ -232,12 +232,9 @@ class ModbusClient:
             raise
         except (LinkError, FrameError) as error:
             self.close()
-            is_wrong = isinstance(error, FrameError)
-            words = (
-                f"closed the connection after a malformed reply: {error}"
-                if is_wrong
-                else str(error)
-            )
+            words = str(error)
+            if isinstance(error, FrameError):
+                words = f"closed the connection after a malformed reply: {error}"
             n_in_flight = self._protocol.n_in_flight
             if n_in_flight > 1 and self._shows_too_many(error):
                 self.requests_in_flight = 1
