@@ -133,7 +133,7 @@ class Answers:
             Function that returns the answer. It is called in a thread and may block, or is a
             coroutine function.
         is_polled
-            Whether `revision` remains that of the request, so that `Repetition` can answer it.
+            Whether `revision` applies to later requests for the URL, which `Repetition` may answer.
         """
         scope = request.scope
         if is_polled and (asked := _asked(scope, scope["state"][CALLER].identity)) is not None:

@@ -11,6 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.auth.gate import OPEN, needs
 from service.api.context import Context
+from service.api.downloads import file_content
 from service.api.values import ApiModel
 from service.runtime.metrics import TEXT
 from service.store.access.identities import Permission
@@ -76,10 +77,7 @@ EXAMPLE = """\
 padwatch_link_connected{unit="U1"} 1.0
 """
 
-ANSWER = {
-    "description": "Metrics in the Prometheus text format",
-    "content": {"text/plain": {"schema": {"type": "string"}, "example": EXAMPLE}},
-}
+WORDS = "Metrics in the Prometheus text format"
 
 
 def health_router(context: Context, requests: RequestMetrics) -> APIRouter:
@@ -123,7 +121,7 @@ def health_router(context: Context, requests: RequestMetrics) -> APIRouter:
         "/metrics",
         dependencies=[needs(Permission.READ)],
         response_class=Response,
-        responses={200: ANSWER},
+        responses=file_content("text/plain", WORDS, {"type": "string"}, example=EXAMPLE),
     )
     async def prometheus_metrics() -> Response:
         """Return metrics of samples, links, results, films, alarms, store, deliveries, requests."""

@@ -134,7 +134,7 @@ def table_content(words: str) -> dict[int | str, dict[str, Any]]:
 
 
 def table_response(
-    wanted: FormatName, columns: Sequence[Column], name: str, next_cursor: str | None = None
+    wanted: FormatName, columns: Sequence[Column], name: str, next_cursor: str | int | None = None
 ) -> StreamingResponse:
     """Return a response with a table as a CSV or Parquet file.
 
@@ -142,7 +142,7 @@ def table_response(
     `CURSOR_HEADER`, or None to omit the header.
     """
     pieces = csv_pieces(columns) if wanted == "csv" else iter([parquet_file(columns)])
-    cursor = {} if next_cursor is None else {CURSOR_HEADER: next_cursor}
+    cursor = {} if next_cursor is None else {CURSOR_HEADER: str(next_cursor)}
     return attachment(pieces, TYPE_OF[wanted], f"{name}.{wanted}", Vary="Accept", **cursor)
 
 
@@ -179,10 +179,8 @@ def parquet_file(columns: Sequence[Column]) -> bytes:
 
 def _cells(column: Column) -> Iterator[object]:
     if column.kind == "time":
-        return (rfc3339(value) for value in column.values)
-    if column.kind == "text":
-        return (None if value is None else harmless(value) for value in column.values)
-    return iter(column.values)
+        return map(rfc3339, column.values)
+    return map(_cell, column.values) if column.kind == "text" else iter(column.values)
 
 
 HEADER = ("time", "chain", *(field.name for field in fields(AuditEntry)))
@@ -213,6 +211,4 @@ def harmless(text: str) -> str:
 
 
 def _cell(value: object) -> object:
-    if isinstance(value, str):
-        return harmless(value)
-    return "" if value is None else value
+    return harmless(value) if isinstance(value, str) else value

@@ -204,8 +204,7 @@ def alarm_router(context: Context) -> APIRouter:
             return await rendered(read)
         found = await asyncio.to_thread(read)
         columns = await asyncio.to_thread(event_table, found.events)
-        cursor = None if found.next_before is None else str(found.next_before)
-        return table_response(wanted, columns, "alarm-events", cursor)
+        return table_response(wanted, columns, "alarm-events", found.next_before)
 
     @router.get("/{alarm}", responses=problem_responses(own=UNKNOWN))
     async def one_alarm(alarm: AlarmId) -> AlarmModel:
