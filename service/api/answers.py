@@ -203,15 +203,12 @@ class Answers:
             response = await asyncio.to_thread(answer, await make())
         else:
             response = await asyncio.to_thread(lambda: answer(cast("Answer", make())))
-        self._keep(key, response)
-        return response
-
-    def _keep(self, key: tuple[str, str], response: Response) -> None:
         self._kept[key] = response
         self._n_bytes += len(response.body)
         while self._n_bytes > self._max_bytes:
             _, dropped = self._kept.popitem(last=False)
             self._n_bytes -= len(dropped.body)
+        return response
 
 
 async def rendered(make: Callable[[], BaseModel]) -> Response:
