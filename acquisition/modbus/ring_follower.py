@@ -138,7 +138,8 @@ class RingFollower:
         for (name, expected), value in zip(self._expected.items(), found, strict=True):
             if value != expected:
                 raise ConfigError(
-                    f"{self._client.where}: block ring: {name} is {value}, expected {expected}"
+                    f"{self._client.where}: block ring: {name} of the device is {value},"
+                    f" of the plant file {expected}"
                 )
         return header
 

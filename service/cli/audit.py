@@ -37,13 +37,17 @@ def verify(
     """
     trails = open_trails(load_plant_file(plant_file))
     chains, lines = {}, []
+    unmatched = set(known or ())
     for trail in trails:
         verdict = trail.verify()
         numbers = verdict.contradictions
         unknown = [n for n in numbers if f"{trail.chain}:{n}" not in (known or ())]
+        unmatched -= {f"{trail.chain}:{n}" for n in numbers}
         is_whole = verdict.is_whole and not unknown
         chains[trail.chain] = {"is_whole": is_whole} | asdict(verdict) | {"contradictions": unknown}
         lines += [f"{trail.chain}: {line}" for line in _lines(trail.chain, verdict, unknown)]
+    if unmatched:
+        fail(f"--known {min(unmatched)}: no such entry reports a restored backup", code=2)
     are_whole = all(chain["is_whole"] for chain in chains.values())
     print_result({"is_whole": are_whole, "chains": chains}, lines, json_output)
     if not are_whole:

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -33,10 +34,11 @@ from service.cli.options import (
     print_result,
 )
 from service.runtime.times import rfc3339
-from service.settings.plant import load_plant_file
+from service.settings.plant import PlantFile, load_plant_file
 from service.settings.sources.devices import MappedDeviceSettings
 from service.settings.sources.modbus import ModbusLinkSettings
 from service.settings.sources.register_map import load_map_file
+from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings
 
 app = command_group("Read a device once and print its data; nothing is stored.")
@@ -108,7 +110,7 @@ def map_(
 ) -> None:
     """Read a register map once; print each value with its unit, raw registers and status flags."""
     if at is None:
-        settings = one_unit(load_plant_file(file), unit, file)
+        settings = one_unit(_plant(file), unit, file)
         device = _mapped_device(settings, slow)
         units = {channel.id: MEASURAND_UNITS[channel.measurand] for channel in settings.channel}
         units |= {channel.id: channel.unit for channel in settings.slow_channel}
@@ -190,6 +192,16 @@ def _place(
             f"invalid device {device}: {key}: {what['msg']}; use HOST[:PORT] or /dev/… of a port",
             code=2,
         )
+
+
+def _plant(file: Path) -> PlantFile:
+    try:
+        return load_plant_file(file)
+    except TomlFileError:
+        with suppress(TomlFileError):
+            load_map_file(file)
+            fail(f"{file} is a register map; name its device with --at", code=2)
+        raise
 
 
 def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:

@@ -6,6 +6,7 @@ U1 runs at part load; on its way some samples are lost, a probe is doubted by it
 seconds, and the device restarts. U2 runs at full load until the cable of a probe breaks.
 """
 
+import argparse
 import asyncio
 import json
 import shutil
@@ -90,6 +91,7 @@ async def results(folder: Path, unit: UnitSettings, plant: PlantFile) -> list[As
 
 
 def main() -> None:
+    argparse.ArgumentParser(description=__doc__).parse_args()
     plant = load_plant_file(HERE / "plant.toml")
     for unit in plant.unit:
         folder = record(unit)

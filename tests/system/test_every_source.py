@@ -22,8 +22,8 @@ FAST_LINE = "baudrate = 4_000_000\nparity = 'none'"
 
 MIN_SAMPLES = 20
 POLLED_EACH_S = 0.05
-QUEUE_HZ = 50.0
-"""A queue that a busy machine does not empty in time is a lost link."""
+SLOW_HZ = 50.0
+"""A queue that a busy machine does not empty in time is a lost link; polls see as much of it."""
 
 POLLED_UP_TO_HZ = 8.0
 
@@ -89,8 +89,8 @@ def plant_file(
         if found and str(found[id_].get("channel", "")).startswith("socket"):
             source = source.replace("socket://127.0.0.1:0", str(found[id_]["channel"]))
         mine = before.replace('id = "U1"', f'id = "{id_}"')
-        if id_.startswith("FIFO"):
-            mine = mine.replace("rate_hz = 600.0", f"rate_hz = {QUEUE_HZ}")
+        if id_.startswith(("FIFO", "POLLED", "VECTOR")):
+            mine = mine.replace("rate_hz = 600.0", f"rate_hz = {SLOW_HZ}")
         text += "[[unit]]\n" + mine
         text += f"[unit.source]\n{source}\n{after}"
     path = folder / "plant.toml"

@@ -166,7 +166,7 @@ class Gate:
         means = caller.means
         may_be_forged = scope["method"] not in SAFE and means is not Means.KEY
         if may_be_forged and is_foreign(scope, requires_origin=means is not None):
-            detail = "requests from pages of other sites are rejected"
+            detail = "pages of other sites are refused; scripts must send a key, or Origin"
             raise ProblemError(403, "Cross-site request", detail)
         if caller.identity is not None and caller.identity.is_proven:
             name_actor(caller.identity.actor)

@@ -40,6 +40,10 @@ YEAR_NS = 365.25 * DAY_NS
 MAX_PERIOD_RATIO = 2.0
 """Ratio of a reading's nominal period to the time between readings that raises a warning."""
 
+MIN_RATE_YEARS = 1.0 / 12.0
+"""Shortest time of compared readings, in unit-years, for which a rate of alarms is reported: one
+alarm in a shorter time could mean any rate up to hundreds per year."""
+
 
 @dataclass
 class BackTestResult:
@@ -59,7 +63,7 @@ class BackTestResult:
     def report(self, file: str, n_rows: int, duration_s: float) -> BackTestReport:
         """Return the report; the back-test of `n_rows` rows of `file` took `duration_s` seconds."""
         n_alarms, n_danger = len(self.alarms), sum(a.level == "danger" for a in self.alarms)
-        per_year = n_alarms / self.unit_years if self.unit_years else None
+        per_year = n_alarms / self.unit_years if self.unit_years >= MIN_RATE_YEARS else None
         return BackTestReport(
             file=file,
             rows=n_rows,

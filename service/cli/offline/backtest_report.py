@@ -143,7 +143,10 @@ class FilmReport(_Part):
 
 
 class RateReport(_Part):
-    """Rate of alarms, null without compared readings; on a healthy plant the false-alarm rate."""
+    """Rate of alarms; on a healthy plant the false-alarm rate.
+
+    It is null if readings were compared for less than a unit-month.
+    """
 
     unit_years: float
     """From the end of learning to the end of readings, all units together."""

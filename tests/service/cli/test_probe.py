@@ -215,6 +215,7 @@ async def test_the_map_of_a_plants_rack_is_read_with_units(probe, tmp_path):
         for n, id_ in enumerate(ids)
     )
     (tmp_path / "map.toml").write_text(f'{values}[[value]]\nchannel = "speed"\naddress = 500\n')
+    alone = await probe("map", str(tmp_path / "map.toml"))
     registers = load_map_file(tmp_path / "map.toml").register_map()
     device = MapDevice(
         SlowFeed((92.0,)),
@@ -244,6 +245,7 @@ async def test_the_map_of_a_plants_rack_is_read_with_units(probe, tmp_path):
     assert found["tjb_bearing_y.order1_amplitude"]["unit"] == "mm/s pk"
     assert found["speed"]["unit"] == "r/min"
     assert len(table.stdout.splitlines()) == 13
-    assert other.exit_code == none.exit_code == 2
+    assert alone.exit_code == other.exit_code == none.exit_code == 2
+    assert "map.toml is a register map; name its device with --at" in alone.stderr
     assert "source of unit U2 has no register map" in other.stderr
     assert "slow_source of unit U1 has no register map" in none.stderr

@@ -234,7 +234,7 @@ def test_a_report_is_one_json_document(readings):
         "unit_years": pytest.approx(2 / 365.25, rel=0.01),
         "n_alarms": 0,
         "n_danger": 0,
-        "alarms_per_unit_year": 0.0,
+        "alarms_per_unit_year": None,
     }
     assert report["doubts"] == ["U1 UJB: no attitude_deg, so its baseline does not use it"]
     assert report["readings_per_s"] > 0.0

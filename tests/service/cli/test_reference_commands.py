@@ -185,7 +185,9 @@ def test_a_restored_backup_can_be_said_to_be_known(plant_path, database):
         audit("verify", plant_path, f"--known=padwatch:{number}"),
     )
     assert (unknown.exit_code, known.exit_code) == (1, 0)
-    assert audit("verify", plant_path, f"--known=access:{number}").exit_code == 1
+    other = audit("verify", plant_path, f"--known=access:{number}")
+    assert other.exit_code == 2
+    assert f"--known access:{number}: no such entry reports a restored backup" in other.stderr
     assert f"entry {number} reports that the head file did not match" in unknown.stdout
 
 

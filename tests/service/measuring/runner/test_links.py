@@ -57,7 +57,10 @@ async def test_a_unit_without_link_says_why_and_since_when(plant, scripted, bloc
 
 
 async def test_a_device_that_cannot_fit_is_tried_much_more_seldom(plant, scripted, block):
-    wrong = [[ConfigError("block ring: n_channels is 8, expected 12")] for _ in range(3)]
+    wrong = [
+        [ConfigError("block ring: n_channels of the device is 8, of the plant file 12")]
+        for _ in range(3)
+    ]
     source = scripted(*wrong, [block(0)], ends=False)
 
     await run_until(plant, source.exhausted, U1=source)
