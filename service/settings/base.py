@@ -50,7 +50,11 @@ class Settings(BaseModel):
     """Base class of all settings: frozen; unknown keys, NaN and infinity are errors."""
 
     model_config = ConfigDict(
-        frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
+        defer_build=True,  # most models are only part of another, which contains their validators
     )
 
     @field_validator("*")

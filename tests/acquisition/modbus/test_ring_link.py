@@ -42,8 +42,11 @@ async def test_a_device_that_stands_still_or_counts_but_writes_nothing_is_not_co
     ("expected", "complaint"),
     [
         ({"n_channels": 4}, "n_channels of the device is 3, of the plant file 4"),
-        ({"n_channels": 3, "rate_hz": 500.0}, "rate in mHz is 600000, expected 500000"),
-        ({"n_channels": 3, "n_slow": 3}, "n_slow is 2, expected 3"),
+        (
+            {"n_channels": 3, "rate_hz": 500.0},
+            "rate in mHz of the device is 600000, of the plant file 500000",
+        ),
+        ({"n_channels": 3, "n_slow": 3}, "n_slow of the device is 2, of the plant file 3"),
     ],
 )
 async def test_another_device_than_configured_is_refused_with_found_and_expected(
