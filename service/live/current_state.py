@@ -9,6 +9,7 @@ from typing import Any
 import structlog
 
 from acquisition.clock import Clock
+from acquisition.delivery.arrival import LeastDelay
 from core.alarms.alarm import PLANT
 from core.baseline.baseline import BearingBaseline
 from core.change.film_judge import FilmNews
@@ -104,7 +105,7 @@ class LiveUnits:
         self, units: Iterable[str], clock: Clock, stale_after_s: float, ask: Ask | None = None
     ) -> None:
         self._clock, self._stale_after_s, self._ask = clock, stale_after_s, ask
-        self._delays = ReportDelays()
+        self._delays: dict[str, LeastDelay] = {}
         self._latest = dict.fromkeys((*units, PLANT, SHARED), LatestReport())
         self._revisions = dict.fromkeys(self._latest, 0)
         self._seen: dict[str, object] = {}
@@ -153,7 +154,7 @@ class LiveUnits:
         if latest.beat == beat:
             return
         now_s = self._clock.monotonic_s()
-        delay_s = self._delays.delay_s(process, link.said_s, now_s)
+        delay_s = self._delay_s(process, link.said_s, now_s)
         is_first = latest.beat is None or latest.beat[0] != process
         sent_s = None if is_first and not is_direct else now_s - delay_s
         status, received_ns = link.status, latest.received_ns
@@ -171,6 +172,17 @@ class LiveUnits:
         self._latest[unit] = replace(
             latest, beat=beat, sent_s=sent_s, link=link, status=status, received_ns=received_ns
         )
+
+    def _delay_s(self, process: str, said_s: float | None, now_s: float) -> float:
+        """Return the delay of a report, s, relative to the fastest report of the same process.
+
+        The offset of the two monotonic clocks is constant. The common delay of all reports is
+        unobservable; reading the database twice a second keeps it below half a second.
+        """
+        if said_s is None:
+            return 0.0
+        delay = self._delays.setdefault(process, LeastDelay(MAX_DRIFT))
+        return max(0.0, delay.late_s(now_s - said_s, now_s))
 
     def set_results(self, unit: str, results: Mapping[str, BearingSnapshot]) -> None:
         """Set the newest results of a unit, by bearing id."""
@@ -293,31 +305,6 @@ class LiveUnits:
 
     def _why_not_current(self, unit: str, age_s: float | None) -> Reason | None:
         return why_not_current(self.status(unit).state, age_s, self._stale_after_s)
-
-
-class ReportDelays:
-    """Estimator of the delays of reports relative to the fastest report of the same process.
-
-    The offset of two monotonic clocks is constant. The common delay of all reports is unobservable;
-    reading the database twice a second keeps it below half a second.
-    """
-
-    def __init__(self) -> None:
-        self._fastest: dict[str, tuple[float, float]] = {}
-
-    def delay_s(self, process: str, sent_s: float | None, received_s: float) -> float:
-        """Return the delay of a report relative to the fastest report of the process, s.
-
-        `sent_s` is the send time by the monotonic clock of the reporting process, s, None if not
-        reported; `received_s` is the arrival time by the monotonic clock of this process, s.
-        """
-        if sent_s is None:
-            return 0.0
-        offset_s = received_s - sent_s
-        fastest_s, since_s = self._fastest.get(process, (offset_s, received_s))
-        fastest_s = min(offset_s, fastest_s + MAX_DRIFT * (received_s - since_s))
-        self._fastest[process] = (fastest_s, received_s)
-        return offset_s - fastest_s
 
 
 Key = tuple[str, str]
