@@ -16,8 +16,9 @@ from service.app.process import Host, Supervision
 from service.app.service_audit import ServiceTrail
 from service.app.serving_process import access_desk, context_of, serve_requests
 from service.app.storage import open_access, open_store
-from service.cluster.serving_side import DatabaseOperators, Feed, replica_receivers
+from service.cluster.serving_side import DatabaseSender, Feed, replica_receivers
 from service.live.client import LiveClient
+from service.live.commands import Operators
 from service.live.metrics import add_plant
 from service.live.receivers import ReceiverView
 from service.notifications.metrics import add_deliveries
@@ -78,7 +79,8 @@ class Replica:
 
     def context(self, desk: Authenticator, beats: Heartbeats) -> Context:
         """Return the API context of this process."""
-        operators = DatabaseOperators(self._store, self.live.alarms, self._clock)
+        sender = DatabaseSender(self._store, self._clock)
+        operators = Operators(sender.send, self._store, self.live.alarms)
         return context_of(
             *(self._plant, self._store, self.live, operators, self._clock),
             access=desk,

@@ -29,15 +29,9 @@ from service.app.storage import (
     recordings_folder,
 )
 from service.dashboard.assets import StaticFiles, compress_all, edition
-from service.live.client import LiveClient, SocketOperators
+from service.live.client import LiveClient
 from service.live.commands import Operators
-from service.live.exchange import (
-    MeasuringGoneError,
-    ServingEnd,
-    Start,
-    VersionError,
-    read_start,
-)
+from service.live.exchange import MeasuringGoneError, ServingEnd, Start, VersionError, read_start
 from service.live.metrics import add_plant
 from service.live.receivers import with_backlogs
 from service.live.references import ReferencesInForce
@@ -180,12 +174,7 @@ async def serve_requests(
 
 
 def context_of(
-    plant: PlantFile,
-    store: Store,
-    live: LiveClient,
-    operators: Operators,
-    clock: Clock,
-    **own: Any,
+    plant: PlantFile, store: Store, live: LiveClient, operators: Operators, clock: Clock, **own: Any
 ) -> Context:
     """Return the context of the API; `own` are the fields that differ between the processes."""
     return Context(
@@ -235,18 +224,19 @@ async def serve_beside(
         closing(open_store(plant, start.origin, only_reads=True)) as store,
         closing(open_access(plant, start.origin)) as access,
     ):
-        live = LiveClient(plant, store.films, clock, lambda *question: exchange.ask(*question))
+        exchange = ServingEnd(writer)
+        live = LiveClient(plant, store.films, clock, exchange.ask)
         live.alarms.take_stored(await asyncio.to_thread(store.alarms))
-        operators = SocketOperators(store, live.alarms)
+        operators = Operators(exchange.send, store, live.alarms)
         informed = asyncio.Event()
 
         async def take(report: Report) -> None:
             await live.take(report, is_direct=True)
             informed.set()
 
-        exchange = operators.exchange = ServingEnd(writer, take)
-        listening = asyncio.create_task(exchange.run(reader), name="reports")
+        listening = asyncio.create_task(exchange.run(reader, take), name="reports")
         listening.add_done_callback(lambda _: stopped.set())
+        listening.add_done_callback(lambda _: informed.set())
 
         async def metrics() -> bytes:
             try:
@@ -269,9 +259,7 @@ async def serve_beside(
             metrics=metrics,
             recordings=(evidence_folders(plant).captures, recordings_folder(plant)),
         )
-        waiting = asyncio.ensure_future(informed.wait())
-        await asyncio.wait([listening, waiting], return_when=asyncio.FIRST_COMPLETED)
-        waiting.cancel()
+        await informed.wait()
         report = partial(report_access, access, exchange)
         loops = {"access": partial(periodic, report, ACCESS_EVERY_S, clock)}
         evidence = evidence_of(plant, context)

@@ -9,9 +9,8 @@ import structlog
 
 from acquisition.clock import Clock
 from core.units import ns_from_s
-from service.live.alarm_list import LiveAlarms
 from service.live.client import LiveClient
-from service.live.commands import OperatorCommand, Operators, encoded
+from service.live.commands import OperatorCommand, encoded
 from service.live.receivers import (
     ReceiverView,
     SenderState,
@@ -118,12 +117,11 @@ of the two hosts may differ by a few seconds."""
 POLL_EVERY_S = 0.1
 
 
-class DatabaseOperators(Operators):
+class DatabaseSender:
     """Sender of operators' commands through the database to the process that analyses the unit."""
 
-    def __init__(self, store: Store, alarms: LiveAlarms, clock: Clock) -> None:
-        super().__init__(store, alarms)
-        self._clock = clock
+    def __init__(self, store: Store, clock: Clock) -> None:
+        self._store, self._clock = store, clock
 
     async def send(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
         """Store a command and return its answer; withdraw it if no answer arrives in `WAIT_S`.

@@ -1,19 +1,15 @@
-"""`LiveClient`: present state of the plant in the serving process, and operators' commands."""
+"""`LiveClient`: present state of the plant in the serving process."""
 
 from dataclasses import replace
 
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from service.live.alarm_list import LiveAlarms
-from service.live.commands import CommandFailedError, OperatorCommand, Operators, encoded
 from service.live.current_state import Ask, LiveFilms, LiveUnits
-from service.live.exchange import MeasuringGoneError, ServingEnd
 from service.live.snapshot import PlantSnapshot, Report
 from service.settings.core_values import chatter_rule_of, stale_after_s
 from service.settings.plant import PlantFile
-from service.store.access.audit_entries import acting
 from service.store.films import FilmStore
-from service.store.sharing import Answer
 
 
 class LiveClient:
@@ -64,21 +60,3 @@ class LiveClient:
             )
         if report.plant is not None:
             self._plant = report.plant
-
-
-class SocketOperators(Operators):
-    """Sender of operators' commands over the socket to the measuring process."""
-
-    exchange: ServingEnd
-
-    async def send(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
-        """Send a command of the user `actor` about a unit; return the answer.
-
-        Raises `CommandFailedError` if there is no answer.
-        """
-        try:
-            answer: Answer = await self.exchange.ask(*encoded(command), actor, acting().peer)
-        except MeasuringGoneError as error:
-            detail = f"unit {unit}: {error}; check whether the command was carried out"
-            raise CommandFailedError("No answer", detail) from error
-        return answer

@@ -1,7 +1,7 @@
 """Commands of operators from the serving to the measuring process, and their sending."""
 
 import asyncio
-from abc import ABC, abstractmethod
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from importlib.metadata import version as version_of
 from typing import Any, TypeAlias, get_args
@@ -170,23 +170,20 @@ class CommandFailedError(Exception):
         self.title = title
 
 
-class Operators(ABC):
-    """Sender of operators' commands to the process that analyses the unit.
+Send = Callable[[str, OperatorCommand, str], Awaitable[Answer]]
+"""Coroutine function that sends a command about a unit to the process that analyses the unit. Its
+arguments are the unit, the command and the user. It returns the answer, which states whether the
+result is stored, and raises `CommandFailedError` if no process answers."""
+
+
+class Operators:
+    """Sender of operators' commands to the process that analyses the unit, by the function `send`.
 
     Stored alarms and references are read from `store` after a command, and `alarms` are updated.
     """
 
-    def __init__(self, store: Store, alarms: LiveAlarms) -> None:
-        self._store, self._alarms = store, alarms
-
-    @abstractmethod
-    async def send(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
-        """Send a command of the user `actor` about a unit; return the answer.
-
-        The answer states whether the result is stored.
-
-        Raises `CommandFailedError` if no process answers.
-        """
+    def __init__(self, send: Send, store: Store, alarms: LiveAlarms) -> None:
+        self._send, self._store, self._alarms = send, store, alarms
 
     async def operate(self, id_: str, action: Action) -> Alarm:
         """Apply an operator's action to the alarm with the id `id_`; return the stored alarm.
@@ -246,7 +243,7 @@ class Operators(ABC):
         refusal: type[Exception] | None = None,
     ) -> None:
         """Send a command, and raise an error if it failed: `refusal` if the command is refused."""
-        answer = await self.send(unit, command, actor)
+        answer = await self._send(unit, command, actor)
         if answer.state is CommandState.UNKNOWN:
             raise LookupError(answer.words)
         if answer.state is CommandState.REFUSED and refusal is not None:

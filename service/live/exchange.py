@@ -16,8 +16,11 @@ from typing import Any
 import structlog
 from pydantic import TypeAdapter, ValidationError
 
+from service.live.commands import CommandFailedError, OperatorCommand, encoded
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
+from service.store.access.audit_entries import acting
+from service.store.sharing import Answer
 
 log = structlog.get_logger()
 
@@ -206,27 +209,27 @@ class MeasuringEnd:
 
 
 class ServingEnd:
-    """Serving process's end of the socket, which receives reports and asks questions.
+    """Serving process's end of the socket, which receives reports and asks questions."""
 
-    `take` receives each report of the measuring process.
-    """
-
-    def __init__(
-        self, writer: asyncio.StreamWriter, take: Callable[[Any], Awaitable[None]]
-    ) -> None:
-        self._writer, self._take = writer, take
+    def __init__(self, writer: asyncio.StreamWriter) -> None:
+        self._writer = writer
         self._waiting: dict[int, asyncio.Future[Any]] = {}
         self._n_asked = 0
 
-    async def run(self, reader: asyncio.StreamReader) -> None:
-        """Receive reports and answers until the measuring process closes the socket."""
+    async def run(
+        self, reader: asyncio.StreamReader, take: Callable[[Any], Awaitable[None]]
+    ) -> None:
+        """Receive reports and answers until the measuring process closes the socket.
+
+        `take` is called with each report.
+        """
         try:
             while (content := await _read(reader, MAX_REPORT_BYTES)) is not None:
                 message = pickle.loads(content)  # noqa: S301  written by the trusted side
                 if isinstance(message, Reply):
                     self._settle(message)
                 else:
-                    await self._take(message)
+                    await take(message)
         finally:
             for future in (each for each in self._waiting.values() if not each.done()):
                 future.set_exception(MeasuringGoneError("the measuring process has ended"))
@@ -263,3 +266,15 @@ class ServingEnd:
             raise MeasuringGoneError("the measuring process has ended") from error
         finally:
             self._waiting.pop(number, None)
+
+    async def send(self, unit: str, command: OperatorCommand, actor: str) -> Answer:
+        """Send a command of the user `actor` about a unit; return the answer.
+
+        Raises `CommandFailedError` if there is no answer.
+        """
+        try:
+            answer: Answer = await self.ask(*encoded(command), actor, acting().peer)
+        except MeasuringGoneError as error:
+            detail = f"unit {unit}: {error}; check whether the command was carried out"
+            raise CommandFailedError("No answer", detail) from error
+        return answer

@@ -37,9 +37,7 @@ def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
     if opposite is None or not any(opposite_axes(bearing)):
         opposite = bearing.opposite_reference_um
     return replace(
-        bearing,
-        gap_reference_um=reference.gap_reference_um,
-        opposite_reference_um=opposite,
+        bearing, gap_reference_um=reference.gap_reference_um, opposite_reference_um=opposite
     )
 
 

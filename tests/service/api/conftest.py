@@ -29,8 +29,9 @@ from service.api.context import Context
 from service.app.kept_files import captures_of, evidence_of
 from service.app.serving_process import evidence_of as downloads_of
 from service.app.storage import built_configuration, evidence_folders
-from service.live.client import LiveClient, SocketOperators
-from service.live.exchange import Question
+from service.live.client import LiveClient
+from service.live.commands import Operators
+from service.live.exchange import Question, ServingEnd
 from service.live.references import ReferencesInForce
 from service.live.snapshot import PlantSnapshot
 from service.live.status import LinkState
@@ -141,7 +142,7 @@ class Service:
 Serve = Callable[[PlantFile, Path], Service]
 
 
-class DirectExchange:
+class DirectExchange(ServingEnd):
     """Questions to the measuring side without the socket between two processes."""
 
     def __init__(self, questions: Questions) -> None:
@@ -196,8 +197,7 @@ async def build(plant: PlantFile, store: SqliteStore, access: AccessStore, folde
     exchange = DirectExchange(Questions(executor, live, integrity, no_metrics))
     serving = LiveClient(plant, store.films, clock, exchange.ask)
     serving.alarms.take_stored(store.alarms())
-    operators = SocketOperators(store, serving.alarms)
-    operators.exchange = exchange  # type: ignore[assignment]
+    operators = Operators(exchange.send, store, serving.alarms)
     builder = SnapshotBuilder(plant.unit, live, alarms, films, clock)
     ids = [*(unit.id for unit in plant.unit), PLANT]
 

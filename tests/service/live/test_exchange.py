@@ -40,8 +40,8 @@ async def test_the_first_report_is_whole_and_answers_go_to_those_who_asked():
         taken.append(report)
 
     serving, reader, writer = await connected(lambda is_first: is_first)
-    end = ServingEnd(writer, take)
-    running = asyncio.create_task(end.run(reader))
+    end = ServingEnd(writer)
+    running = asyncio.create_task(end.run(reader, take))
 
     asked = [end.ask("echo", json.dumps(n), "A. Name", "192.0.2.7") for n in range(50)]
 
@@ -59,8 +59,8 @@ async def test_the_first_report_is_whole_and_answers_go_to_those_who_asked():
 async def test_a_question_is_not_left_waiting_when_the_measuring_process_ends():
     ours, theirs = socket.socketpair()
     reader, writer = await asyncio.open_connection(sock=theirs)
-    end = ServingEnd(writer, lambda _: asyncio.sleep(0))
-    running = asyncio.create_task(end.run(reader))
+    end = ServingEnd(writer)
+    running = asyncio.create_task(end.run(reader, lambda _: asyncio.sleep(0)))
     asked = asyncio.create_task(end.ask("echo", "[]"))
     await asyncio.sleep(0)
 

@@ -9,7 +9,7 @@ import pytest
 from harness.waiting import at_work
 
 from core.alarms.operation import Comment
-from service.cluster.serving_side import WAIT_S, DatabaseOperators
+from service.cluster.serving_side import WAIT_S, DatabaseSender
 from service.live.commands import AlarmCommand, UnreadableCommandError, decoded, encoded
 from service.store.port import AlarmQuery
 from service.store.sharing import Answer, Command, CommandState
@@ -44,7 +44,7 @@ async def post(pair: Any, action: str, **body: object) -> httpx2.Response:
 
 def ask_for_a_comment(pair: Any) -> Command:
     """Ask as a replica does, without waiting for an answer."""
-    asking = DatabaseOperators(pair.service.store, pair.replica.live.alarms, pair.service.clock)
+    asking = DatabaseSender(pair.service.store, pair.service.clock)
     command = asking._command("U1", AlarmCommand(LINK, Comment("anna", "seen")), "anna")
     pair.service.store.commands.ask(command)
     return command
@@ -98,7 +98,7 @@ async def test_what_nobody_carries_out_is_said_and_not_carried_out_later(pair):
 
 async def test_a_command_whose_asker_was_killed_is_not_carried_out_late(pair, monkeypatch):
     await raise_alarm(pair)
-    monkeypatch.setattr(DatabaseOperators, "_answer", _killed_in)
+    monkeypatch.setattr(DatabaseSender, "_answer", _killed_in)
     with pytest.raises(KeyboardInterrupt):
         await post(pair, "acknowledge", occurrence=1)
     pair.pass_time(60.0)
@@ -141,7 +141,7 @@ async def test_a_store_that_comes_back_late_is_told_of(pair, monkeypatch):
     await raise_alarm(pair)
     monkeypatch.setattr(pair.service.alarms, "_put", lambda _: None)
     monkeypatch.setattr(pair.service.recorder, "stored", _never)
-    monkeypatch.setattr(DatabaseOperators, "_give_up", _after(pair))
+    monkeypatch.setattr(DatabaseSender, "_give_up", _after(pair))
     monkeypatch.setattr("service.cluster.serving_side.EXPIRES_S", 1e6)  # time only steps here
     async with at_work(pair.carrying_out.run()):
         answer = await post(pair, "acknowledge", occurrence=1)
@@ -152,9 +152,9 @@ async def test_a_store_that_comes_back_late_is_told_of(pair, monkeypatch):
 
 def _after(pair: Any) -> Any:
     """Give up, but not before the command was taken."""
-    give_up = DatabaseOperators._give_up
+    give_up = DatabaseSender._give_up
 
-    def late(self: DatabaseOperators, command: Command, found: Answer) -> Answer:
+    def late(self: DatabaseSender, command: Command, found: Answer) -> Answer:
         while not pair.service.store.commands.open(["U1"])[0].taken_by:
             pass
         return give_up(self, command, found)
