@@ -36,10 +36,7 @@ DRAIN_S = 3.0
 
 
 async def run_acquire(
-    plant: PlantFile,
-    settings: StreamSettings,
-    units: Mapping[str, WatchedUnit],
-    host: Host,
+    plant: PlantFile, settings: StreamSettings, units: Mapping[str, WatchedUnit], host: Host
 ) -> None:
     """Acquire and publish the samples of units until SIGINT or SIGTERM.
 

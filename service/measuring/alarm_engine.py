@@ -103,9 +103,7 @@ class AlarmEngine:
         self._observer = observer
 
     def restore(
-        self,
-        alarms: Iterable[Alarm],
-        memories: Mapping[str, AlarmMemory] = MappingProxyType({}),
+        self, alarms: Iterable[Alarm], memories: Mapping[str, AlarmMemory] = MappingProxyType({})
     ) -> None:
         """Restore stored alarms; call it before the first block.
 

@@ -68,11 +68,7 @@ def in_force(
 
 
 def resume_films(
-    store: FilmStore,
-    unit: str,
-    rules: FilmRules,
-    response: ShaftResponse | None,
-    watch: FilmWatch,
+    store: FilmStore, unit: str, rules: FilmRules, response: ShaftResponse | None, watch: FilmWatch
 ) -> None:
     """Restore the film monitor ``watch`` of a unit from stored readings, decisions and response."""
     places = places_of(unit, rules)

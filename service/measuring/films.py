@@ -16,16 +16,8 @@ from core.change.settings import FilmRules
 from core.limits import Judgement
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
-from service.live.commands import (
-    Accept,
-    BaselineAction,
-    BaselineRefusedError,
-    FilmPlace,
-    Freeze,
-    Reject,
-    Renew,
-    Thaw,
-)
+from service.live import commands
+from service.live.commands import BaselineAction, BaselineRefusedError, FilmPlace
 from service.measuring.baseline_learning import Learner, in_force, places_of, resume_films
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.core_values import film_rules_of
@@ -157,12 +149,8 @@ class FilmMonitor:
         async with self._acting:
             learned = await asyncio.to_thread(self.learner.learn, place, now_ns)
         if learned is not None:
-            log.info(
-                "baseline learned",
-                unit=place.unit,
-                bearing=place.bearing,
-                version=learned.origin.version,
-            )
+            version = learned.origin.version
+            log.info("baseline learned", unit=place.unit, bearing=place.bearing, version=version)
             await self._put_in_force(place)
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
@@ -192,16 +180,16 @@ class FilmMonitor:
         version: int | None = versions.in_force
         from_ns: int | None = None
         match action:
-            case Accept(version):
+            case commands.Accept(version):
                 step = BaselineStep.ACCEPTED
-            case Reject(version):
+            case commands.Reject(version):
                 is_in_force = version == versions.in_force
                 step = BaselineStep.WITHDRAWN if is_in_force else BaselineStep.REJECTED
-            case Freeze():
+            case commands.Freeze():
                 step = BaselineStep.FROZEN
-            case Thaw():
+            case commands.Thaw():
                 step = BaselineStep.THAWED
-            case Renew(from_ns):
+            case commands.Renew(from_ns):
                 step, version = BaselineStep.RENEWED, None
         return StoredStep(place.unit, place.bearing, version, step, now_ns, actor, reason, from_ns)
 
@@ -227,28 +215,30 @@ def _require_possible(
     """
     version, renewed_ns, fault = versions.in_force, versions.renewed_ns, None
     match action:
-        case Accept(wanted) | Reject(wanted) if wanted not in entries:
+        case commands.Accept(wanted) | commands.Reject(wanted) if wanted not in entries:
             fault = f"version {wanted} does not exist; choose a listed version"
-        case Accept(wanted) if wanted == version:
+        case commands.Accept(wanted) if wanted == version:
             fault = f"version {wanted} is already in force"
-        case Accept(wanted) if (estimator := entries[wanted].estimator) is not place.estimator:
+        case commands.Accept(wanted) if (
+            estimator := entries[wanted].estimator
+        ) is not place.estimator:
             fault = (
                 f"version {wanted} was learned with estimator {estimator};"
                 f" the plant file selects {place.estimator}"
             )
-        case Accept(wanted) if entries[wanted].learned_from_ns < (renewed_ns or 0):
+        case commands.Accept(wanted) if entries[wanted].learned_from_ns < (renewed_ns or 0):
             fault = f"version {wanted} is older than the last machine event; accept a later one"
-        case Reject(wanted) if wanted in versions.rejected:
+        case commands.Reject(wanted) if wanted in versions.rejected:
             fault = f"version {wanted} is already rejected"
-        case Freeze() if versions.is_frozen:
+        case commands.Freeze() if versions.is_frozen:
             fault = f"the baseline of {place.bearing} is already frozen"
-        case Freeze() if version is None:
+        case commands.Freeze() if version is None:
             fault = f"{place.bearing} has no baseline in force; accept one"
-        case Thaw() if not versions.is_frozen:
+        case commands.Thaw() if not versions.is_frozen:
             fault = f"the baseline of {place.bearing} is not frozen"
-        case Renew(from_ns) if from_ns > now_ns:
+        case commands.Renew(from_ns) if from_ns > now_ns:
             fault = "the time of a machine event must not be in the future"
-        case Renew(from_ns) if from_ns < (renewed_ns or 0):
+        case commands.Renew(from_ns) if from_ns < (renewed_ns or 0):
             fault = "a later machine event exists; enter a time after it"
     if fault is not None:
         raise BaselineRefusedError(fault)
