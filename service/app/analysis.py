@@ -31,7 +31,7 @@ from service.measuring.films import film_monitor
 from service.measuring.integrity import IntegrityMonitor
 from service.measuring.live_view import LiveView
 from service.measuring.metrics import add_disks, add_integrity, add_samples, add_store
-from service.measuring.recorder import FILE, ParkedRows, Recorder
+from service.measuring.recorder import Recorder
 from service.measuring.service_alarms import ServiceHealth
 from service.measuring.snapshots import SnapshotBuilder
 from service.notifications.message import LiveContext
@@ -123,7 +123,7 @@ class Analysis:
             store,
             process.live,
             clock,
-            ParkedRows(Path(plant.service.data_folder) / FILE),
+            Path(plant.service.data_folder),
             on_stored=self.deliveries.wake,
             finds_again=part != WHOLE,
         )

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -34,32 +34,27 @@ MAX_BYTES = 16_000_000
 """Size in bytes above which a new file is begun; only one predecessor is kept."""
 
 
-class ParkedRows:
-    """JSON Lines file of the rows that the database refused, with reasons; private to its owner."""
+def park_rows(path: Path, time_ns: int, refused: Iterable[tuple[object, str]]) -> None:
+    """Append pairs of refused row and reason to a JSON Lines file, private to its owner; sync it.
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def add(self, time_ns: int, refused: Iterable[tuple[object, str]]) -> None:
-        """Append pairs of refused row and reason for ``time_ns``, ns since 1970 UTC; sync the file.
-
-        Raises `OSError` if the file cannot be written.
-        """
-        lines = [
-            json.dumps(
-                {"time_ns": time_ns, "reason": reason, "kind": type(row).__name__, "row": row},
-                default=_plain,
-                skipkeys=True,
-            )
-            for row, reason in refused
-        ]
-        if self.path.exists() and self.path.stat().st_size > MAX_BYTES:
-            self.path.replace(self.path.with_name(self.path.name + ".1"))
-        descriptor = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
-        with os.fdopen(descriptor, "a", encoding="ascii") as file:
-            file.write("".join(f"{line}\n" for line in lines))
-            file.flush()
-            os.fsync(file.fileno())
+    `time_ns` is the time of the refusal, ns since 1970 UTC. Raises `OSError` if the file cannot be
+    written.
+    """
+    lines = [
+        json.dumps(
+            {"time_ns": time_ns, "reason": reason, "kind": type(row).__name__, "row": row},
+            default=_plain,
+            skipkeys=True,
+        )
+        for row, reason in refused
+    ]
+    if path.exists() and path.stat().st_size > MAX_BYTES:
+        path.replace(path.with_name(path.name + ".1"))
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+    with os.fdopen(descriptor, "a", encoding="ascii") as file:
+        file.write("".join(f"{line}\n" for line in lines))
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def _plain(value: Any) -> Any:
@@ -126,6 +121,7 @@ COMMITS = Histogram(
 """A commit waits for the disk, and up to five seconds for the lock of the database."""
 
 
+@dataclass(eq=False)
 class Recorder:
     """Queue of findings that a thread writes to the store; a slow disk does not delay samples.
 
@@ -133,8 +129,8 @@ class Recorder:
 
     Parameters
     ----------
-    parked
-        File of refused rows.
+    folder
+        Folder of the file of refused rows.
     capacity
         Maximum number of queued findings; above it the oldest are dropped and counted in
         :attr:`LiveView.n_unstored`. Changes of alarms have a separate queue of `MAX_NEWS`.
@@ -144,20 +140,15 @@ class Recorder:
         Whether the next start reproduces unwritten findings from the stream of blocks.
     """
 
-    def __init__(
-        self,
-        store: Store,
-        live: LiveView,
-        clock: Clock,
-        parked: ParkedRows,
-        capacity: int = 5000,
-        on_stored: Callable[[], None] = lambda: None,
-        *,
-        finds_again: bool = False,
-    ) -> None:
-        self._store, self._live, self._clock, self._parked = store, live, clock, parked
-        self._capacity, self._on_stored = capacity, on_stored
-        self._finds_again = finds_again
+    store: Store
+    live: LiveView
+    clock: Clock
+    folder: Path
+    capacity: int = 5000
+    on_stored: Callable[[], None] = lambda: None
+    finds_again: bool = field(default=False, kw_only=True)
+
+    def __post_init__(self) -> None:
         self._waiting: deque[Findings] = deque()
         self._alarms: deque[AlarmNews] = deque()
         self._n_writing = 0
@@ -178,19 +169,19 @@ class Recorder:
         """Time for which findings have waited without a successful write, s; 0 if none wait."""
         if not (self._waiting or self._alarms):
             return 0.0
-        return self._clock.monotonic_s() - self._waits_since_s
+        return self.clock.monotonic_s() - self._waits_since_s
 
     def put(self, findings: Findings) -> None:
         """Queue findings for writing."""
         if not (self._waiting or self._alarms):
-            self._waits_since_s = self._clock.monotonic_s()
+            self._waits_since_s = self.clock.monotonic_s()
         if findings.assessments or findings.gaps or findings.films or findings.position:
             self._waiting.append(replace(findings, alarms=()))
         self._drop_oldest()
         self._alarms += findings.alarms
         while len(self._alarms) > MAX_NEWS:
             self._resolve(self._alarms.popleft(), "the queue to the store is full")
-            self._live.note_unstored(1, GIVEN_UP)
+            self.live.note_unstored(1, GIVEN_UP)
         self._news.set()
 
     async def stored(self) -> None:
@@ -219,13 +210,13 @@ class Recorder:
         Raises `StoreError` if nothing can be written now.
         """
         loop = asyncio.get_running_loop()
-        await loop.run_in_executor(self._thread, self._store.append, [], [])
+        await loop.run_in_executor(self._thread, self.store.append, [], [])
 
     async def settled(self) -> None:
         """Wait until all queued findings are written, or until the store refuses writes."""
         async with self._progress:
             await self._progress.wait_for(
-                lambda: self._live.store_error or not (self._waiting or self._alarms)
+                lambda: self.live.store_error or not (self._waiting or self._alarms)
             )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
@@ -237,22 +228,22 @@ class Recorder:
             while self._waiting or self._alarms:
                 pulse.beat(RETRY_S)
                 if not await self._write():
-                    await self._clock.sleep(RETRY_S)
+                    await self.clock.sleep(RETRY_S)
 
     async def flush(self) -> None:
         """Try once to write all queued findings, at the end of the process."""
         if (self._waiting or self._alarms) and not await self._write():
             counts = {"n_findings": len(self._waiting), "n_alarm_news": len(self._alarms)}
-            if self._finds_again:
+            if self.finds_again:
                 log.warning("results are not stored; the next start repeats them", **counts)
             else:
                 log.error("results are lost: the process ends before they are stored", **counts)
 
     def _drop_oldest(self) -> None:
         """Drop the oldest findings above the capacity, except those being written."""
-        while len(self._waiting) > self._capacity + self._n_writing:
+        while len(self._waiting) > self.capacity + self._n_writing:
             del self._waiting[self._n_writing]
-            self._live.note_unstored(1, GIVEN_UP)
+            self.live.note_unstored(1, GIVEN_UP)
 
     async def _write(self) -> bool:
         batch, alarms = list(self._waiting), list(self._alarms)
@@ -261,51 +252,52 @@ class Recorder:
         try:
             refused = await asyncio.get_running_loop().run_in_executor(self._thread, append)
         except StoreError as error:
-            if self._live.store_error is None:
+            if self.live.store_error is None:
                 log.error("results are not being stored", reason=str(error))
-            self._live.store_error = str(error)
+            self.live.store_error = str(error)
             self._n_writing = 0
             self._drop_oldest()
             await self._notify()
             return False
-        if self._live.store_error is not None:
+        if self.live.store_error is not None:
             log.info("results are being stored again")
-        self._live.store_error = None
-        self._waits_since_s = self._clock.monotonic_s()
+        self.live.store_error = None
+        self._waits_since_s = self.clock.monotonic_s()
         if refused:
-            reason = f"{refused[-1][1]} (parked in {self._parked.path.name})"
-            self._live.note_unstored(len(refused), reason)
+            reason = f"{refused[-1][1]} (parked in {FILE})"
+            self.live.note_unstored(len(refused), reason)
             log.error("the database refused results", n_parked=len(refused), reason=reason)
         self._n_writing = 0
         for findings in batch:
-            self._live.note_stored(findings.assessments, findings.gaps)
+            self.live.note_stored(findings.assessments, findings.gaps)
         _drop(self._waiting, batch)
         _drop(self._alarms, alarms)
         reasons = {id(row): reason for row, reason in refused}
         for news in alarms:
             self._resolve(news, reasons.get(id(news)))
         if alarms:
-            self._on_stored()
+            self.on_stored()
         await self._notify()
         return True
 
     def _append(self, batch: Iterable[Findings]) -> list[tuple[object, str]]:
         """Store findings; write refused rows to the file, and return pairs of row and reason."""
         refused: list[tuple[object, str]] = []
-        began_s = self._clock.monotonic_s()
+        began_s = self.clock.monotonic_s()
         self._append_parts([part for findings in batch for part in findings.parts], refused)
-        COMMITS.observe(self._clock.monotonic_s() - began_s)
+        COMMITS.observe(self.clock.monotonic_s() - began_s)
         if refused:
+            path = self.folder / FILE
             try:
-                self._parked.add(self._clock.now_ns(), refused)
+                park_rows(path, self.clock.now_ns(), refused)
             except OSError as error:
-                raise StoreError(f"cannot write {self._parked.path}: {error}") from error
+                raise StoreError(f"cannot write {path}: {error}") from error
         return refused
 
     def _append_parts(self, parts: Sequence[Findings], refused: list[tuple[object, str]]) -> None:
         """Store parts in one transaction; if the transaction is refused, store each half."""
         try:
-            self._store.append(
+            self.store.append(
                 [row for part in parts for row in part.assessments],
                 [row for part in parts for row in part.gaps],
                 [row for part in parts for row in part.alarms],
@@ -318,12 +310,12 @@ class Recorder:
                 self._append_parts(parts[:middle], refused)
                 self._append_parts(parts[middle:], refused)
                 return
-            self._store.append([], [])  # raises if the store refuses every write
+            self.store.append([], [])  # raises if the store refuses every write
             refused.append((parts[0].row, str(error)))
             found = parts[0].assessments
             if any(assessment.spectrum.frequency_hz.size for assessment in found):
                 with suppress(RefusedRowError):  # the spectrum may be the refused part
-                    self._store.append([replace(a, spectrum=NO_SPECTRUM) for a in found], [])
+                    self.store.append([replace(a, spectrum=NO_SPECTRUM) for a in found], [])
 
     def _resolve(self, news: AlarmNews, refusal: str | None) -> None:
         """Resolve the future of a change of an alarm; `refusal` is None if it was stored."""

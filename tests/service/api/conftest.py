@@ -40,7 +40,7 @@ from service.measuring.commands import CommandExecutor, Questions
 from service.measuring.films import FilmMonitor, film_monitor
 from service.measuring.integrity import IntegrityMonitor
 from service.measuring.live_view import LiveView
-from service.measuring.recorder import FILE, ParkedRows, Recorder
+from service.measuring.recorder import Recorder
 from service.measuring.simulated_sources import simulated_feed
 from service.measuring.snapshots import SnapshotBuilder, SocketReports
 from service.notifications.sender import Deliveries
@@ -181,7 +181,7 @@ async def build(plant: PlantFile, store: SqliteStore, access: AccessStore, folde
     analysis = analysis_of(plant.analysis)
     monitors = {unit.id: UnitMonitor(machine_of(unit), analysis) for unit in plant.unit}
     references = ReferencesInForce([monitor.unit for monitor in monitors.values()], store, clock)
-    recorder = Recorder(store, live, clock, ParkedRows(folder / FILE))
+    recorder = Recorder(store, live, clock, folder)
     alarms = await alarm_engine(plant, Origin.LIVE, store, recorder.put, clock)
     captures = captures_of(plant, Origin.REPLAY, clock)
     machines = {unit: monitor.unit for unit, monitor in monitors.items()}

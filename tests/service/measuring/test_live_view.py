@@ -37,4 +37,3 @@ def test_samples_age_from_when_the_device_had_them_and_not_from_their_analysis(l
     live.set_received(BLOCK, SampleAccount(), stepped_clock.monotonic_s() - 31.0)
 
     assert live.data_age_s("U1") == pytest.approx(31.0)
-    assert live.status("U1").received_s == stepped_clock.monotonic_s() - 31.0

@@ -38,7 +38,7 @@ from core.limits import AlarmLevel, Judgement, unknown
 from core.quality import GOOD, Reason, bad
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.live_view import LiveView
-from service.measuring.recorder import FILE, Findings, ParkedRows, Recorder
+from service.measuring.recorder import Findings, Recorder
 from service.store.port import AlarmQuery
 from service.store.sqlite import SqliteStore
 
@@ -96,9 +96,7 @@ class Life:
         self.store = SqliteStore(self.path)
         self.uncertain = self.tools.uncertain(self.store)
         live = LiveView(["U1"], self.host, 30.0)
-        self.recorder = Recorder(
-            self.uncertain, live, self.host, ParkedRows(self.path.with_name(FILE))
-        )
+        self.recorder = Recorder(self.uncertain, live, self.host, self.path.parent)
         units = {"U1": UnitAlarms(self.tools.unit, self.rules)}
         self.engine = AlarmEngine(units, self.recorder.put, self.host)
         self.engine.restore(self.store.alarms())

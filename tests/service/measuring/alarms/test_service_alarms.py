@@ -17,7 +17,7 @@ from core.samples.gaps import SampleAccount
 from service.cluster.silent_units import SILENT_AFTER_S, SilentUnits
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.live_view import LiveView
-from service.measuring.recorder import FILE, Findings, ParkedRows, Recorder
+from service.measuring.recorder import Findings, Recorder
 from service.measuring.service_alarms import (
     ServiceAlarms,
     ServiceHealth,
@@ -174,7 +174,7 @@ def stored(database, host, tools) -> Callable[[], tuple[Any, Any, Any]]:
         store = SqliteStore(path)
         uncertain = tools.uncertain(store)
         live = LiveView([], host, 30.0)
-        recorder = Recorder(uncertain, live, host, ParkedRows(path.with_name(FILE)))
+        recorder = Recorder(uncertain, live, host, path.parent)
 
         def look() -> ServiceHealth:
             return ServiceHealth(store_error=live.store_error, store_behind_s=recorder.behind_s)
@@ -263,7 +263,7 @@ async def test_alarms_of_a_unit_that_is_gone_stay_until_somebody_has_seen_them(s
 
 REPORT = UnitRow("U1", 1, 0, "connected", None, None, "signs", 1, b"state")
 GONE = identity_of("U2").id
-NOWHERE = ParkedRows(Path("nowhere"))
+NOWHERE = Path("nowhere")
 
 
 class Process:

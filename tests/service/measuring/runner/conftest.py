@@ -28,7 +28,7 @@ from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.analyser import BUS_CAPACITY, Analyser, Runner
 from service.measuring.films import FilmMonitor
 from service.measuring.live_view import LiveView
-from service.measuring.recorder import FILE, ParkedRows, Recorder
+from service.measuring.recorder import Recorder
 from service.measuring.sources import WatchedUnit
 from service.recordings.around_alarms import Captures, CaptureSettings
 from service.recordings.segment import MakeWriter
@@ -155,9 +155,7 @@ class Plant:
         self.clock = RecordingClock()
         self.store = SqliteStore(path)
         self.live = LiveView(["U1", "U2"], self.clock, 30.0)
-        self.recorder = Recorder(
-            self.store, self.live, self.clock, ParkedRows(path.with_name(FILE)), capacity
-        )
+        self.recorder = Recorder(self.store, self.live, self.clock, path.parent, capacity)
         self.capture_folder = path.parent / "captures"
         units = {name: unit_named(name) for name in ("U1", "U2")}
         self.films = FilmMonitor(

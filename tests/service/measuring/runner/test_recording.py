@@ -27,7 +27,6 @@ from service.measuring.recorder import (
     FILE,
     Findings,
     NotStoredError,
-    ParkedRows,
     Recorder,
 )
 from service.store.access.audit_entries import ActedNews
@@ -115,8 +114,7 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
     ],
 )
 async def test_only_results_that_nobody_finds_again_are_said_to_be_lost(plant, finds_again, said):
-    parked = ParkedRows(plant.path.with_name(FILE))
-    parts = (plant.store, plant.live, plant.clock, parked)
+    parts = (plant.store, plant.live, plant.clock, plant.path.parent)
     recorder = Recorder(*parts, finds_again=finds_again)
     break_store(plant)
     recorder.put(Findings([assessment()]))
