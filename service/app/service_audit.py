@@ -23,13 +23,12 @@ STARTED, STOPPED, CHANGED = "service.started", "service.stopped", "configuration
 STEPPED = "clock.stepped"
 
 
-Release = Mapping[str, str]
-"""Version of padwatch, version of the configuration, and origin of the data, by key."""
-
-
-def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[AuditAction]:
+def start_deeds(
+    release: Mapping[str, str], last_start: AuditEntry | None, now_ns: int
+) -> list[AuditAction]:
     """Return the audit entries of a service start; a changed configuration comes first.
 
+    `release` has the versions of padwatch and of the configuration, and the origin of the data;
     `last_start` is the audit entry of the previous start; None for the first start. `now_ns` is the
     host time, ns since 1970 UTC.
     """

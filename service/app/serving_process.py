@@ -20,14 +20,8 @@ from service.api.auth.authenticator import Authenticator
 from service.api.context import Context
 from service.api.problems import ProblemError
 from service.api.server import HttpServer, TrustedProxy, http_server
+from service.app import storage
 from service.app.listener import tls_of
-from service.app.storage import (
-    built_configuration,
-    evidence_folders,
-    open_access,
-    open_store,
-    recordings_folder,
-)
 from service.dashboard.assets import StaticFiles, compress_all, edition
 from service.live.client import LiveClient
 from service.live.commands import Operators
@@ -196,7 +190,7 @@ def context_of(
 
 def evidence_of(plant: PlantFile, context: Context) -> EvidenceService:
     """Return the service for downloads of alarm evidence."""
-    archive = EvidenceArchive(evidence_folders(plant), context.store)
+    archive = EvidenceArchive(storage.evidence_folders(plant), context.store)
     parts = (plant.evidence.trend_days, context.clock, context.downloads)
     return EvidenceService(archive, lambda: context.plant().evidence, *parts)
 
@@ -221,8 +215,8 @@ async def serve_beside(
     """Serve requests until the measuring process, connected by `reader` and `writer`, ends."""
     plant, stopped = start.plant, stop_on_signals()
     with (
-        closing(open_store(plant, start.origin, only_reads=True)) as store,
-        closing(open_access(plant, start.origin)) as access,
+        closing(storage.open_store(plant, start.origin, only_reads=True)) as store,
+        closing(storage.open_access(plant, start.origin)) as access,
     ):
         exchange = ServingEnd(writer)
         live = LiveClient(plant, store.films, clock, exchange.ask)
@@ -254,10 +248,10 @@ async def serve_beside(
             *(plant, store, live, operators, clock),
             access=access_desk(plant, access, clock, start.is_demo),
             origin=start.origin,
-            configuration=built_configuration(plant),
+            configuration=storage.built_configuration(plant),
             receivers=lambda: asyncio.to_thread(with_backlogs, live.plant.receivers, store.outbox),
             metrics=metrics,
-            recordings=(evidence_folders(plant).captures, recordings_folder(plant)),
+            recordings=(storage.evidence_folders(plant).captures, storage.recordings_folder(plant)),
         )
         await informed.wait()
         report = partial(report_access, access, exchange)

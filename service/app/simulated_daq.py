@@ -32,7 +32,6 @@ from service.settings.sources.devices import (
     ModbusSettings,
     ModbusVectorSettings,
     SimulatedSettings,
-    SourceSettings,
 )
 from service.settings.sources.modbus import ModbusLinkSettings
 from service.settings.units import UnitSettings
@@ -229,19 +228,13 @@ class Wire(StrEnum):
 
 
 def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
-    """Return a copy of the plant with a source of kind `wire` for each unit, without addresses."""
-    units = tuple(
-        # the recording of a polled source has the rate of its polls
-        unit.model_copy(update={"source": _source(wire), "rate_hz": unit.sampling_hz})
-        for unit in plant.unit
-    )
-    return plant.model_copy(update={"unit": units})
+    """Return a copy of the plant with a source of kind `wire` for each unit, without addresses.
 
-
-def _source(wire: Wire) -> SourceSettings:
-    """Return source settings for a wire; fast polls do not limit the speed of a replay."""
+    Fast polls do not limit the speed of a replay.
+    """
+    source: CanSettings | ModbusRingSettings
     if wire in (Wire.CAN, Wire.CAN_FD):
-        return CanSettings(
+        source = CanSettings(
             kind="can",
             interface="slcan",
             channel=f"socket://{_LOOPBACK}:0",
@@ -250,7 +243,13 @@ def _source(wire: Wire) -> SourceSettings:
             stale_after_s=STALE_AFTER_S,
             when_full="wait",
         )
-    where = {"host": _LOOPBACK, "port": 0} if wire is Wire.MODBUS_TCP else {"device": "pty"}
-    return ModbusRingSettings(
-        kind="modbus_ring", **where, poll_period_s=0.02, timeout_s=2.0, stale_after_s=STALE_AFTER_S
+    else:
+        where = {"host": _LOOPBACK, "port": 0} if wire is Wire.MODBUS_TCP else {"device": "pty"}
+        times = {"poll_period_s": 0.02, "timeout_s": 2.0, "stale_after_s": STALE_AFTER_S}
+        source = ModbusRingSettings(kind="modbus_ring", **where, **times)
+    units = tuple(
+        # the recording of a polled source has the rate of its polls
+        unit.model_copy(update={"source": source, "rate_hz": unit.sampling_hz})
+        for unit in plant.unit
     )
+    return plant.model_copy(update={"unit": units})

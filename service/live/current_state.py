@@ -165,9 +165,7 @@ class LiveUnits:
             found_ns = {b: sent_ns - ns_from_s(age_s) for b, age_s in ages_s}
             received_ns = {**found_ns, **received_ns}
             if link.data_age_s is not None:
-                arrived_ns = sent_ns - ns_from_s(link.data_age_s)
-                received_s = sent_s - link.data_age_s
-                status = replace(status, received_s=received_s, received_ns=arrived_ns)
+                status = replace(status, received_ns=sent_ns - ns_from_s(link.data_age_s))
         self.n_reports += 1
         self._latest[unit] = replace(
             latest, beat=beat, sent_s=sent_s, link=link, status=status, received_ns=received_ns

@@ -39,8 +39,6 @@ class UnitStatus:
     last_sample_ns
         End of the newest block by the time stamps of its samples, UTC nanoseconds since 1970; None
         before the first block.
-    received_s
-        Arrival time of the newest block by a monotonic clock, s; None before the first block.
     received_ns
         Arrival time of the newest block by the host clock of the serving process, UTC nanoseconds
         since 1970; None in the measuring process, and while the age of the block is unknown.
@@ -58,7 +56,6 @@ class UnitStatus:
     reason: str | None = None
     since_ns: int | None = None
     last_sample_ns: int | None = None
-    received_s: float | None = None
     received_ns: int | None = None
     account: SampleAccount = field(default_factory=SampleAccount)
     clock: DeviceClock | None = None

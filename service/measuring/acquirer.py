@@ -98,9 +98,6 @@ CONFIG_RETRY_S = 15.0
 
 ENDED = "the recording has ended"
 
-Publish = Callable[[SampleBlock], Awaitable[None]]
-"""Coroutine function that receives a block; reading of the source waits until it returns."""
-
 
 @dataclass(frozen=True)
 class Acquirer:
@@ -109,7 +106,7 @@ class Acquirer:
     Parameters
     ----------
     publish
-        Function that receives each block.
+        Coroutine function that receives each block; reading of the source waits until it returns.
     report
         Function that receives each reported link state.
     beats
@@ -120,7 +117,7 @@ class Acquirer:
     units: Mapping[str, WatchedUnit]
     live: LiveView
     clock: Clock
-    publish: Publish
+    publish: Callable[[SampleBlock], Awaitable[None]]
     report: Callable[[LinkNews], None]
     beats: Heartbeats
 

@@ -99,18 +99,14 @@ class IntegrityMonitor:
         news = [place for place in self.stored.damaged if place not in self._reported]
         news = news[: max(0, MAX_REPORTED - len(self._reported))]
         if news:
-            self._audit.record([self._deed(place) for place in news])
+            self._audit.record([_damage(place, self._clock.now_ns()) for place in news])
             self._reported.update(news)
             first = f"{news[0].table}: {news[0].key}"
             log.error("stored rows are damaged or missing", n_rows=len(news), first=first)
 
-    def _deed(self, place: Place) -> AuditAction:
-        return AuditAction(
-            time_ns=self._clock.now_ns(),
-            actor="padwatch",
-            action="store.row_damaged",
-            object=f"{place.table}: {place.key}",
-            reason="the row is missing"
-            if place.is_missing
-            else "the row does not match its checksum; queries omit it",
-        )
+
+def _damage(place: Place, now_ns: int) -> AuditAction:
+    fault = "does not match its checksum; queries omit it"
+    reason = f"the row {'is missing' if place.is_missing else fault}"
+    where = f"{place.table}: {place.key}"
+    return AuditAction(now_ns, "padwatch", "store.row_damaged", where, reason=reason)

@@ -33,6 +33,7 @@ class LiveView:
         self._status = {unit: UnitStatus() for unit in units}
         self._assessments: dict[tuple[str, str], tuple[float, Assessment]] = {}
         self._blocks: dict[str, BlockHistory] = {}
+        self._received_s: dict[str, float] = {}
         self._revisions = dict.fromkeys(self._status, 0)
         self._stored = dict.fromkeys(self._status, StoredResults())
 
@@ -76,10 +77,10 @@ class LiveView:
             most = HELD_SAMPLES // max(block.counts.shape[0], 1)
             self._blocks[block.unit] = BlockHistory(min(round(HELD_S * block.rate_hz), most))
         self._blocks[block.unit].add(block)
+        self._received_s[block.unit] = self._clock.monotonic_s() if sampled_s is None else sampled_s
         self._status[block.unit] = replace(
             self._status[block.unit],
             last_sample_ns=block.stop_ns,
-            received_s=self._clock.monotonic_s() if sampled_s is None else sampled_s,
             account=account,
             clock=block.clock,
             stamp_fault=block.stamp_fault,
@@ -106,7 +107,7 @@ class LiveView:
 
     def data_age_s(self, unit: str) -> float | None:
         """Return the age of the newest block in seconds; None before the first block."""
-        received_s = self._status[unit].received_s
+        received_s = self._received_s.get(unit)
         return None if received_s is None else self._clock.monotonic_s() - received_s
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
