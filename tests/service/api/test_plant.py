@@ -168,7 +168,7 @@ async def test_a_service_that_works_is_alive_and_ready(read_only):
 
 
 async def test_faults_of_accounts_and_audit_trail_reach_the_other_process(running, tmp_path):
-    await running.context.operators.exchange.ask("access", json.dumps(["rolled back: 2"]))
+    await running.serving.units._ask("access", json.dumps(["rolled back: 2"]))
     head = head_path(tmp_path / "padwatch.sqlite3")
     head.unlink(missing_ok=True)
     (head / "in the way").mkdir(parents=True)
