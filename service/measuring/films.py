@@ -219,11 +219,9 @@ def _require_possible(
             fault = f"version {wanted} does not exist; choose a listed version"
         case commands.Accept(wanted) if wanted == version:
             fault = f"version {wanted} is already in force"
-        case commands.Accept(wanted) if (
-            estimator := entries[wanted].estimator
-        ) is not place.estimator:
+        case commands.Accept(wanted) if entries[wanted].estimator is not place.estimator:
             fault = (
-                f"version {wanted} was learned with estimator {estimator};"
+                f"version {wanted} was learned with estimator {entries[wanted].estimator};"
                 f" the plant file selects {place.estimator}"
             )
         case commands.Accept(wanted) if entries[wanted].learned_from_ns < (renewed_ns or 0):
