@@ -20,6 +20,8 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 ComplexArray: TypeAlias = npt.NDArray[np.complex128]
 """Complex phasors and spectra."""
 
+BoolArray: TypeAlias = npt.NDArray[np.bool_]
+"""Masks."""
 
 TimeArray: TypeAlias = npt.NDArray[np.int64]
 """Times in nanoseconds since 1970, UTC."""

@@ -128,18 +128,18 @@ def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = 
     are equal by default; "most" is more than half of the total weight.
     """
     weights = [1.0] * len(readings) if weights is None else weights
-    counted = [
-        (reading.value, weight)
+    known = [
+        (reading.value, weight, reading.quality)
         for reading, weight in zip(readings, weights, strict=True)
         if reading.value is not None
     ]
-    if 2.0 * sum(weight for _, weight in counted) < sum(weights):
+    whole = sum([weight for _, weight, _ in known])
+    if 2.0 * whole < sum(weights):
         return next(reading for reading in reversed(readings) if reading.value is None)
-    quality = worst(reading.quality for reading in readings if reading.value is not None)
     # relative to the newest value, so that the mean of constant readings is exact to the last bit
-    newest = counted[-1][0]
-    shift = sum(weight * (value - newest) for value, weight in counted)
-    return Reading(newest + shift / sum(weight for _, weight in counted), quality)
+    newest = known[-1][0]
+    shift = sum([weight * (value - newest) for value, weight, _ in known])
+    return Reading(newest + shift / whole, worst([quality for _, _, quality in known]))
 
 
 def current_mean(readings: Sequence[Reading], *, is_grazed: bool = False) -> Reading:
@@ -151,11 +151,11 @@ def current_mean(readings: Sequence[Reading], *, is_grazed: bool = False) -> Rea
     """
     newest = readings[-1]
     usable = [reading for reading in readings if reading.value is not None]
-    if newest.value is not None:
-        return mean_reading(usable)
-    if not (is_grazed and usable):
+    if newest.value is None and not (is_grazed and usable):
         return newest
     mean = mean_reading(usable)
+    if newest.value is not None:
+        return mean
     return replace(mean, quality=worst((mean.quality, uncertain(Reason.CLIPPED))))
 
 

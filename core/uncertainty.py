@@ -8,7 +8,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import lru_cache
+from functools import cache, lru_cache
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -164,9 +165,17 @@ def _coverage_factor(combined: float, fourth: float, confidence: float) -> float
 @lru_cache(maxsize=256)
 def _quantile(freedoms: float, probability: float) -> float:
     """Return a quantile of Student's distribution, or of the normal one for infinite `freedoms`."""
-    from scipy.special import ndtri, stdtrit  # slow import, not needed at start
+    special = _special_functions()
+    if math.isinf(freedoms):
+        return float(special.ndtri(probability))
+    return float(special.stdtrit(freedoms, probability))
 
-    return float(ndtri(probability) if math.isinf(freedoms) else stdtrit(freedoms, probability))
+
+@cache
+def _special_functions() -> ModuleType:
+    import scipy.special  # slow import, not needed at start
+
+    return scipy.special
 
 
 def proportional(value: float, budget: Budget) -> Budget:

@@ -1,7 +1,7 @@
 """Waveform channels, conversion of their phasors to displacement, and recorded slow channels."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -112,13 +112,12 @@ def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexAr
     return np.asarray(channel.direction * factor, dtype=np.complex128)
 
 
-def line_floors_um_pk(channel: Channel, frequency_hz: FloatArray) -> FloatArray:
-    """Return the noise amplitudes of a transducer at frequencies, µm zero-to-peak, (n_lines,).
-
-    The displacement grows towards low frequencies if the signal must be integrated or the
-    transducer's response falls off.
-    """
-    return np.abs(displacement_factor(channel, frequency_hz)) * channel.line_floor
+def displacement_factors(channels: Sequence[Channel], frequency_hz: FloatArray) -> ComplexArray:
+    """Return the `displacement_factor` of each channel at each frequency, (n_channels, n_lines)."""
+    kinds = [(c.measurand, c.direction, c.response, c.delay_s) for c in channels]
+    alike = dict(zip(kinds, channels, strict=True))
+    factors = {kind: displacement_factor(channel, frequency_hz) for kind, channel in alike.items()}
+    return np.array([factors[kind] for kind in kinds])
 
 
 @dataclass(frozen=True)

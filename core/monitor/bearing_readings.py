@@ -5,12 +5,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import ComplexArray, FloatArray
+from core.arrays import BoolArray, ComplexArray, FloatArray
 from core.checks.sensor_checks import stationarity
 from core.condition.shaft_readings import pad_results, slow_channels, slow_results
-from core.machine.channel import line_floors_um_pk
+from core.machine.channel import displacement_factors
 from core.machine.unit import Bearing, Estimator, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.overall_readings import overall_readings
@@ -81,14 +80,9 @@ class UnitEvaluation:
 
     @cached_property
     def _bearings(self) -> "dict[str, _Bearing]":
-        order_hz = np.mean([each.order_frequency_hz for each in self.kept.segments], axis=0)
-        given = self.settings, self.kept, self.n_expected, order_hz, self._floors_um_pk(order_hz)
+        averaged = _AveragedSegments(self.unit, self.kept)
+        given = self.settings, self.kept, self.n_expected, averaged
         return {bearing.id: _Bearing(self.unit, bearing, *given) for bearing in self.unit.bearings}
-
-    def _floors_um_pk(self, order_hz: FloatArray) -> FloatArray:
-        """Return the amplitudes that noise of the channels gives 1× and vortex, (n_channels, 2)."""
-        floors = [line_floors_um_pk(channel, order_hz) for channel in self.unit.channels]
-        return Resolution(self.unit).floors(np.array(floors))
 
     @cached_property
     def _films(self) -> dict[str, DynamicStiffness | Reason]:
@@ -123,6 +117,40 @@ class UnitEvaluation:
         )
 
 
+class _AveragedSegments:
+    """Order lines of all channels of a unit in n averaged segments or polls, oldest first.
+
+    Attributes
+    ----------
+    each_hz, order_hz
+        Frequencies of 1× and of the vortex in each segment, (n, 2), and their means, (2,).
+    usable, has_phase : (n, 2, n_channels)
+        Whether each phasor is usable, and whether its phase is known.
+    phasors_um_pk : (n, n_channels, 2)
+    at_mark_um_pk : (n, n_channels)
+        1× phasors with the phase at the passage of the shaft's mark; zero if unknown.
+    has_mark : (n, 1)
+        Whether `at_mark_um_pk` is known.
+    floors_um_pk : (n_channels, 2)
+        Amplitudes that noise of the channels gives 1× and vortex.
+    """
+
+    def __init__(self, unit: Unit, kept: KeptSegments) -> None:
+        self.segments = segments = list(kept.segments)
+        self.each_hz: FloatArray = np.array([s.order_frequency_hz for s in segments])
+        self.order_hz: FloatArray = self.each_hz.mean(axis=0)
+        self.usable: BoolArray = np.array([s.order_usable for s in segments])
+        self.has_phase: BoolArray = np.array([s.has_phase for s in segments])
+        self.phasors_um_pk: ComplexArray = np.array([s.order_phasors_um_pk for s in segments])
+        marked = [s.at_mark_um_pk for s in segments]
+        nothing = np.zeros(len(unit.channels), dtype=np.complex128)
+        self.at_mark_um_pk: ComplexArray = np.array([nothing if m is None else m for m in marked])
+        self.has_mark: BoolArray = np.array([[m is not None] for m in marked])
+        factors = np.abs(displacement_factors(unit.channels, self.order_hz))
+        own = factors * np.array([[channel.line_floor] for channel in unit.channels])
+        self.floors_um_pk = Resolution(unit).floors(own)
+
+
 class _Bearing:
     """Computation of the readings of one bearing from one set of segments or polls."""
 
@@ -133,19 +161,17 @@ class _Bearing:
         settings: AnalysisSettings,
         kept: KeptSegments,
         n_expected: int,
-        order_hz: FloatArray,
-        floors_um_pk: FloatArray,
+        averaged: _AveragedSegments,
     ) -> None:
-        self._order_hz = order_hz
         self._unit, self._bearing, self._settings = unit, bearing, settings
-        self._segments = segments = list(kept.segments)
+        self._averaged, self._order_hz = averaged, averaged.order_hz
+        self._segments = segments = averaged.segments
         self._min_segments = kept.min_segments
         ids = [channel.id for channel in unit.channels]
         rows = self._rows = [ids.index(id_) for id_ in bearing.channels]
-        self._floors_um_pk = floors_um_pk[rows]
-        self._usable = np.array([s.order_usable for s in segments])[:, :, rows]  # (n, 2, 4)
-        self._whole: npt.NDArray[np.bool_] = np.all(self._usable[:, ORDER1], axis=1)
-        self._phasors: ComplexArray = np.array([s.order_phasors_um_pk for s in segments])[:, rows]
+        self._usable = averaged.usable[:, :, rows]  # (n, 2, 4)
+        self._whole: BoolArray = np.all(self._usable[:, ORDER1], axis=1)
+        self._phasors = averaged.phasors_um_pk[:, rows]
         # copying a slice is faster than copying rows in any order
         adjacent = slice(rows[0], rows[0] + len(rows))
         own = adjacent if rows == [*range(adjacent.start, adjacent.stop)] else rows
@@ -155,6 +181,9 @@ class _Bearing:
         self.spectrum: CrossSpectrum | None = None
         if kept.frequency_hz is not None:
             self.spectrum = average(kept.frequency_hz, self._bins, self._usable[:, ORDER1])
+        self._newest_quality = [
+            [segments[-1].line_quality(row, line) for row in rows] for line in (ORDER1, VORTEX)
+        ]
         self._n_segments = int(self._whole.sum())
         self._coverage = self._n_segments / n_expected
         self._lines = self._order_lines()
@@ -232,11 +261,8 @@ class _Bearing:
 
         Both lines are averaged over the same segments; with polls, each over its own usable polls.
         """
-        marked = [segment.at_mark_um_pk for segment in self._segments]
-        nothing = np.zeros(len(self._unit.channels), dtype=np.complex128)
-        at_mark = np.array([nothing if m is None else m for m in marked])[:, self._rows]
-        has_mark = np.array([m is not None for m in marked])[:, np.newaxis]
-        has_phase = np.array([segment.has_phase for segment in self._segments])[:, :, self._rows]
+        averaged, rows = self._averaged, self._rows
+        has_phase, floors_um_pk = averaged.has_phase[:, :, rows], averaged.floors_um_pk[rows]
         orders = average(self._order_hz, self._phasors, self._usable[:, ORDER1])
         lines = []
         for line in (ORDER1, VORTEX):
@@ -256,9 +282,9 @@ class _Bearing:
                     phasors_um_pk=self._phasors[:, :, line],
                     usable=self._usable[:, line],
                     has_phase=has_phase[:, line],
-                    at_mark_um_pk=at_mark,
-                    has_mark=has_mark & has_phase[:, ORDER1],
-                    floors_um_pk=tuple(self._floors_um_pk[:, line].tolist()),
+                    at_mark_um_pk=averaged.at_mark_um_pk[:, rows],
+                    has_mark=averaged.has_mark & has_phase[:, ORDER1],
+                    floors_um_pk=tuple(floors_um_pk[:, line].tolist()),
                     round_shafts=frozenset(p for p in (SHAFT_X, SHAFT_Y) if self._is_round(p)),
                 )
             )
@@ -294,11 +320,10 @@ class _Bearing:
         quality = self._line_quality(*range(len(self._rows)))
         if self.spectrum is None or isinstance(quality, Reading) or not self._n_segments:
             return None
-        whole = [s for s, counts in zip(self._segments, self._whole, strict=True) if counts]
-        turns_hz = [float(segment.order_frequency_hz[ORDER1]) for segment in whole]
+        turns_hz = self._averaged.each_hz[self._whole, ORDER1].tolist()
         spectrum = self.spectrum
         if not self._whole.all():
-            all_usable = np.ones((len(whole), len(self._rows)), dtype=np.bool_)
+            all_usable = np.ones((len(turns_hz), len(self._rows)), dtype=np.bool_)
             spectrum = average(spectrum.frequency_hz, self._bins[self._whole], all_usable)
         turn_hz = (min(turns_hz), max(turns_hz))
         return FilmSpectrum(spectrum, self._bearing.bracket, turn_hz, self._n_integrations)
@@ -324,7 +349,7 @@ class _Bearing:
 
     def _frequency(self, line: int) -> Budgeted:
         speed, frequency_hz = self._segments[-1].speed, float(self._order_hz[line])
-        each_hz = np.array([segment.order_frequency_hz[line] for segment in self._segments])
+        each_hz = self._averaged.each_hz[:, line]
         if self.spectrum is None and line == VORTEX and not self._unit.has_vortex:
             return missing(Reason.SWITCHED_OFF), None
         if speed.rpm.value is None:
@@ -371,11 +396,11 @@ class _Bearing:
 
     def _line_quality(self, *places: int, line: int = ORDER1) -> Quality | Reading:
         """Return the quality of a line in the channels, or a missing reading with the reason."""
-        newest, few = self._segments[-1], uncertain(Reason.FEW_SEGMENTS)
-        own = [newest.line_quality(self._rows[place], line) for place in places]
-        now = worst([newest.speed.rpm.quality, self._doubts, *own])
+        speed, few = self._segments[-1].speed.rpm, uncertain(Reason.FEW_SEGMENTS)
+        own = [self._newest_quality[line][place] for place in places]
+        now = worst([speed.quality, self._doubts, *own])
         n_segments = self._lines[line].n_segments(places[0], places[-1])
-        if newest.speed.rpm.value is None or now.level is Level.BAD or n_segments == 0:
+        if speed.value is None or now.level is Level.BAD or n_segments == 0:
             return missing(now.reason)
         if n_segments < self._min_segments:
             return worst([now, few] if self.spectrum is None else [few, now])

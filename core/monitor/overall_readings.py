@@ -46,12 +46,11 @@ def overall_readings(
         spans = [segment.spans_um_pp[rows[place]] for segment in segments]
         mean = current_mean(spans, is_grazed=grazed[place])
         found[name] = mean, _mean_budget(mean, spans, bearing, place)
-    orbits = [_orbit(segment, rows[:2], number) for segment in segments]
+    orbits = [segment.orbits_um_pk[number] for segment in segments]
     mean = current_mean(orbits, is_grazed=all(grazed[:2]))
     found[ORBIT] = mean, _mean_budget(mean, orbits, bearing, SHAFT_X)
     for name, place in BEARING_SPEEDS.items():
-        speeds = [segment.velocities_mm_s_rms[rows[place]] for segment in segments]
-        squares = [r if r.value is None else Reading(r.value**2, r.quality) for r in speeds]
+        squares = [segment.velocity_squares[rows[place]] for segment in segments]
         mean = _root(current_mean(squares, is_grazed=grazed[place]))
         found[name] = mean, _mean_budget(mean, squares, bearing, place, is_root=True)
     return with_budgets(found)
@@ -128,11 +127,6 @@ def _mean_budget(
     lines = amplitude_lines(bearing, place, reading.value)
     sensitivity = 0.5 / reading.value if is_root else 1.0
     return mean_budget(reading.value, numbers(parts), lines, sensitivity)
-
-
-def _orbit(segment: Segment, rows: Sequence[int], bearing: int) -> Reading:
-    overall = segment.overall
-    return segment.reading(rows, float(overall.orbit_um_pk[bearing]) if overall else math.nan)
 
 
 def _root(mean: Reading) -> Reading:

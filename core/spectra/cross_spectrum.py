@@ -230,22 +230,28 @@ def roundness(spectrum: CrossSpectrum, line: int) -> float:
     return 2.0 * float(matrix[SHAFT_X, SHAFT_Y].imag) / whole if whole > 0.0 else 0.0
 
 
-def vortex_frequency_hz(
-    spectra: Sequence[CrossSpectrum], band_hz: tuple[float, float]
-) -> float | None:
-    """Return the frequency in Hz of the strongest line shared by shaft and bearing in a band.
+def shared_power(spectra: Sequence[CrossSpectrum]) -> FloatArray:
+    """Return the shaft's power that is coherent with the bearing's motion, µm², (n_lines,).
 
-    The shaft's power is weighted by its coherence with the bearing's motion, corrected for the bias
-    of few segments, and summed over directions and bearings. A line of one probe alone (runout,
-    mains, a loose cable) does not count. `spectra` are those of one or more bearings, at the same
-    lines. None if no line of the band is a peak, or if none is coherent.
+    The coherence is corrected for the bias of few segments; the power is summed over directions and
+    bearings. `spectra` are those of one or more bearings, at the same lines.
     """
-    frequency_hz = spectra[0].frequency_hz
-    shared = np.zeros(frequency_hz.size)
+    shared = np.zeros(spectra[0].frequency_hz.size)
     for spectrum in spectra:
         for shaft, bearing in ((SHAFT_X, BEARING_X), (SHAFT_Y, BEARING_Y)):
             n_segments = max(int(spectrum.n_segments[shaft, bearing]), 2)
             chance = 1.0 / n_segments  # mean coherence of unrelated signals
             coherence = np.maximum(spectrum.coherence(shaft, bearing) - chance, 0.0)
             shared += spectrum.power[:, shaft, bearing] * coherence / (1.0 - chance)
-    return peak_frequency_hz(shared, frequency_hz, band_hz)
+    return shared
+
+
+def vortex_frequency_hz(
+    spectra: Sequence[CrossSpectrum], band_hz: tuple[float, float]
+) -> float | None:
+    """Return the frequency in Hz of the strongest line of `shared_power` in a band.
+
+    A line of one probe alone (runout, mains, a loose cable) does not count. None if no line of the
+    band is a peak, or if none is coherent.
+    """
+    return peak_frequency_hz(shared_power(spectra), spectra[0].frequency_hz, band_hz)

@@ -48,11 +48,14 @@ class Overall:
     velocity_mm_s_rms : (n_channels,)
         Velocity in the band of `SegmentSettings`, with the transducer's response compensated; zero
         for a key-phase channel.
+    shafts
+        Rows of the two shaft channels of each bearing.
     """
 
     peak_to_peak_um: FloatArray
     orbit_um_pk: FloatArray
     velocity_mm_s_rms: FloatArray
+    shafts: Sequence[Sequence[int]]
 
 
 class OverallTransform:
@@ -100,7 +103,7 @@ class OverallTransform:
         power /= 2.0 * NOISE_BANDWIDTH_BINS
         pairs = zip(self._shafts, self._matrices, strict=True)
         orbits = np.array([self._orbit(centred, rows, matrix) for rows, matrix in pairs])
-        return Overall(span, orbits, np.sqrt(power))
+        return Overall(span, orbits, np.sqrt(power), self._shafts)
 
     def _orbit(self, centred: FloatArray, rows: Sequence[int], matrix: FloatArray | None) -> float:
         if not self._is_displacement[rows].all():

@@ -14,7 +14,7 @@ from enum import StrEnum
 import numpy as np
 
 from core.arrays import ComplexArray, FloatArray
-from core.machine.channel import displacement_factor
+from core.machine.channel import displacement_factors
 from core.machine.unit import Unit
 from core.quality import Level, Quality, Reason, bad
 from core.samples.ring import Window
@@ -137,7 +137,7 @@ class PollTransform(KeptSegments):
         quality = of_line[ORDER1][1], of_line[VORTEX][1]
         angle_deg, angle_quality = self._of_channels(VectorPart.ORDER1_PHASE, window)
         has_phase = usable_channels(angle_quality)
-        factor = np.array([displacement_factor(c, order_hz) for c in self._unit.channels])
+        factor = displacement_factors(self._unit.channels, order_hz)
         # without a phase, the angle of the factor would look like a measured one
         turned: ComplexArray = np.where(has_phase[:, np.newaxis], factor, np.abs(factor))
         phasors: ComplexArray = amplitude * turned

@@ -20,7 +20,7 @@ from core.checks.sensor_checks import (
     quietest_rms,
     signal_quality,
 )
-from core.machine.channel import Channel, displacement_factor
+from core.machine.channel import displacement_factors
 from core.machine.unit import Unit
 from core.quality import GOOD, Level, Quality, Reading, Reason, bad, missing, uncertain, worst
 from core.samples.ring import Window
@@ -150,6 +150,22 @@ class Segment:
         """
         return self._of_channels(None if self.overall is None else self.overall.velocity_mm_s_rms)
 
+    @cached_property
+    def velocity_squares(self) -> tuple[Reading, ...]:
+        """Squares of `velocities_mm_s_rms`, whose mean is the square of an average."""
+        return tuple(
+            r if r.value is None else Reading(r.value**2, r.quality)
+            for r in self.velocities_mm_s_rms
+        )
+
+    @cached_property
+    def orbits_um_pk(self) -> tuple[Reading, ...]:
+        """Largest displacement of the shaft in each bearing, in µm; empty for a poll."""
+        if self.overall is None:
+            return ()
+        orbits = zip(self.overall.shafts, self.overall.orbit_um_pk.tolist(), strict=True)
+        return tuple(self.reading(rows, value) for rows, value in orbits)
+
     def _of_channels(self, values: FloatArray | None) -> tuple[Reading, ...]:
         each = [math.nan] * self.usable.size if values is None else values.tolist()
         return tuple(self.reading((row,), value) for row, value in enumerate(each))
@@ -245,7 +261,7 @@ class SegmentTransform(KeptSegments):
         self.frequency_hz: FloatArray = bin_hz * np.arange(1, n_lines + 1, dtype=np.float64)
         self._overall = OverallTransform(unit, settings)
         self._resolution = Resolution(unit)
-        self._bin_factor = _factors(unit.channels, self.frequency_hz)
+        self._bin_factor = displacement_factors(unit.channels, self.frequency_hz)
         shafts = {id_ for bearing in unit.bearings for id_ in (bearing.shaft_x, bearing.shaft_y)}
         self._is_shaft = np.array([channel.id in shafts for channel in unit.channels])
         ids = [channel.id for channel in unit.channels]
@@ -280,7 +296,7 @@ class SegmentTransform(KeptSegments):
         resolved = self._resolution.qualities(quality)
         vortex_hz = self._vortex_hz(turn_hz, bins, usable_channels(resolved))
         order_hz = np.array([turn_hz, vortex_hz or self._settings.vortex_order * turn_hz])
-        factors = _factors(self._unit.channels, order_hz)
+        factors = displacement_factors(self._unit.channels, order_hz)
         turn_samples = window.rate_hz / turn_hz
         turning = turning_factors(samples.shape[1], window.rate_hz, order_hz)
         orders = factors * line_phasors(prepared, turning)
@@ -415,11 +431,3 @@ def usable_channels(qualities: Sequence[Quality]) -> npt.NDArray[np.bool_]:
 def _turned(phasors: ComplexArray, angle_rad: float) -> ComplexArray:
     factor = cmath.exp(1j * angle_rad)
     return np.array([phasor * factor for phasor in phasors.tolist()])
-
-
-def _factors(channels: Sequence[Channel], frequency_hz: FloatArray) -> ComplexArray:
-    """Return the `displacement_factor` of each channel at each frequency, (n_channels, n_lines)."""
-    kinds = [(c.measurand, c.direction, c.response, c.delay_s) for c in channels]
-    alike = dict(zip(kinds, channels, strict=True))
-    factors = {kind: displacement_factor(channel, frequency_hz) for kind, channel in alike.items()}
-    return np.array([factors[kind] for kind in kinds])

@@ -6,8 +6,7 @@ comparison. All other uncertainties in the budgets can explain a difference.
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
 
@@ -30,17 +29,25 @@ minutes per year, with eight comparisons each: about one false disagreement per 
 
 COMMON = frozenset({SHAFT_GAIN, BEARING_GAIN, BRACKET})
 
+KNOWN = COMMON | {CROSS_COUPLING}
+"""Errors that do not affect a comparison with a film whose cross-coupling is known."""
 
-def disagree(first: Budget, second: Budget) -> bool:
-    """Return whether two results of one quantity differ by more than their uncertainties allow."""
-    lines = [line for line in (*first.lines, *second.lines) if line.name not in COMMON]
-    random = [line for line in lines if line.kind is Kind.RANDOM]
-    spread = math.hypot(*(line.contribution for line in random))
+
+def disagree(first: Budget, second: Budget, common: Set[str] = COMMON) -> bool:
+    """Return whether two results of one quantity differ by more than their uncertainties allow.
+
+    Errors with the names `common` cancel in the difference.
+    """
+    lines = [line for line in (*first.lines, *second.lines) if line.name not in common]
     limits = sum(
         abs(line.sensitivity) * line.width for line in lines if line.kind is Kind.SYSTEMATIC
     )
-    allowed = coverage_factor(random, 1.0 - FALSE_ALARM) * spread + limits
-    return abs(first.value - second.value) > allowed
+    beyond = abs(first.value - second.value) - limits
+    if beyond <= 0.0:
+        return False
+    random = [line for line in lines if line.kind is Kind.RANDOM]
+    spread = math.hypot(*(line.contribution for line in random))
+    return beyond > coverage_factor(random, 1.0 - FALSE_ALARM) * spread
 
 
 def contradicting(
@@ -92,33 +99,36 @@ def contradicting(
             omega = 2.0 * math.pi * float(orders.frequency_hz[lines[prefix]])
             motion = [1.0 + 0.0j, across] if row == 0 else [across, 1.0 + 0.0j]
             factors = np.array([*motion, *(1j * omega * each for each in motion)])
-            expected = (
-                _combined(film, factors.real, covariance),
-                _combined(film, factors.imag / omega, covariance),
-            )
-            if any(map(disagree, expected, map(_without_cross_coupling, measured))):
+            parts = np.array([factors.real, factors.imag / omega])
+            expected = _combined(film, parts, covariance)
+            if any(map(disagree, expected, measured, itertools.repeat(KNOWN))):
                 doubted |= of_line[prefix] | {*of_row, f"dynamic_ck_{axes}_s"}
     return doubted
 
 
-def _without_cross_coupling(budget: Budget) -> Budget:
-    known = (line for line in budget.lines if line.name != CROSS_COUPLING)
-    return replace(budget, lines=tuple(known))
+def _combined(
+    budgets: Sequence[Budget], factors: FloatArray, covariance: FloatArray
+) -> list[Budget]:
+    """Return the budgets of n sums of four coefficients, each multiplied by its factor (n, 4).
 
-
-def _combined(budgets: Sequence[Budget], factors: FloatArray, covariance: FloatArray) -> Budget:
-    """Return the budget of the sum of four coefficients, each multiplied by its factor."""
-    random = math.sqrt(float(factors @ covariance @ factors))
-    systematic = zip(
-        *([line for line in b.lines if line.kind is Kind.SYSTEMATIC] for b in budgets), strict=True
-    )
-    return Budget(
-        float(factors @ [budget.value for budget in budgets]),
-        (
-            random_line(STATISTICS, random),
-            *(
-                lines[0]._replace(sensitivity=float(factors @ [line.sensitivity for line in lines]))
-                for lines in systematic
+    Contributions with the names `KNOWN` are left out.
+    """
+    systematic = [
+        [line for line in b.lines if line.kind is Kind.SYSTEMATIC and line.name not in KNOWN]
+        for b in budgets
+    ]
+    values = (factors @ [budget.value for budget in budgets]).tolist()
+    sensitivities = factors @ [[line.sensitivity for line in lines] for lines in systematic]
+    variances = np.einsum("ni,ij,nj->n", factors, covariance, factors)
+    return [
+        Budget(
+            value,
+            (
+                random_line(STATISTICS, std),
+                *(line._replace(sensitivity=s) for line, s in zip(systematic[0], of, strict=True)),
             ),
-        ),
-    )
+        )
+        for value, std, of in zip(
+            values, np.sqrt(variances).tolist(), sensitivities.tolist(), strict=True
+        )
+    ]

@@ -1,5 +1,6 @@
 """Readings and uncertainty budgets of the eight film coefficients of `dynamic`."""
 
+import itertools
 import math
 
 import numpy as np
@@ -76,19 +77,19 @@ def dynamic_budgets(
     names, widths = _bracket_half_widths(found, bracket, accuracy)
     # coefficients are inversely proportional to the shaft spectrum
     left_in = found.noise_share / (1.0 - found.noise_share)
-    std, budgets = found.std, {}
-    for row, column in np.ndindex(2, 4):
-        value, changes = float(found.coefficients[row, column]), found.changes[:, row, column]
-        direct = float(found.coefficients[row, row + 2 * (column // 2)])
+    std, model, coefficients = found.std.tolist(), found.model.tolist(), found.coefficients.tolist()
+    changes, budgets = found.changes.transpose(1, 2, 0).tolist(), {}
+    for row, column in itertools.product(range(2), range(4)):
+        value, direct = coefficients[row][column], coefficients[row][row + 2 * (column // 2)]
         budgets[DYNAMIC_COEFFICIENTS[row][column]] = Budget(
             value,
             (
-                random_line(STATISTICS, float(std[row, column])),
+                random_line(STATISTICS, std[row][column]),
                 *gain_lines(value, accuracy),
-                *map(systematic_line, names, widths, changes.tolist()),
+                *map(systematic_line, names, widths, changes[row][column]),
                 systematic_line("probe noise taken off", accuracy.probe_noise, value * left_in),
                 systematic_line("spectral resolution", RESOLUTION, direct),
-                systematic_line("film over frequency", float(found.model[row, column]), 1.0),
+                systematic_line("film over frequency", model[row][column], 1.0),
             ),
         )
     return budgets

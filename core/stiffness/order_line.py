@@ -22,8 +22,9 @@ from core.spectra.cross_spectrum import (
     average,
     independent_segments,
     roundness,
-    vortex_frequency_hz,
+    shared_power,
 )
+from core.spectra.lines import peak_frequency_hz
 from core.spectra.segments import ORDER1, VORTEX
 from core.stiffness.channel_budget import (
     amplitude_budget,
@@ -389,9 +390,9 @@ def other_line_hz(
     `band_hz` has more than `min_line_to_floor` times the power of the noise floor.
     """
     bin_hz = float(bins.frequency_hz[1] - bins.frequency_hz[0])
-    margin_hz = (MAIN_LOBE + 1) * bin_hz
+    margin_hz, shared = (MAIN_LOBE + 1) * bin_hz, shared_power([bins])
     for low, high in ((margin_hz, band_hz[0]), (band_hz[1], turn_hz - margin_hz)):
-        found_hz = vortex_frequency_hz([bins], (low, high)) if low < high else None
+        found_hz = peak_frequency_hz(shared, bins.frequency_hz, (low, high)) if low < high else None
         if found_hz is None:
             continue
         peak = round(found_hz / bin_hz) - 1

@@ -3,7 +3,9 @@
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 import numpy.typing as npt
@@ -110,13 +112,28 @@ class Layout:
 
     def encode(self, readings: Mapping[str, Reading]) -> tuple[bytes, bytes]:
         """Return values (float64, NaN if missing) and quality bytes, in the order of the layout."""
-        ordered = [_column(readings, name) for name in self.quantities]
-        values = np.array([number for number, _ in ordered], dtype="<f8")
-        qualities = bytes(
-            quality.level << LEVEL_SHIFT | self.reasons.index(quality.reason.value)
-            for _, quality in ordered
-        )
-        return values.tobytes(), qualities
+        values: list[float | None] = []
+        qualities = bytearray()
+        for name, parts in self._parts:
+            reading = readings[name]
+            values += [getattr(reading, part) for part in parts]
+            byte = reading.quality.level << LEVEL_SHIFT | self._numbers[reading.quality.reason]
+            qualities += bytes([byte]) * len(parts)
+        return np.array(values, dtype="<f8").tobytes(), bytes(qualities)
+
+    @cached_property
+    def _parts(self) -> list[tuple[str, list[str]]]:
+        """Quantities of the columns in order, each with the parts of its reading."""
+        columns = [column.partition(".") for column in self.quantities]
+        return [
+            (name, [part or "value" for _, _, part in own])
+            for name, own in groupby(columns, key=itemgetter(0))
+        ]
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        """Number of each quality reason."""
+        return {reason: number for number, reason in enumerate(self.reasons)}
 
     def decode(
         self, values: list[bytes], qualities: list[bytes]
@@ -137,15 +154,6 @@ class Layout:
         level = Level(byte >> LEVEL_SHIFT)
         quality = Quality(level, Reason(self.reasons[byte & ((1 << LEVEL_SHIFT) - 1)]))
         return Reading(None if level is Level.BAD else value, quality)
-
-
-def _column(readings: Mapping[str, Reading], column: str) -> tuple[float, Quality]:
-    name, dot, which = column.partition(".")
-    reading = readings[name]
-    number = {U_RANDOM: reading.u_random, U_SYSTEMATIC: reading.u_systematic}.get(
-        dot + which, reading.value
-    )
-    return np.nan if number is None else number, reading.quality
 
 
 def remember_layout(writer: Connection, layout: Layout) -> int:
