@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import BoolArray, FloatArray
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import Support
 from core.baseline.grouping import group_readings, robust_std
@@ -57,7 +57,7 @@ class Drift:
 
 
 def learning_drift(
-    history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], baseline: QuantityBaseline
+    history: StiffnessHistory, is_settled: BoolArray, baseline: QuantityBaseline
 ) -> Drift | None:
     """Return the drift of ln of a quantity about its baseline during the learning period.
 
@@ -114,7 +114,7 @@ stiffness of warm films at the same eccentricity and oil temperature differs by 
 
 
 def far_readings(
-    history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], baseline: BearingBaseline
+    history: StiffnessHistory, is_settled: BoolArray, baseline: BearingBaseline
 ) -> str | None:
     """Return a warning text if settled readings are at least twice or at most half the baseline.
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import BoolArray, FloatArray
 from core.baseline.cell_table import NODES, CellTable
 from core.baseline.history import QUANTITIES, StiffnessHistory
 from core.baseline.surface import ATTITUDE_TERMS, Surface, attitude_terms
@@ -80,7 +80,7 @@ class Deviations:
         Standard uncertainty of the surface at the reading.
     """
 
-    is_known: npt.NDArray[np.bool_]
+    is_known: BoolArray
     place: npt.NDArray[np.int64]
     deviation: FloatArray
     weight: FloatArray
@@ -186,7 +186,7 @@ class QuantityBaseline:
         value, u_random, _ = history.of(self.quantity)
         return self.compare(history.conditions, value, u_random)
 
-    def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
+    def is_known(self, conditions: FilmConditions) -> BoolArray:
         """Return whether all conditions that the baseline depends on are known (n,)."""
         return conditions.is_known(self.grid.has_attitude or self.surface.shape.has_attitude)
 

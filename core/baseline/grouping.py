@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray, TimeArray
+from core.arrays import BoolArray, FloatArray, TimeArray
 from core.condition.cells import CellGrid, FilmConditions
 from core.units import DAY_NS
 
@@ -23,7 +23,7 @@ class Groups:
     n_readings: npt.NDArray[np.int64]
     day: npt.NDArray[np.int64]
 
-    def rows(self, wanted: npt.NDArray[np.bool_]) -> "Groups":
+    def rows(self, wanted: BoolArray) -> "Groups":
         """Return the groups selected by a mask (n_groups,)."""
         n_readings, day = self.n_readings[wanted], self.day[wanted]
         return Groups(self.conditions.rows(wanted), self.value[wanted], n_readings, day)

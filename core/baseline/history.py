@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import ComplexArray, FloatArray, TimeArray
+from core.arrays import BoolArray, ComplexArray, FloatArray, TimeArray
 from core.condition.cells import FilmConditions
 
 CodeArray: TypeAlias = npt.NDArray[np.int8]
@@ -57,7 +57,7 @@ MIN_LN_K = math.log(1e5)
 have 1e7 N/m and more, and films are less than a hundred times softer or stiffer."""
 
 
-def are_ratios(ln_k: FloatArray | float) -> npt.NDArray[np.bool_]:
+def are_ratios(ln_k: FloatArray | float) -> BoolArray:
     """Return whether each value of ln k is of a ratio to the bracket stiffness, not of N/m."""
     return np.asarray(np.asarray(ln_k) < MIN_LN_K)
 
@@ -171,7 +171,7 @@ class StiffnessHistory:
         """Return the readings with the indices `start` to `stop - 1`."""
         return self.where(slice(start, stop))
 
-    def where(self, wanted: npt.NDArray[np.bool_] | slice) -> "StiffnessHistory":
+    def where(self, wanted: BoolArray | slice) -> "StiffnessHistory":
         """Return the readings selected by a mask (n,) or a slice."""
         return StiffnessHistory(
             **{f.name: getattr(self, f.name)[..., wanted] for f in fields(self)}
@@ -202,7 +202,7 @@ PER_DIRECTION = frozenset(
 """Names of the columns of shape (2, n), with rows for x and y."""
 
 
-def _refuse(column: str, why: str, is_wrong: npt.NDArray[np.bool_]) -> None:
+def _refuse(column: str, why: str, is_wrong: BoolArray) -> None:
     wrong = np.argwhere(is_wrong)
     if wrong.size:
         raise ValueError(f"{column}: row {wrong[0][-1]} {why}")

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray, TimeArray
+from core.arrays import BoolArray, FloatArray, TimeArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
 from core.baseline.cell_table import CellTable
 from core.baseline.grouping import Groups, group_readings
@@ -57,7 +57,7 @@ def _is_known_without(
     group_fold: npt.NDArray[np.int64],
     table: CellTable,
     place: npt.NDArray[np.int64],
-) -> npt.NDArray[np.bool_]:
+) -> BoolArray:
     """Return whether each cell has at least half of `min_days` without the fold `left_out`."""
     group_place = table.find(settings.grid.cells(groups.conditions))
     counted = (group_fold != left_out) & (group_place >= 0)
@@ -72,7 +72,7 @@ REJECTED = 0.1
 
 def learn(
     history: StiffnessHistory,
-    is_settled: npt.NDArray[np.bool_],
+    is_settled: BoolArray,
     origin: Origin,
     settings: BaselineSettings,
 ) -> BearingBaseline:
@@ -96,7 +96,7 @@ def learn(
 
 def _learn_quantity(
     history: StiffnessHistory,
-    is_settled: npt.NDArray[np.bool_],
+    is_settled: BoolArray,
     name: str,
     settings: BaselineSettings,
 ) -> QuantityBaseline | None:

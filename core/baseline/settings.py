@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass, field
 
-import numpy as np
-import numpy.typing as npt
-
+from core.arrays import BoolArray
 from core.condition.cells import CellGrid, FilmConditions
 
 
@@ -59,6 +57,6 @@ class BaselineSettings:
         """Whether the surface or the cells depend on the attitude angle."""
         return self.uses_attitude or self.grid.has_attitude
 
-    def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
+    def is_known(self, conditions: FilmConditions) -> BoolArray:
         """Return whether all conditions that the baseline depends on are known (n,)."""
         return conditions.is_known(self.has_attitude)

@@ -9,7 +9,7 @@ from itertools import repeat
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray, TimeArray
+from core.arrays import BoolArray, FloatArray, TimeArray
 from core.baseline.baseline import QuantityBaseline
 from core.baseline.history import CodeArray, StiffnessHistory
 from core.change.decision import INITIAL_DECISION, Decision, outcomes, step
@@ -30,7 +30,7 @@ class OperationHistory:
     """Operating state at each reading (n,), and whether the unit was settled in this state (n,)."""
 
     state: CodeArray
-    is_settled: npt.NDArray[np.bool_]
+    is_settled: BoolArray
 
 
 def operation_history(
@@ -112,7 +112,7 @@ class DecisionHistory:
 
 def decide_all(
     history: StiffnessHistory,
-    is_settled: npt.NDArray[np.bool_],
+    is_settled: BoolArray,
     quantity: str,
     baseline: QuantityBaseline | None,
     limits: ChangeLimits,
@@ -136,7 +136,7 @@ def decide_all(
 
 def last_decision(
     history: StiffnessHistory,
-    is_settled: npt.NDArray[np.bool_],
+    is_settled: BoolArray,
     baseline: QuantityBaseline,
     rules: FilmRules,
 ) -> Decision:
@@ -153,7 +153,7 @@ def last_decision(
 
 def _decisions(
     history: StiffnessHistory,
-    is_settled: npt.NDArray[np.bool_],
+    is_settled: BoolArray,
     quantity: str,
     baseline: QuantityBaseline | None,
     limits: ChangeLimits,

@@ -21,7 +21,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import ComplexArray, FloatArray
+from core.arrays import BoolArray, ComplexArray, FloatArray
 from core.change.shaft_response import MEAN_READINGS, FilmDirection, ShaftResponse
 
 
@@ -245,7 +245,7 @@ class _Residuals:
         is_possible &= self.misfit(self.if_unchanged - share * step, share * step) <= MAX_MISFIT
         return (share, std) if is_possible else (None, None)
 
-    def bearings(self, rows: npt.NDArray[np.bool_]) -> frozenset[str]:
+    def bearings(self, rows: BoolArray) -> frozenset[str]:
         """Return the ids of the bearings whose films are selected by the mask `rows` (n_films,)."""
         places = zip(self.response.places, rows.tolist(), strict=True)
         return frozenset(bearing for (bearing, _), is_wanted in places if is_wanted)

@@ -7,9 +7,8 @@ from enum import IntEnum
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import BoolArray, FloatArray
 from core.baseline.baseline import QuantityBaseline
 from core.baseline.history import CodeArray, ReadingOutcome
 from core.change.evidence import NO_EVIDENCE, Comparison, Finding, GatheredEvidence
@@ -51,7 +50,7 @@ def outcomes(
     value: FloatArray,
     u_random: FloatArray,
     codes: CodeArray,
-    is_settled: npt.NDArray[np.bool_],
+    is_settled: BoolArray,
     baseline: QuantityBaseline | None,
 ) -> Iterator[Outcome]:
     """Yield, for each reading of a film in one direction, its comparison with the baseline.

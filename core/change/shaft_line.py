@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import ComplexArray, FloatArray
+from core.arrays import BoolArray, ComplexArray, FloatArray
 from core.baseline.history import DIRECTIONS, StiffnessHistory
 
 MEANS_OF = 24
@@ -229,7 +228,7 @@ def _gains(
 
 
 def learn_lines(
-    histories: Mapping[str, StiffnessHistory], is_settled: npt.NDArray[np.bool_]
+    histories: Mapping[str, StiffnessHistory], is_settled: BoolArray
 ) -> tuple[ShaftLine, ...]:
     """Learn the lines of a shaft from histories by bearing id, at common times.
 

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import BoolArray, FloatArray
 from core.baseline.grouping import bisquare, robust_std
 from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.change.shaft_line import ShaftLine, learn_lines
@@ -85,7 +84,7 @@ class ShaftResponse:
 
 
 def learn_response(
-    histories: Mapping[str, StiffnessHistory], is_settled: npt.NDArray[np.bool_]
+    histories: Mapping[str, StiffnessHistory], is_settled: BoolArray
 ) -> ShaftResponse | None:
     """Learn the shaft response of a unit from stiffness histories by bearing id, at common times.
 

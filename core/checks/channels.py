@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray, RawArray
+from core.arrays import BoolArray, FloatArray, RawArray
 from core.quality import GOOD, Level, Quality, Reason, bad, uncertain
 
 COUNTS_FULL_SCALE = 32768
@@ -52,7 +52,7 @@ class ChannelLimits:
 def channel_verdicts(
     samples: RawArray,
     starts: npt.NDArray[np.int64],
-    is_ok: npt.NDArray[np.bool_],
+    is_ok: BoolArray,
     limits: ChannelLimits,
 ) -> VerdictArray:
     """Return the verdict on each channel in each cell, from status, clipping and OK limits.
@@ -72,7 +72,7 @@ def channel_verdicts(
     """
     lowest = np.minimum.reduceat(samples, starts, axis=1)
     highest = np.maximum.reduceat(samples, starts, axis=1)
-    length = np.diff(starts, append=samples.shape[1])
+    length = np.append(starts[1:], samples.shape[1]) - starts
     if samples.dtype == np.int16:
         total = np.add.reduceat(samples, starts, axis=1, dtype=np.int64)
         mean_v = total / length * limits.full_scale_v / COUNTS_FULL_SCALE

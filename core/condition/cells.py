@@ -7,7 +7,7 @@ from typing import Self, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import BoolArray, FloatArray
 from core.condition.operating_state import OperatingState
 
 
@@ -32,7 +32,7 @@ class FilmConditions:
         """Return the conditions of the readings selected by a mask (n,) or by indices."""
         return FilmConditions(*(column[wanted] for column in vars(self).values()))
 
-    def is_known(self, needs_attitude: bool) -> npt.NDArray[np.bool_]:
+    def is_known(self, needs_attitude: bool) -> BoolArray:
         """Return whether eccentricity, oil temperature and, if needed, attitude are finite (n,)."""
         known = np.isfinite(self.eccentricity_ratio) & np.isfinite(self.oil_temperature_c)
         return known & np.isfinite(self.attitude_deg) if needs_attitude else known
@@ -83,7 +83,7 @@ class CellGrid:
             axes.append(np.mod(conditions.attitude_deg, 360.0) / self.attitude_width_deg)
         return np.floor(np.nan_to_num(np.stack(axes))).astype(np.int64)
 
-    def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
+    def is_known(self, conditions: FilmConditions) -> BoolArray:
         """Return whether all conditions that the cell depends on are known (n,)."""
         return conditions.is_known(self.has_attitude)
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray, RawArray, SampleArray
+from core.arrays import BoolArray, FloatArray, RawArray, SampleArray
 from core.checks.channels import (
     NOT_FINITE,
     VERDICTS,
@@ -98,7 +98,7 @@ class SideValues:
 
     starts: npt.NDArray[np.int64]
     start_ns: npt.NDArray[np.int64]
-    ok: npt.NDArray[np.bool_]
+    ok: BoolArray
     slow: FloatArray
 
     @classmethod

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import ComplexArray, FloatArray
+from core.arrays import BoolArray, ComplexArray, FloatArray
 from core.spectra.lines import hann, peak_frequency_hz
 
 SHAFT_X, SHAFT_Y, BEARING_X, BEARING_Y = range(4)
@@ -90,7 +90,7 @@ NO_SPECTRUM = CrossSpectrum(
 
 
 def average(
-    frequency_hz: FloatArray, phasors_um_pk: ComplexArray, usable: npt.NDArray[np.bool_]
+    frequency_hz: FloatArray, phasors_um_pk: ComplexArray, usable: BoolArray
 ) -> CrossSpectrum:
     """Return the cross-spectrum averaged over segments.
 

@@ -10,9 +10,8 @@ from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import ComplexArray, FloatArray
+from core.arrays import BoolArray, ComplexArray, FloatArray
 from core.checks.sensor_checks import (
     MAX_CLIPPED_SHARE,
     clipped_share,
@@ -106,7 +105,7 @@ class Segment:
     stop_index: int
     stop_ns: int
     channel_quality: tuple[Quality, ...]
-    usable: npt.NDArray[np.bool_]
+    usable: BoolArray
     slow: Mapping[str, Reading]
     mean: FloatArray
     speed: Speed
@@ -115,8 +114,8 @@ class Segment:
     has_vortex_peak: bool
     order_phasors_um_pk: ComplexArray
     order_quality: tuple[tuple[Quality, ...], tuple[Quality, ...]]
-    order_usable: npt.NDArray[np.bool_]
-    has_phase: npt.NDArray[np.bool_]
+    order_usable: BoolArray
+    has_phase: BoolArray
     at_mark_um_pk: ComplexArray | None
     runout: Mapping[str, RunoutVerdict]
     overall: Overall | None
@@ -362,9 +361,7 @@ class SegmentTransform(KeptSegments):
             ]
         )
 
-    def _key_phase(
-        self, samples: FloatArray, rate_hz: float, usable: npt.NDArray[np.bool_]
-    ) -> KeyPhase | None:
+    def _key_phase(self, samples: FloatArray, rate_hz: float, usable: BoolArray) -> KeyPhase | None:
         row = self._key_phase_row
         if row is None or not usable[row]:
             return None
@@ -374,7 +371,7 @@ class SegmentTransform(KeptSegments):
         self,
         window: Window,
         bins: ComplexArray,
-        usable: npt.NDArray[np.bool_],
+        usable: BoolArray,
         key_phase: KeyPhase | None,
     ) -> Speed:
         power: FloatArray = (np.abs(bins[usable & self._is_shaft]) ** 2).sum(axis=0)
@@ -403,9 +400,7 @@ class SegmentTransform(KeptSegments):
             spans.append(np.ptp(part, axis=1))
         return RecentVibration(stops, np.array(amplitudes), np.array(spans))
 
-    def _vortex_hz(
-        self, turn_hz: float, bins: ComplexArray, usable: npt.NDArray[np.bool_]
-    ) -> float | None:
+    def _vortex_hz(self, turn_hz: float, bins: ComplexArray, usable: BoolArray) -> float | None:
         """Return the vortex frequency in the spectra averaged up to now; None without a vortex."""
         low, high = self._settings.vortex_band
         band_hz = (low * turn_hz, high * turn_hz)
@@ -423,7 +418,7 @@ class SegmentTransform(KeptSegments):
         return vortex_frequency_hz(spectra, band_hz)
 
 
-def usable_channels(qualities: Sequence[Quality]) -> npt.NDArray[np.bool_]:
+def usable_channels(qualities: Sequence[Quality]) -> BoolArray:
     """Return a mask (n_channels,) of the channels that are not bad."""
     return np.array([quality.level is not Level.BAD for quality in qualities])
 

@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import BoolArray, FloatArray
 from core.machine.unit import BracketDynamics
 from core.quality import Reason
 from core.spectra.cross_spectrum import (
@@ -225,7 +224,7 @@ def _fitted(
     turn_rad_s = math.pi * sum(turn_hz)
     no_parts, no_share = np.zeros((len(measured), 2, N_PARTS)), np.zeros((len(measured), 1))
 
-    def fit() -> tuple[FilmFits, npt.NDArray[np.bool_]]:
+    def fit() -> tuple[FilmFits, BoolArray]:
         bracket_n_per_m = stiffness - mass_kg * omega**2 + 1j * omega * damping
         # a delay turns the phase back by ω times the delay
         changes[:, DELAY] = 1j * omega * bracket_n_per_m
@@ -269,7 +268,7 @@ def late_share(fits: FilmFits) -> FloatArray:
     return np.nan_to_num(certain * is_delay)
 
 
-def _delay(fits: FilmFits, may_be_late: npt.NDArray[np.bool_]) -> FloatArray:
+def _delay(fits: FilmFits, may_be_late: BoolArray) -> FloatArray:
     """Return the delay of the bearing channels, its uncertainty and per `DAMPING`, (3, n).
 
     Where a delay is not excluded it is beside a film of constant coefficients, otherwise beside
@@ -286,7 +285,7 @@ def _results(
     dropped: FloatArray,
     delay: FloatArray,
     mass_kg: FloatArray,
-    seeks_mass: npt.NDArray[np.bool_],
+    seeks_mass: BoolArray,
     bin_hz: float,
 ) -> list[DynamicStiffness]:
     delay_s, delay_std, delay_per_damping = delay

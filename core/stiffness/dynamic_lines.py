@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import ComplexArray, FloatArray
+from core.arrays import BoolArray, ComplexArray, FloatArray
 from core.spectra.cross_spectrum import (
     BEARING_X,
     CORRELATED_LINES,
@@ -68,7 +68,7 @@ class DynamicSettings:
 
 
 def used_lines(
-    spectra: Sequence[CrossSpectrum], between: npt.NDArray[np.bool_], settings: DynamicSettings
+    spectra: Sequence[CrossSpectrum], between: BoolArray, settings: DynamicSettings
 ) -> list[npt.NDArray[np.int64]]:
     """Return for each spectrum the indices of the lines that have motion and little leakage.
 
@@ -85,15 +85,15 @@ def used_lines(
     return [inside[own] for own in used]
 
 
-def _in_band(band_hz: tuple[float, float], spectrum: CrossSpectrum) -> npt.NDArray[np.bool_]:
+def _in_band(band_hz: tuple[float, float], spectrum: CrossSpectrum) -> BoolArray:
     """Return a mask of the lines of a band, (n_lines,)."""
-    inside: npt.NDArray[np.bool_] = spectrum.frequency_hz >= band_hz[0]
+    inside: BoolArray = spectrum.frequency_hz >= band_hz[0]
     return inside & (spectrum.frequency_hz <= band_hz[1])
 
 
 def between_harmonics(
     frequency_hz: FloatArray, turn_hz: tuple[float, float], guard_bins: float
-) -> npt.NDArray[np.bool_]:
+) -> BoolArray:
     """Return a mask of the lines between the harmonics of the running speed, (n_lines,).
 
     Parameters
@@ -111,11 +111,11 @@ def between_harmonics(
     # harmonic n guards a line f if n · lowest - guard <= f <= n · highest + guard
     last = np.floor((frequency_hz + guard_hz) / lowest)
     first = np.maximum(np.ceil((frequency_hz - guard_hz) / highest), 1.0)
-    clear: npt.NDArray[np.bool_] = first > last
+    clear: BoolArray = first > last
     return clear
 
 
-def little_leakage(shaft_power: FloatArray, lines: slice = slice(None)) -> npt.NDArray[np.bool_]:
+def little_leakage(shaft_power: FloatArray, lines: slice = slice(None)) -> BoolArray:
     """Return a mask of the lines with little leakage from stronger lines.
 
     Parameters
@@ -129,7 +129,7 @@ def little_leakage(shaft_power: FloatArray, lines: slice = slice(None)) -> npt.N
     (n, n_channels)
     """
     leaked = leakage_kernel(shaft_power.shape[0])[lines] @ shaft_power
-    little: npt.NDArray[np.bool_] = leaked <= MAX_LEAKAGE * shaft_power[lines]
+    little: BoolArray = leaked <= MAX_LEAKAGE * shaft_power[lines]
     return little
 
 
@@ -171,7 +171,7 @@ def own_power(matrix: ComplexArray) -> FloatArray:
 
 def probe_noise_power(
     spectra: Sequence[CrossSpectrum],
-    between: npt.NDArray[np.bool_],
+    between: BoolArray,
     settings: DynamicSettings,
     n_segments: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:

@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import ComplexArray, FloatArray
+from core.arrays import BoolArray, ComplexArray, FloatArray
 from core.spectra.cross_spectrum import (
     CORRELATED_LINES,
     SMEARED_APART,
@@ -354,7 +353,7 @@ def _summed(weight: FloatArray, values: FloatArray) -> FloatArray:
     return total
 
 
-def _inverse(information: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+def _inverse(information: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Return inverses of (n, p, p) matrices, and where they are positive definite.
 
     Elsewhere the inverse is the identity.

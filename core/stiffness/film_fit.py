@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import ComplexArray, FloatArray
+from core.arrays import BoolArray, ComplexArray, FloatArray
 from core.spectra.cross_spectrum import BEARING_X
 from core.stiffness.dynamic_lines import conditional_power, own_power
 
@@ -277,9 +277,7 @@ def _largest_share(part: FloatArray, whole: FloatArray) -> FloatArray:
     return np.where(singular, 1.0, (mixed + root) / np.where(singular, 1.0, 2.0 * determinant))
 
 
-def line_weights(
-    terms: FilmTerms, force_power: FloatArray
-) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+def line_weights(terms: FilmTerms, force_power: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Return the weights of the lines: reciprocals of the smoothed residual power.
 
     Fit of constant coefficients and weights are iterated. The first weights are the reciprocals of

@@ -129,7 +129,7 @@ class FilmInputs:
         """The `changes` divided by the bracket's dynamic stiffness, (n, 4, n_used)."""
         return self.changes / self.bracket_n_per_m[:, np.newaxis]
 
-    @property
+    @cached_property
     def size(self) -> FloatArray:
         """Factors (n, 1) that convert inverse normal matrices to covariances of estimates."""
         return CORRELATED_LINES / (2.0 * self.n_segments)

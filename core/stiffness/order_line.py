@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import ComplexArray, FloatArray
+from core.arrays import BoolArray, ComplexArray, FloatArray
 from core.checks.sensor_checks import axes_quality, backward_share
 from core.machine.unit import Bearing
 from core.quality import GOOD, Quality, Reading, Reason, missing, worst
@@ -104,10 +103,10 @@ class OrderLine:
     bins: CrossSpectrum | None
     min_segments: int
     phasors_um_pk: ComplexArray
-    usable: npt.NDArray[np.bool_]
-    has_phase: npt.NDArray[np.bool_]
+    usable: BoolArray
+    has_phase: BoolArray
     at_mark_um_pk: ComplexArray
-    has_mark: npt.NDArray[np.bool_]
+    has_mark: BoolArray
     floors_um_pk: tuple[float, ...]
     round_shafts: frozenset[int] = frozenset()
 

@@ -4,9 +4,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import BoolArray, FloatArray
 from core.machine.unit import BearingAccuracy, BracketDynamics
 from core.spectra.cross_spectrum import SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.uncertainty import (
@@ -190,7 +189,7 @@ def _ratio_lines(
     )
 
 
-def changed_polls(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> npt.NDArray[np.bool_]:
+def changed_polls(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> BoolArray:
     """Return a mask (n_polls,) of the polls whose amplitudes differ from the poll before.
 
     The first poll counts as changed.
