@@ -22,6 +22,8 @@ ComplexArray: TypeAlias = npt.NDArray[np.complex128]
 
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 """Masks."""
+IntArray: TypeAlias = npt.NDArray[np.int64]
+"""Indices and counts."""
 
 TimeArray: TypeAlias = npt.NDArray[np.int64]
 """Times in nanoseconds since 1970, UTC."""

@@ -16,6 +16,10 @@ class AlarmLevel(IntEnum):
     DANGER = 2
 
 
+LEVELS = tuple(AlarmLevel)
+"""Both levels; iteration over the enumeration itself is slow."""
+
+
 @dataclass(frozen=True)
 class Judgement:
     """Result of checking the condition that an alarm monitors, at one time.
@@ -109,7 +113,7 @@ class Limits:
         levels = [
             level
             for level, high, low in zip(
-                AlarmLevel,
+                LEVELS,
                 (self.alert, self.danger),
                 (self.alert_below, self.danger_below),
                 strict=True,

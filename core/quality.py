@@ -59,6 +59,8 @@ class Quality:
 
 GOOD = Quality(Level.GOOD, Reason.OK)
 
+_BAD = Level.BAD
+
 
 @cache
 def uncertain(reason: Reason) -> Quality:
@@ -106,7 +108,7 @@ class Reading:
     interval_95: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        if (self.value is None) != (self.quality.level is Level.BAD):
+        if (self.value is None) != (self.quality.level is _BAD):
             level = self.quality.level.name.lower()
             raise ValueError(f"a reading of {level} quality cannot have the value {self.value}")
 
@@ -151,11 +153,11 @@ def current_mean(readings: Sequence[Reading], *, is_grazed: bool = False) -> Rea
     """
     newest = readings[-1]
     usable = [reading for reading in readings if reading.value is not None]
-    if newest.value is None and not (is_grazed and usable):
+    if newest.value is not None:
+        return mean_reading(usable)
+    if not (is_grazed and usable):
         return newest
     mean = mean_reading(usable)
-    if newest.value is not None:
-        return mean
     return replace(mean, quality=worst((mean.quality, uncertain(Reason.CLIPPED))))
 
 

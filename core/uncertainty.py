@@ -8,8 +8,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache, lru_cache
-from types import ModuleType
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +31,11 @@ class Kind(StrEnum):
 
     RANDOM = "random"
     SYSTEMATIC = "systematic"
+
+
+# names of a module are found faster than members of an enumeration
+_NORMAL, _UNIFORM = Distribution
+_RANDOM, _SYSTEMATIC = Kind
 
 
 class BudgetLine(NamedTuple):
@@ -120,7 +124,7 @@ def random_line(name: str, standard: float, freedoms: float = math.inf) -> Budge
     `standard` is its standard uncertainty in the unit of the result, and `freedoms` the degrees of
     freedom of this uncertainty; infinite if it is not estimated from data.
     """
-    return BudgetLine(name, Kind.RANDOM, Distribution.NORMAL, standard, 1.0, freedoms)
+    return BudgetLine(name, _RANDOM, _NORMAL, standard, 1.0, freedoms)
 
 
 def systematic_line(name: str, half_width: float, sensitivity: float) -> BudgetLine:
@@ -128,7 +132,7 @@ def systematic_line(name: str, half_width: float, sensitivity: float) -> BudgetL
 
     `sensitivity` is the change of the result per unit of the input quantity.
     """
-    return BudgetLine(name, Kind.SYSTEMATIC, Distribution.UNIFORM, half_width, sensitivity)
+    return BudgetLine(name, _SYSTEMATIC, _UNIFORM, half_width, sensitivity)
 
 
 def coverage_factor(lines: Sequence[BudgetLine], confidence: float = CONFIDENCE) -> float:
@@ -146,9 +150,9 @@ def _variances(lines: Iterable[BudgetLine]) -> tuple[float, float, float]:
     random = systematic = fourth = 0.0
     for _, kind, distribution, width, sensitivity, freedoms in lines:
         square = (width * sensitivity) ** 2
-        if distribution is Distribution.UNIFORM:
+        if distribution is _UNIFORM:
             square /= 3.0  # GUM, 4.3.7
-        if kind is Kind.RANDOM:
+        if kind is _RANDOM:
             random += square
         else:
             systematic += square
@@ -165,17 +169,11 @@ def _coverage_factor(combined: float, fourth: float, confidence: float) -> float
 @lru_cache(maxsize=256)
 def _quantile(freedoms: float, probability: float) -> float:
     """Return a quantile of Student's distribution, or of the normal one for infinite `freedoms`."""
-    special = _special_functions()
+    from scipy import special  # slow import, not needed at start
+
     if math.isinf(freedoms):
         return float(special.ndtri(probability))
     return float(special.stdtrit(freedoms, probability))
-
-
-@cache
-def _special_functions() -> ModuleType:
-    import scipy.special  # slow import, not needed at start
-
-    return scipy.special
 
 
 def proportional(value: float, budget: Budget) -> Budget:

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmRule, changed
-from core.limits import INACTIVE, ON, AlarmLevel, DelayTimer, Judgement
+from core.limits import INACTIVE, LEVELS, ON, AlarmLevel, DelayTimer, Judgement
 from core.units import NS_PER_S
 
 Timers = tuple[DelayTimer, DelayTimer]
@@ -88,7 +88,7 @@ def shown_again(alarm: Alarm) -> Alarm:
 def restored(alarm: Alarm) -> Alarm:
     """Return the alarm after a restart: an active alarm stays active, pending delays are reset."""
     level = None if alarm.is_latched else alarm.level
-    alert, danger = (ON if (level or 0) >= each else INACTIVE for each in AlarmLevel)
+    alert, danger = (ON if (level or 0) >= each else INACTIVE for each in LEVELS)
     return replace(alarm, timers=(alert, danger))
 
 
@@ -98,7 +98,7 @@ def next_level(held: AlarmLevel | None, timers: Iterable[Timers]) -> AlarmLevel 
     `held` is the present level, which is returned if no delay is running. `timers` are the pairs of
     delay timers (alert, danger) of the alarm, or of each direction of a film.
     """
-    pairs = [pair for each in timers for pair in zip(AlarmLevel, each, strict=True)]
+    pairs = [pair for each in timers for pair in zip(LEVELS, each, strict=True)]
     pending = [(level, timer.is_on) for level, timer in pairs if timer not in (INACTIVE, ON)]
     rising = max((level for level, is_on in pending if not is_on), default=None)
     if rising is not None and rising > (held or 0):
@@ -110,7 +110,7 @@ def next_level(held: AlarmLevel | None, timers: Iterable[Timers]) -> AlarmLevel 
 
 def standing_level(timers: Timers) -> AlarmLevel | None:
     """Return the highest level whose on-delay has elapsed, or None; the latch is disregarded."""
-    return max((n for n, t in zip(AlarmLevel, timers, strict=True) if t.is_on), default=None)
+    return max((n for n, t in zip(LEVELS, timers, strict=True) if t.is_on), default=None)
 
 
 def _raised(alarm: Alarm, level: AlarmLevel, now_ns: int) -> Alarm:
@@ -133,7 +133,7 @@ def _stepped(alarm: Alarm, now_ns: int, rule: AlarmRule) -> Timers:
     level = alarm.condition.level or 0
     alert, danger = (
         timer.step(level >= each, now_ns, rule.on_delay_ns, rule.off_delay_ns)
-        for each, timer in zip(AlarmLevel, alarm.timers, strict=True)
+        for each, timer in zip(LEVELS, alarm.timers, strict=True)
     )
     return alert, danger
 

@@ -5,10 +5,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmState
-from core.arrays import TimeArray
+from core.arrays import IntArray, TimeArray
 from core.limits import AlarmLevel
 from core.units import DAY_NS, NS_PER_S
 
@@ -160,7 +159,7 @@ def stale_alarms(alarms: Iterable[Alarm], now_ns: int) -> list[Alarm]:
     return [alarm for _, alarm in sorted(old, key=lambda pair: pair[0])]
 
 
-def _n_before(times: TimeArray, window_ns: int) -> npt.NDArray[np.int64]:
+def _n_before(times: TimeArray, window_ns: int) -> IntArray:
     """Return the number of sorted times in the closed window that ends at each time."""
     return np.arange(1, times.size + 1) - np.searchsorted(times, times - window_ns)
 

@@ -4,9 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import BoolArray, FloatArray
+from core.arrays import BoolArray, FloatArray, IntArray
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import Support
 from core.baseline.grouping import group_readings, robust_std
@@ -74,9 +73,7 @@ def learning_drift(
     return drift_within(groups.day, groups.value, cell.reshape(-1))
 
 
-def drift_within(
-    day: npt.NDArray[np.int64], value: FloatArray, cell: npt.NDArray[np.int64]
-) -> Drift | None:
+def drift_within(day: IntArray, value: FloatArray, cell: IntArray) -> Drift | None:
     """Return the drift of values (n,), n ≥ 1, whose `day` and condition cell are given, (n,).
 
     Values are compared within each cell. None if fewer than `MIN_SPELLS` time blocks contain values
@@ -96,7 +93,7 @@ def drift_within(
     return Drift(slope, float(np.sqrt(np.sum(scores**2)) / np.sum(time**2)))
 
 
-def _within(x: FloatArray, cell: npt.NDArray[np.int64]) -> FloatArray:
+def _within(x: FloatArray, cell: IntArray) -> FloatArray:
     """Return the differences (n,) of the values from the mean of their cell."""
     _, number = np.unique(cell, return_inverse=True)
     mean = np.bincount(number, weights=x) / np.bincount(number)

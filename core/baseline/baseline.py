@@ -3,9 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import BoolArray, FloatArray
+from core.arrays import BoolArray, FloatArray, IntArray
 from core.baseline.cell_table import NODES, CellTable
 from core.baseline.history import QUANTITIES, StiffnessHistory
 from core.baseline.surface import ATTITUDE_TERMS, Surface, attitude_terms
@@ -81,7 +80,7 @@ class Deviations:
     """
 
     is_known: BoolArray
-    place: npt.NDArray[np.int64]
+    place: IntArray
     deviation: FloatArray
     weight: FloatArray
     scatter: FloatArray
@@ -198,7 +197,7 @@ class QuantityBaseline:
         rise[known] = here.eccentricity_ratio * self.surface.slope(here)
         return rise
 
-    def _surface_std(self, conditions: FilmConditions, cell: npt.NDArray[np.int64]) -> FloatArray:
+    def _surface_std(self, conditions: FilmConditions, cell: IntArray) -> FloatArray:
         """Return the uncertainty of the surface (n,), with that of the attitude terms."""
         std = self._between_nodes(conditions, cell)
         if not self.surface.shape.has_attitude:
@@ -209,7 +208,7 @@ class QuantityBaseline:
         variance = std**2 + np.maximum(np.sum(turned * (covariance @ turned), axis=0), 0.0)
         return np.asarray(np.sqrt(variance))
 
-    def _between_nodes(self, conditions: FilmConditions, cell: npt.NDArray[np.int64]) -> FloatArray:
+    def _between_nodes(self, conditions: FilmConditions, cell: IntArray) -> FloatArray:
         """Return the uncertainty of the surface (n,), bilinear between the nodes of the cell."""
         i, along_e = _steps(conditions.eccentricity_ratio, self.grid.eccentricity_width)
         j, along_t = _steps(conditions.oil_temperature_c, self.grid.temperature_width_c)
@@ -220,7 +219,7 @@ class QuantityBaseline:
         return np.asarray(low * (1.0 - along_e) + high * along_e)
 
 
-def _steps(x: FloatArray, width: float) -> tuple[npt.NDArray[np.int64], FloatArray]:
+def _steps(x: FloatArray, width: float) -> tuple[IntArray, FloatArray]:
     """Return the index of the next lower node of each x, and the fraction of the step above it."""
     steps = x / width % 1.0 * (NODES - 1)
     node = np.minimum(np.floor(steps), NODES - 2)

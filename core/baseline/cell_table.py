@@ -6,9 +6,8 @@ from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, IntArray
 from core.condition.cells import Cell, CellArray, FilmConditions
 
 NODES = 3
@@ -95,7 +94,7 @@ class CellTable:
         if len({len(name) for name in names}) > 1:
             raise ValueError("all cells must have the same number of axes, 2 or 3")
 
-    def find(self, cells: CellArray) -> npt.NDArray[np.int64]:
+    def find(self, cells: CellArray) -> IntArray:
         """Return the table row of each of n cells (n,); -1 for a missing or unsupported cell."""
         if not self.cells:
             return np.full(cells.shape[1], -1)
@@ -134,7 +133,7 @@ class CellTable:
         return FilmConditions(*np.array(rows, np.float64).reshape(-1, 3).T)
 
     @cached_property
-    def _places(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    def _places(self) -> tuple[IntArray, IntArray]:
         """Lowest bin number of each axis, and table rows indexed by bin number minus the lowest."""
         bins = np.array([cell.cell for cell in self.cells])
         low = bins.min(axis=0)

@@ -4,9 +4,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import BoolArray, FloatArray, TimeArray
+from core.arrays import BoolArray, FloatArray, IntArray, TimeArray
 from core.condition.cells import CellGrid, FilmConditions
 from core.units import DAY_NS
 
@@ -20,8 +19,8 @@ class Groups:
 
     conditions: FilmConditions
     value: FloatArray
-    n_readings: npt.NDArray[np.int64]
-    day: npt.NDArray[np.int64]
+    n_readings: IntArray
+    day: IntArray
 
     def rows(self, wanted: BoolArray) -> "Groups":
         """Return the groups selected by a mask (n_groups,)."""
@@ -55,7 +54,7 @@ def group_readings(
     return Groups(middle, group_medians(value, group), np.bincount(group), keys[0])
 
 
-def group_medians(x: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
+def group_medians(x: FloatArray, group: IntArray) -> FloatArray:
     """Return the median of x (n,) in each group, (n_groups,); `group` (n,) is the group index."""
     x = x[np.lexsort((x, group))]
     count = np.bincount(group)

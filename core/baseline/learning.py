@@ -1,9 +1,8 @@
 """Learning of a baseline from the readings of a healthy bearing."""
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import BoolArray, FloatArray, TimeArray
+from core.arrays import BoolArray, FloatArray, IntArray, TimeArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
 from core.baseline.cell_table import CellTable
 from core.baseline.grouping import Groups, group_readings
@@ -54,9 +53,9 @@ def _is_known_without(
     left_out: int,
     settings: BaselineSettings,
     groups: Groups,
-    group_fold: npt.NDArray[np.int64],
+    group_fold: IntArray,
     table: CellTable,
-    place: npt.NDArray[np.int64],
+    place: IntArray,
 ) -> BoolArray:
     """Return whether each cell has at least half of `min_days` without the fold `left_out`."""
     group_place = table.find(settings.grid.cells(groups.conditions))

@@ -3,9 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, IntArray
 from core.baseline.baseline import TimeScatter
 from core.baseline.cell_table import CellTable
 from core.baseline.grouping import (
@@ -30,8 +29,8 @@ MAX_LASTING = 0.95
 def with_scatter(
     table: CellTable,
     slope: FloatArray,
-    place: npt.NDArray[np.int64],
-    day: npt.NDArray[np.int64],
+    place: IntArray,
+    day: IntArray,
     deviation: FloatArray,
 ) -> CellTable:
     """Return the table with estimated `scatter` and `lasting`; unchanged without deviations.
@@ -64,9 +63,7 @@ def with_scatter(
     )
 
 
-def _own(
-    place: npt.NDArray[np.int64], mean: FloatArray, n_cells: int
-) -> tuple[FloatArray, FloatArray]:
+def _own(place: IntArray, mean: FloatArray, n_cells: int) -> tuple[FloatArray, FloatArray]:
     """Return the scatter of the daily means, and the number of days, of each cell (n_cells,)."""
     own, n_days = np.zeros(n_cells), np.zeros(n_cells)
     seen, numbered = np.unique(place, return_inverse=True)
@@ -75,9 +72,7 @@ def _own(
     return own, n_days
 
 
-def _daily(
-    place: npt.NDArray[np.int64], day: npt.NDArray[np.int64], deviation: FloatArray
-) -> tuple[npt.NDArray[np.int64], FloatArray]:
+def _daily(place: IntArray, day: IntArray, deviation: FloatArray) -> tuple[IntArray, FloatArray]:
     """Return the table row and the mean deviation of each day in each cell."""
     keys, group = np.unique(np.vstack([place, day]), axis=1, return_inverse=True)
     group = group.reshape(-1)
@@ -93,7 +88,7 @@ HALVINGS = 24
 
 def time_scatter(
     deviation: FloatArray,
-    place: npt.NDArray[np.int64],
+    place: IntArray,
     table: CellTable,
     settings: BaselineSettings,
 ) -> tuple[TimeScatter, ...]:

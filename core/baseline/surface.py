@@ -4,9 +4,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, IntArray
 from core.condition.cells import FilmConditions
 
 ATTITUDE_TERMS = 4
@@ -34,7 +33,7 @@ class KnotAxis:
         """Number of cubic B-splines that are non-zero on the axis."""
         return self.n_intervals + 3
 
-    def splines(self, x: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    def splines(self, x: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return the non-zero splines at each x (n,).
 
         Beyond the ends, the outermost cubic polynomials are extrapolated.
@@ -72,7 +71,7 @@ class SurfaceShape:
         tensor = self.eccentricity.n_splines * self.temperature.n_splines
         return tensor + (ATTITUDE_TERMS if self.has_attitude else 0)
 
-    def terms(self, conditions: FilmConditions) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    def terms(self, conditions: FilmConditions) -> tuple[IntArray, FloatArray]:
         """Return indices and values (16, n) of the non-zero products of splines at n conditions."""
         first_e, value_e = self.eccentricity.splines(conditions.eccentricity_ratio)
         first_t, value_t = self.temperature.splines(conditions.oil_temperature_c)

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, IntArray
 from core.baseline.grouping import Groups, bisquare, robust_std
 from core.baseline.surface import ATTITUDE_TERMS, KnotAxis, Surface, SurfaceShape
 
@@ -139,7 +138,7 @@ class _Points:
     design: FloatArray
     y: FloatArray
     trust: FloatArray
-    day: npt.NDArray[np.int64]
+    day: IntArray
 
     @classmethod
     def of(cls, groups: Groups, shape: SurfaceShape, offset: float) -> "_Points":

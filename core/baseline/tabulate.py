@@ -4,9 +4,8 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import FloatArray
+from core.arrays import FloatArray, IntArray
 from core.baseline.cell_table import (
     NODES,
     CellStatistics,
@@ -146,7 +145,7 @@ def _node_std(contents: dict[Cell, _Contents], fit: Fit, grid: CellGrid) -> list
 
 def _support_counts(
     groups: Groups, fit: Fit, grid: CellGrid, cells: CellArray
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+) -> tuple[IntArray, IntArray]:
     """Return the numbers of readings and days of each cell (n_cells,), without rejected groups."""
     believed = groups.rows(fit.robust_weight >= BELIEVED)
     place = _find_columns(grid.cells(believed.conditions), cells)
@@ -156,7 +155,7 @@ def _support_counts(
     return n_readings, np.bincount(days, minlength=n)
 
 
-def _find_columns(wanted: CellArray, cells: CellArray) -> npt.NDArray[np.int64]:
+def _find_columns(wanted: CellArray, cells: CellArray) -> IntArray:
     """Return the index of each wanted column (n,) in `cells`, which `np.unique` has sorted."""
     low = np.minimum(cells.min(axis=1), wanted.min(axis=1, initial=0))[:, np.newaxis]
     size = tuple(np.maximum(cells.max(axis=1), wanted.max(axis=1, initial=0)) - low[:, 0] + 1)

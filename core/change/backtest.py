@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from itertools import repeat
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import BoolArray, FloatArray, TimeArray
+from core.arrays import BoolArray, FloatArray, IntArray, TimeArray
 from core.baseline.baseline import QuantityBaseline
 from core.baseline.history import CodeArray, StiffnessHistory
 from core.change.decision import INITIAL_DECISION, Decision, outcomes, step
@@ -105,7 +104,7 @@ class DecisionHistory:
     significance: FloatArray
     time_scale_h: FloatArray
 
-    def raised(self) -> npt.NDArray[np.int64]:
+    def raised(self) -> IntArray:
         """Return the indices (n_raised,) at which the level is higher than just before."""
         return np.flatnonzero(np.diff(self.level, prepend=np.int8(0)) > 0)
 

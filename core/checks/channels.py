@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import BoolArray, FloatArray, RawArray
+from core.arrays import BoolArray, FloatArray, IntArray, RawArray
 from core.quality import GOOD, Level, Quality, Reason, bad, uncertain
 
 COUNTS_FULL_SCALE = 32768
@@ -51,7 +51,7 @@ class ChannelLimits:
 
 def channel_verdicts(
     samples: RawArray,
-    starts: npt.NDArray[np.int64],
+    starts: IntArray,
     is_ok: BoolArray,
     limits: ChannelLimits,
 ) -> VerdictArray:

@@ -7,7 +7,7 @@ from typing import Self, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import BoolArray, FloatArray
+from core.arrays import BoolArray, FloatArray, IntArray
 from core.condition.operating_state import OperatingState
 
 
@@ -41,7 +41,7 @@ class FilmConditions:
 Cell: TypeAlias = tuple[int, ...]
 """Bin numbers of eccentricity ratio, oil temperature and, if in the grid, attitude angle."""
 
-CellArray: TypeAlias = npt.NDArray[np.int64]
+CellArray: TypeAlias = IntArray
 """Cells of n readings as bin numbers (n_axes, n), in the order of the axes in `Cell`."""
 
 

@@ -80,9 +80,8 @@ class UnitEvaluation:
 
     @cached_property
     def _bearings(self) -> "dict[str, _Bearing]":
-        averaged = _AveragedSegments(self.unit, self.kept)
-        given = self.settings, self.kept, self.n_expected, averaged
-        return {bearing.id: _Bearing(self.unit, bearing, *given) for bearing in self.unit.bearings}
+        averaged = _AveragedSegments(self.unit, self.settings, self.kept)
+        return {each.id: _Bearing(each, self, averaged) for each in self.unit.bearings}
 
     @cached_property
     def _films(self) -> dict[str, DynamicStiffness | Reason]:
@@ -133,9 +132,11 @@ class _AveragedSegments:
         Whether `at_mark_um_pk` is known.
     floors_um_pk : (n_channels, 2)
         Amplitudes that noise of the channels gives 1× and vortex.
+    steadiness
+        Quality of the data: uncertain if speed or power varied by more than its limit.
     """
 
-    def __init__(self, unit: Unit, kept: KeptSegments) -> None:
+    def __init__(self, unit: Unit, settings: AnalysisSettings, kept: KeptSegments) -> None:
         self.segments = segments = list(kept.segments)
         self.each_hz: FloatArray = np.array([s.order_frequency_hz for s in segments])
         self.order_hz: FloatArray = self.each_hz.mean(axis=0)
@@ -149,21 +150,22 @@ class _AveragedSegments:
         factors = np.abs(displacement_factors(unit.channels, self.order_hz))
         own = factors * np.array([[channel.line_floor] for channel in unit.channels])
         self.floors_um_pk = Resolution(unit).floors(own)
+        power = unit.power_channel
+        speeds = [s.speed.rpm for s in segments]
+        powers = [s.slow.get(power, NOT_MEASURED) for s in segments] if power else []
+        self.steadiness = stationarity(
+            _numbers(speeds), _numbers(powers), settings.sensors, unit.rated_power_mw
+        )
 
 
 class _Bearing:
     """Computation of the readings of one bearing from one set of segments or polls."""
 
     def __init__(
-        self,
-        unit: Unit,
-        bearing: Bearing,
-        settings: AnalysisSettings,
-        kept: KeptSegments,
-        n_expected: int,
-        averaged: _AveragedSegments,
+        self, bearing: Bearing, whole: UnitEvaluation, averaged: _AveragedSegments
     ) -> None:
-        self._unit, self._bearing, self._settings = unit, bearing, settings
+        unit, kept = whole.unit, whole.kept
+        self._unit, self._bearing, self._settings = unit, bearing, whole.settings
         self._averaged, self._order_hz = averaged, averaged.order_hz
         self._segments = segments = averaged.segments
         self._min_segments = kept.min_segments
@@ -185,10 +187,10 @@ class _Bearing:
             [segments[-1].line_quality(row, line) for row in rows] for line in (ORDER1, VORTEX)
         ]
         self._n_segments = int(self._whole.sum())
-        self._coverage = self._n_segments / n_expected
+        self._coverage = self._n_segments / whole.n_expected
         self._lines = self._order_lines()
         axes_quality = self._lines[ORDER1].axes_quality(unit.rotation_sense)
-        self._doubts = worst((self._steadiness(), axes_quality))
+        self._doubts = worst((averaged.steadiness, axes_quality))
 
     @property
     def evidence(self) -> Evidence:
@@ -295,17 +297,6 @@ class _Bearing:
         channel = self._bearing.channels[place]
         counted = zip(self._segments, self._usable[:, ORDER1, place], strict=True)
         return all(s.runout[channel] is RunoutVerdict.APPLIED for s, usable in counted if usable)
-
-    def _steadiness(self) -> Quality:
-        """Return the data quality: uncertain if speed or power varied by more than its limit."""
-        power = self._unit.power_channel
-        speeds = [segment.speed.rpm for segment in self._segments]
-        powers = (
-            [segment.slow.get(power, NOT_MEASURED) for segment in self._segments] if power else []
-        )
-        return stationarity(
-            _numbers(speeds), _numbers(powers), self._settings.sensors, self._unit.rated_power_mw
-        )
 
     def _order(self, prefix: str, line: int) -> Found:
         quality_of = self._line_quality if line == ORDER1 else self._vortex_quality

@@ -7,9 +7,8 @@ from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import BoolArray, FloatArray, RawArray, SampleArray
+from core.arrays import BoolArray, FloatArray, IntArray, RawArray, SampleArray
 from core.checks.channels import (
     NOT_FINITE,
     VERDICTS,
@@ -96,8 +95,8 @@ class SideValues:
         Values of the slow channels; NaN if the device has none.
     """
 
-    starts: npt.NDArray[np.int64]
-    start_ns: npt.NDArray[np.int64]
+    starts: IntArray
+    start_ns: IntArray
     ok: BoolArray
     slow: FloatArray
 

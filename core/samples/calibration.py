@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import FloatArray, RawArray, SampleArray
+from core.arrays import FloatArray, IntArray, RawArray, SampleArray
 from core.checks.channels import COUNTS_FULL_SCALE, ChannelLimits
 from core.quality import Reading, Reason, mean_reading, missing
 
@@ -71,7 +70,7 @@ class SlowCalibration:
             return missing(Reason.OUT_OF_RANGE)
         return Reading(float(value))
 
-    def mean(self, values: FloatArray, weights: npt.NDArray[np.int64]) -> Reading:
+    def mean(self, values: FloatArray, weights: IntArray) -> Reading:
         """Return the weighted mean of slow values; equals `core.quality.mean_reading` bit by bit.
 
         Parameters

@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import SampleArray
+from core.arrays import IntArray, SampleArray
 from core.checks.channels import worst_qualities
 from core.quality import NOT_MEASURED, Quality, Reading, mean_reading
 from core.samples.blocks import BlockMisfitError, SampleBlock
@@ -63,7 +62,7 @@ class _Part:
     block: SampleBlock
     cells: slice
     samples: slice
-    weights: npt.NDArray[np.int64]
+    weights: IntArray
 
     @classmethod
     def of(cls, block: SampleBlock, first_index: int, stop_index: int) -> "_Part":

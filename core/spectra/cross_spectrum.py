@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import BoolArray, ComplexArray, FloatArray
-from core.spectra.lines import hann, peak_frequency_hz
+from core.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from core.spectra.lines import hann
 
 SHAFT_X, SHAFT_Y, BEARING_X, BEARING_Y = range(4)
 """Indices of a bearing's four channels in all matrices."""
@@ -35,7 +34,7 @@ class CrossSpectrum:
     frequency_hz: FloatArray
     matrix: ComplexArray
     power: FloatArray
-    n_segments: npt.NDArray[np.int64]
+    n_segments: IntArray
 
     def amplitude_um_pk(self, channel: int) -> FloatArray:
         """Return the rms over the segments of a channel's amplitudes in µm 0-pk, (n_lines,)."""
@@ -170,9 +169,7 @@ SMEAR_BINS_SQUARED = 1.0 / 3.0
 """Variance of the frequencies, in bins squared, that contribute to a line of broadband noise."""
 
 
-def correlated_sum(
-    terms: FloatArray, lines: npt.NDArray[np.int64], products: FloatArray
-) -> FloatArray:
+def correlated_sum(terms: FloatArray, lines: IntArray, products: FloatArray) -> FloatArray:
     """Return the covariance matrices of sums over lines whose terms are correlated.
 
     Terms are correlated if their lines are at most 2 bins apart. n is the number of sets of lines.
@@ -234,7 +231,8 @@ def shared_power(spectra: Sequence[CrossSpectrum]) -> FloatArray:
     """Return the shaft's power that is coherent with the bearing's motion, µm², (n_lines,).
 
     The coherence is corrected for the bias of few segments; the power is summed over directions and
-    bearings. `spectra` are those of one or more bearings, at the same lines.
+    bearings. A line of one probe alone (runout, mains, a loose cable) is not in it. `spectra` are
+    those of one or more bearings, at the same lines.
     """
     shared = np.zeros(spectra[0].frequency_hz.size)
     for spectrum in spectra:
@@ -244,14 +242,3 @@ def shared_power(spectra: Sequence[CrossSpectrum]) -> FloatArray:
             coherence = np.maximum(spectrum.coherence(shaft, bearing) - chance, 0.0)
             shared += spectrum.power[:, shaft, bearing] * coherence / (1.0 - chance)
     return shared
-
-
-def vortex_frequency_hz(
-    spectra: Sequence[CrossSpectrum], band_hz: tuple[float, float]
-) -> float | None:
-    """Return the frequency in Hz of the strongest line of `shared_power` in a band.
-
-    A line of one probe alone (runout, mains, a loose cable) does not count. None if no line of the
-    band is a peak, or if none is coherent.
-    """
-    return peak_frequency_hz(shared_power(spectra), spectra[0].frequency_hz, band_hz)

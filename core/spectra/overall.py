@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import ComplexArray, FloatArray
+from core.arrays import ComplexArray, FloatArray, IntArray
 from core.machine.channel import Measurand, displacement_factor
 from core.machine.unit import Unit
 from core.quality import Reading
@@ -128,7 +128,7 @@ class RecentVibration:
         Range of the raw samples; valid only for channels that measure displacement.
     """
 
-    stop: npt.NDArray[np.int64]
+    stop: IntArray
     order1_um_pk: FloatArray
     peak_to_peak_um: FloatArray
 
@@ -141,9 +141,7 @@ class RecentReadings:
     readings: Mapping[str, Reading]
 
 
-def parts_of(
-    n_samples: int, hop_samples: int, turn_samples: float
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def parts_of(n_samples: int, hop_samples: int, turn_samples: float) -> tuple[IntArray, IntArray]:
     """Return the first sample of each part of a segment and the first sample after it, (n_parts,).
 
     The parts cover the last `hop_samples` samples of the segment of `n_samples` samples. A part has

@@ -23,12 +23,13 @@ from core.machine.channel import displacement_factors
 from core.machine.unit import Unit
 from core.quality import GOOD, Level, Quality, Reading, Reason, bad, missing, uncertain, worst
 from core.samples.ring import Window
-from core.spectra.cross_spectrum import average, vortex_frequency_hz
+from core.spectra.cross_spectrum import average, shared_power
 from core.spectra.lines import (
     SegmentSettings,
     bin_phasors,
     line_phasors,
     part_phasors,
+    peak_frequency_hz,
     taper_weights,
     turning_factors,
 )
@@ -415,7 +416,7 @@ class SegmentTransform(KeptSegments):
             average(self.frequency_hz[near], phasors[:, rows], counted[:, rows])
             for rows in self._bearing_rows
         ]
-        return vortex_frequency_hz(spectra, band_hz)
+        return peak_frequency_hz(shared_power(spectra), self.frequency_hz[near], band_hz)
 
 
 def usable_channels(qualities: Sequence[Quality]) -> BoolArray:

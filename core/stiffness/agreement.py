@@ -6,7 +6,7 @@ comparison. All other uncertainties in the budgets can explain a difference.
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from core.stiffness.stiffness_budget import (
     STATISTICS,
     motion_across,
 )
-from core.uncertainty import SHAFT_GAIN, Budget, Kind, coverage_factor, random_line
+from core.uncertainty import SHAFT_GAIN, Budget, Kind, coverage_factor, random_line, systematic_line
 
 FALSE_ALARM = 1e-6
 """Probability of a false disagreement. A bearing has about 100,000 independent averages of five
@@ -79,15 +79,11 @@ def contradicting(
             for prefix in lines
             if (names := ESTIMATORS[TRANSFERS[prefix]].names(axes))[1] in budgets
         }
-        of_line = {
-            prefix: {name for name in budgets if name.startswith(prefix) and f"_{axes}_" in name}
-            for prefix in lines
-        }
         if found is None:
             if len(at_lines) > 1 and any(
                 itertools.starmap(disagree, zip(*at_lines.values(), strict=True))
             ):
-                doubted = doubted.union(*of_line.values())
+                doubted = doubted.union(*(_of_line(budgets, prefix, axes) for prefix in lines))
             continue
         of_row = DYNAMIC_COEFFICIENTS[row]
         if not all(name in budgets for name in of_row):
@@ -102,8 +98,12 @@ def contradicting(
             parts = np.array([factors.real, factors.imag / omega])
             expected = _combined(film, parts, covariance)
             if any(map(disagree, expected, measured, itertools.repeat(KNOWN))):
-                doubted |= of_line[prefix] | {*of_row, f"dynamic_ck_{axes}_s"}
+                doubted |= _of_line(budgets, prefix, axes) | {*of_row, f"dynamic_ck_{axes}_s"}
     return doubted
+
+
+def _of_line(names: Iterable[str], prefix: str, axes: str) -> set[str]:
+    return {name for name in names if name.startswith(prefix) and f"_{axes}_" in name}
 
 
 def _combined(
@@ -117,18 +117,13 @@ def _combined(
         [line for line in b.lines if line.kind is Kind.SYSTEMATIC and line.name not in KNOWN]
         for b in budgets
     ]
-    values = (factors @ [budget.value for budget in budgets]).tolist()
+    names, widths = [line.name for line in systematic[0]], [line.width for line in systematic[0]]
+    values = factors @ [budget.value for budget in budgets]
     sensitivities = factors @ [[line.sensitivity for line in lines] for lines in systematic]
-    variances = np.einsum("ni,ij,nj->n", factors, covariance, factors)
+    std = np.sqrt(np.einsum("ni,ij,nj->n", factors, covariance, factors))
     return [
-        Budget(
-            value,
-            (
-                random_line(STATISTICS, std),
-                *(line._replace(sensitivity=s) for line, s in zip(systematic[0], of, strict=True)),
-            ),
-        )
-        for value, std, of in zip(
-            values, np.sqrt(variances).tolist(), sensitivities.tolist(), strict=True
+        Budget(value, (random_line(STATISTICS, each), *map(systematic_line, names, widths, per)))
+        for value, each, per in zip(
+            values.tolist(), std.tolist(), sensitivities.tolist(), strict=True
         )
     ]

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from core.arrays import BoolArray, ComplexArray, FloatArray
+from core.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from core.spectra.cross_spectrum import (
     BEARING_X,
     CORRELATED_LINES,
@@ -69,7 +68,7 @@ class DynamicSettings:
 
 def used_lines(
     spectra: Sequence[CrossSpectrum], between: BoolArray, settings: DynamicSettings
-) -> list[npt.NDArray[np.int64]]:
+) -> list[IntArray]:
     """Return for each spectrum the indices of the lines that have motion and little leakage.
 
     `between` (n_lines,) is the mask of the lines between the harmonics of the running speed.

@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import BoolArray, ComplexArray, FloatArray
+from core.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from core.spectra.cross_spectrum import BEARING_X
 from core.stiffness.dynamic_lines import conditional_power, own_power
 
@@ -99,7 +99,7 @@ class FilmLines:
     def __init__(
         self,
         matrices: Sequence[ComplexArray],
-        lines: Sequence[npt.NDArray[np.int64]],
+        lines: Sequence[IntArray],
         frequency_hz: FloatArray,
         noise_power: FloatArray,
     ) -> None:

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core.arrays import ComplexArray, FloatArray
-from core.spectra.cross_spectrum import CrossSpectrum, average, roundness, vortex_frequency_hz
+from core.spectra.cross_spectrum import CrossSpectrum, average, roundness, shared_power
+from core.spectra.lines import peak_frequency_hz
 from core.spectra.orbit import ellipse_of, marks_of, order_phasors, trace_of
 
 RATE_HZ, TURN_HZ = 600.0, 92.3 / 60.0
@@ -151,15 +152,20 @@ def with_line(phasors: ComplexArray, line: int, size: float, rows: slice) -> Com
     return changed
 
 
+def vortex_hz(spectra: list[CrossSpectrum], band_hz: tuple[float, float]) -> float | None:
+    """Frequency of the strongest shared line in a band."""
+    return peak_frequency_hz(shared_power(spectra), spectra[0].frequency_hz, band_hz)
+
+
 def test_a_vortex_is_a_shared_line_and_neither_a_flank_nor_nothing():
     shared = with_line(noise(1), 5, 10.0, slice(None))
     louder_in_one_probe = with_line(shared, 8, 30.0, slice(0, 1))
     silent, moving = noise(1), with_line(noise(2), 6, 10.0, slice(None))
 
     for line, bearings in ((5, [louder_in_one_probe]), (6, [silent, moving])):
-        found = vortex_frequency_hz([spectrum(phasors) for phasors in bearings], (0.3, 0.7))
+        found = vortex_hz([spectrum(phasors) for phasors in bearings], (0.3, 0.7))
         assert found == pytest.approx(FREQUENCY_HZ[line], abs=0.3 * FREQUENCY_HZ[0])
 
     beyond = with_line(1e-3 * noise(1), 12, 10.0, slice(None))
-    assert vortex_frequency_hz([spectrum(beyond)], (0.6, 0.89)) is None
-    assert vortex_frequency_hz([orbit(0.0, 0.0)], (5.0, 6.0)) is None
+    assert vortex_hz([spectrum(beyond)], (0.6, 0.89)) is None
+    assert vortex_hz([orbit(0.0, 0.0)], (5.0, 6.0)) is None
