@@ -100,7 +100,9 @@ class Analysis:
         return (
             average(
                 self._transform.frequency_hz,
-                np.array([s.bin_phasors_um_pk[rows] for s in segments]),
+                np.stack([s.bin_phasors_um_pk[rows].T for s in segments], axis=2).transpose(
+                    2, 1, 0
+                ),
                 usable,
             ),
             average(

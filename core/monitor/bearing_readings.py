@@ -177,11 +177,11 @@ class _Bearing:
         # copying a slice is faster than copying rows in any order
         adjacent = slice(rows[0], rows[0] + len(rows))
         own = adjacent if rows == [*range(adjacent.start, adjacent.stop)] else rows
-        self._bins: ComplexArray = np.array(
-            [s.bin_phasors_um_pk[own] for s in segments if s.bin_phasors_um_pk is not None]
-        )
+        bins = [s.bin_phasors_um_pk[own].T for s in segments if s.bin_phasors_um_pk is not None]
         self.spectrum: CrossSpectrum | None = None
         if kept.frequency_hz is not None:
+            # in the memory layout of `average`, which then copies nothing
+            self._bins: ComplexArray = np.stack(bins, axis=2).transpose(2, 1, 0)
             self.spectrum = average(kept.frequency_hz, self._bins, self._usable[:, ORDER1])
         self._newest_quality = [
             [segments[-1].line_quality(row, line) for row in rows] for line in (ORDER1, VORTEX)
