@@ -80,21 +80,18 @@ def slow_channels(unit: Unit, bearing: Bearing) -> dict[str, str | None]:
     return fixed | recorded
 
 
-def slow_results(segments: Sequence[Segment], channels: Mapping[str, str | None]) -> Found:
-    """Return the means of slow channels over the segments, with their budgets, by quantity.
+def slow_result(segments: Sequence[Segment], channel: str | None) -> Budgeted:
+    """Return the mean of a slow channel over the segments, with its budget.
 
-    `channels` is from `slow_channels`; the reading of an absent channel has no value. Uncertainties
-    are due to the scatter, without the unknown calibration of the transmitters.
+    The reading of an absent channel (None) has no value. The uncertainty is due to the scatter,
+    without the unknown calibration of the transmitter.
     """
-    found: dict[str, Budgeted] = {}
-    for name, channel in channels.items():
-        mean, values = _mean_slow(segments, channel)
-        found[name] = mean, None if mean.value is None else mean_budget(mean.value, values)
-    return with_budgets(found)
+    mean, values = _mean_slow(segments, channel)
+    return mean, None if mean.value is None else mean_budget(mean.value, values)
 
 
 def pad_results(unit: Unit, bearing: Bearing, readings: Mapping[str, Reading]) -> Found:
-    """Return the pattern of a bearing's pad temperatures; `readings` are from `slow_results`."""
+    """Return the pattern of a bearing's pad temperatures; `readings` are from `slow_result`."""
     pads = [c for c in unit.slow_channels_of(bearing.id) if c.quantity == PAD_TEMPERATURE]
     return pad_pattern([(readings[pad.reading], pad.angle_deg) for pad in pads]), {}
 

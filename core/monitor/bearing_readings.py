@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 
 from core.arrays import BoolArray, ComplexArray, FloatArray
 from core.checks.sensor_checks import stationarity
-from core.condition.shaft_readings import pad_results, slow_channels, slow_results
+from core.condition.shaft_readings import pad_results, slow_channels, slow_result
 from core.machine.channel import displacement_factors
 from core.machine.unit import Bearing, Estimator, Unit
 from core.monitor.assessment import AnalysisSettings
@@ -132,6 +132,8 @@ class _AveragedSegments:
         Whether `at_mark_um_pk` is known.
     floors_um_pk : (n_channels, 2)
         Amplitudes that noise of the channels gives 1× and vortex.
+    slow
+        Function that returns the mean of a slow channel, by id, with its budget.
     steadiness
         Quality of the data: uncertain if speed or power varied by more than its limit.
     """
@@ -153,6 +155,7 @@ class _AveragedSegments:
         power = unit.power_channel
         speeds = [s.speed.rpm for s in segments]
         powers = [s.slow.get(power, NOT_MEASURED) for s in segments] if power else []
+        self.slow = cache(partial(slow_result, segments))
         self.steadiness = stationarity(
             _numbers(speeds), _numbers(powers), settings.sensors, unit.rated_power_mw
         )
@@ -210,7 +213,8 @@ class _Bearing:
         unit, segments = self._unit, self._segments
         speed = segments[-1].speed
         dynamic, dynamic_budgets, film = self._dynamic(found)
-        slow = slow_results(segments, slow_channels(unit, self._bearing))
+        channels = slow_channels(unit, self._bearing).items()
+        slow = with_budgets({name: self._averaged.slow(id_) for name, id_ in channels})
         parts: list[Found] = [
             with_budgets({"speed_rpm": (speed.rpm, speed.budget)}),
             slow,
