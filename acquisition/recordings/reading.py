@@ -98,9 +98,8 @@ def confined_messages(
 def _why_broken(process: ConfinedProcess, error: Exception) -> tuple[str, OSError | None]:
     """Return the reason why the child failed, and a system error if the file is not the cause."""
     if isinstance(error, TimeoutError):
-        return f"the reading process sent nothing for {SILENCE_S:g} s", _system_error(
-            errno.ETIMEDOUT
-        )
+        words = f"the reading process sent nothing for {SILENCE_S:g} s"
+        return words, _system_error(errno.ETIMEDOUT)
     words, code = process.last_words(), process.exit_code()
     is_of_file = code == FAILED or -code in _SIGNALS_OF_FAULTS
     return words, None if is_of_file else _system_error(errno.EINTR)

@@ -54,9 +54,8 @@ class _CsvFile:
         self._headings = [heading.strip() for heading in next(self._cells, [])]
         if len(self._headings) > MAX_COLUMNS:
             raise self._wrong(f"expected at most {MAX_COLUMNS} columns, got {len(self._headings)}")
-        mapped = [(c.place, c.unit) for c in job.channels] + [(c.place, c.unit) for c in job.slow]
-        for place, unit in mapped:
-            require_unit(place, unit_in(place.name), unit)
+        for column in (*job.channels, *job.slow):
+            require_unit(column.place, unit_in(column.place.name), column.unit)
         self._channels = [self._column(c.place) for c in job.channels]
         self._slow = [self._column(c.place) for c in job.slow]
         self._time = self._column(job.time.place) if job.time.place else None

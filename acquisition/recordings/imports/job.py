@@ -66,15 +66,21 @@ class TimeAxis:
 
 
 @dataclass(frozen=True)
-class ChannelColumn:
+class Column:
+    """Column of a channel; `factor` is the channel's unit of measurement per `unit` of the file."""
+
+    id: str
+    place: ColumnName
+    unit: str
+    factor: float
+
+
+@dataclass(frozen=True)
+class ChannelColumn(Column):
     """Column of a waveform channel.
 
     Parameters
     ----------
-    unit
-        Unit of measurement of the values in the file.
-    factor
-        Engineering units of the channel per unit of the file.
     calibrated_per_count
         Engineering units per count in the calibration of the channel; only counts with this scale
         are imported as counts.
@@ -82,25 +88,17 @@ class ChannelColumn:
         Value of one count in the unit of the file, for counts whose scale the file does not state.
     """
 
-    id: str
-    place: ColumnName
-    unit: str
-    factor: float
     calibrated_per_count: float
     per_count: float | None = None
 
 
 @dataclass(frozen=True)
-class SlowColumn:
+class SlowColumn(Column):
     """Column of a slow channel: value = factor × value in the file + offset.
 
     `time` is a time column of its own, in the form of the time axis; None for the waveform times.
     """
 
-    id: str
-    place: ColumnName
-    unit: str
-    factor: float
     offset: float = 0.0
     time: ColumnName | None = None
 

@@ -10,7 +10,13 @@ import numpy.typing as npt
 
 from acquisition.delivery.units import require_unit
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.job import ChannelColumn, ColumnName, ImportJob, SlowColumn
+from acquisition.recordings.imports.job import (
+    ChannelColumn,
+    Column,
+    ColumnName,
+    ImportJob,
+    SlowColumn,
+)
 from acquisition.recordings.imports.rows import Rows
 from acquisition.recordings.imports.times import TimeArray, from_start, numbers_to_ns
 from core.arrays import FloatArray, SampleArray
@@ -105,7 +111,7 @@ def series_rows(file: SeriesFile, job: ImportJob) -> Iterator[Rows]:
         )
 
 
-def _column(file: SeriesFile, column: ChannelColumn | SlowColumn) -> Series:
+def _column(file: SeriesFile, column: Column) -> Series:
     series = file.find(column.place)
     require_unit(column.place, series.unit, column.unit)
     return series
@@ -174,9 +180,7 @@ class _SlowFeed:
         self._values, self._n_read = np.append(self._values, values), stop
 
 
-def _times_of(
-    file: SeriesFile, job: ImportJob, column: ChannelColumn | SlowColumn, series: Series
-) -> Read:
+def _times_of(file: SeriesFile, job: ImportJob, column: Column, series: Series) -> Read:
     """Return a reader of the times of a column: its own time column, else the job's time axis."""
     own, axis = column.time if isinstance(column, SlowColumn) else None, job.time
     place = own or axis.place
