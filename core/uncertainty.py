@@ -169,11 +169,9 @@ def _coverage_factor(combined: float, fourth: float, confidence: float) -> float
 @lru_cache(maxsize=256)
 def _quantile(freedoms: float, probability: float) -> float:
     """Return a quantile of Student's distribution, or of the normal one for infinite `freedoms`."""
-    from scipy import special  # slow import, not needed at start
+    from scipy.special import ndtri, stdtrit  # slow import, not needed at start
 
-    if math.isinf(freedoms):
-        return float(special.ndtri(probability))
-    return float(special.stdtrit(freedoms, probability))
+    return float(ndtri(probability) if math.isinf(freedoms) else stdtrit(freedoms, probability))
 
 
 def proportional(value: float, budget: Budget) -> Budget:

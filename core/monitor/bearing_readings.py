@@ -269,6 +269,8 @@ class _Bearing:
         """
         averaged, rows = self._averaged, self._rows
         has_phase, floors_um_pk = averaged.has_phase[:, :, rows], averaged.floors_um_pk[rows]
+        at_mark_um_pk = averaged.at_mark_um_pk[:, rows]
+        round_shafts = frozenset(p for p in (SHAFT_X, SHAFT_Y) if self._is_round(p))
         orders = average(self._order_hz, self._phasors, self._usable[:, ORDER1])
         lines = []
         for line in (ORDER1, VORTEX):
@@ -288,10 +290,10 @@ class _Bearing:
                     phasors_um_pk=self._phasors[:, :, line],
                     usable=self._usable[:, line],
                     has_phase=has_phase[:, line],
-                    at_mark_um_pk=averaged.at_mark_um_pk[:, rows],
+                    at_mark_um_pk=at_mark_um_pk,
                     has_mark=averaged.has_mark & has_phase[:, ORDER1],
                     floors_um_pk=tuple(floors_um_pk[:, line].tolist()),
-                    round_shafts=frozenset(p for p in (SHAFT_X, SHAFT_Y) if self._is_round(p)),
+                    round_shafts=round_shafts,
                 )
             )
         return lines[0], lines[1]
