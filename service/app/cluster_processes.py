@@ -53,11 +53,8 @@ async def run_acquire(
         with suppress(TimeoutError):  # the rings of the devices may still contain the samples
             await asyncio.wait_for(publisher.waiting.drained(), DRAIN_S)
 
-    def checks() -> dict[str, str | None]:
-        return {"stream": publisher.trouble}
-
-    fill = partial(add_publisher, publisher=publisher)
-    health = HealthServer(host.listener, beats, live.status, units, checks, fill)
+    parts = (lambda: {"stream": publisher.trouble}, partial(add_publisher, publisher=publisher))
+    health = HealthServer(host.listener, beats, live.status, units, *parts)
     supervision = Supervision(host, beats, live.status, units)
     supervision.announce(url_of(host.listener))
     loops = {"publish": publisher.run, "health": health.run}

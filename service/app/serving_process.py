@@ -84,10 +84,8 @@ def server_of(
 
 def _names(plant: PlantFile) -> list[str]:
     """Return the accepted host names: those of the service and of the dashboard URL."""
-    names = [plant.service.host, *plant.service.hosts]
-    if plant.delivery.dashboard_url is not None:
-        names.append(urlsplit(plant.delivery.dashboard_url).hostname or "")
-    return [name for name in names if name]
+    dashboard = urlsplit(plant.delivery.dashboard_url or "").hostname
+    return [name for name in (plant.service.host, *plant.service.hosts, dashboard) if name]
 
 
 def access_desk(
