@@ -119,14 +119,9 @@ class Analysis:
         self.stream: Consumer | None = None
         self.soundness = IntegrityMonitor(store, clock, process.live)
         self.deliveries = Deliveries(receivers_of(plant, origin, clock), store.outbox, clock)
-        self.recorder = Recorder(
-            store,
-            process.live,
-            clock,
-            Path(plant.service.data_folder),
-            on_stored=self.deliveries.wake,
-            finds_again=part != WHOLE,
-        )
+        parts = (store, process.live, clock, Path(plant.service.data_folder))
+        wake = self.deliveries.wake
+        self.recorder = Recorder(*parts, on_stored=wake, finds_again=part != WHOLE)
         self.captures = kept_files.captures_of(plant, origin, clock)
         self.recordings = kept_files.waveform_keeper(plant, store, clock)
         pressure = Pressure(self.bus, self.recordings.is_full)

@@ -76,12 +76,8 @@ def _add_readings(families: Families, current: CurrentBearing, labels: Mapping[s
     for axis in "xy":
         estimator = estimators.get(axis * 2)
         if estimator is not None:
-            add(
-                "film_stiffness_newtons_per_meter",
-                f"stiffness_{axis * 2}_n_per_m",
-                direction=axis,
-                estimator=estimator.value,
-            )
+            name, quantity = "film_stiffness_newtons_per_meter", f"stiffness_{axis * 2}_n_per_m"
+            add(name, quantity, direction=axis, estimator=estimator.value)
         for place in (f"shaft_{axis}", f"bearing_{axis}"):
             add("order1_pk_meters", f"order1_{place}_um_pk", UM_PER_M, place=place)
     add("eccentricity_ratio", "eccentricity_ratio")

@@ -128,12 +128,8 @@ class Analyser:
 
     def memory(self, unit: str) -> UnitMemory:
         """Return the analysis state of a unit, from which another process continues."""
-        return UnitMemory(
-            self.monitors[unit].state,
-            self.alarms.units[unit].memory,
-            self._films.memory(unit),
-            self._counts[unit].count,
-        )
+        monitor, alarms = self.monitors[unit].state, self.alarms.units[unit].memory
+        return UnitMemory(monitor, alarms, self._films.memory(unit), self._counts[unit].count)
 
     def rewind(self, unit: str, memory: UnitMemory) -> None:
         """Prepare the monitor of a unit for a replay of its newest samples, from a stored state."""

@@ -137,14 +137,9 @@ class Learner:
         since_ns = self._since_ns(place, versions)
         if versions.is_frozen or since_ns is None:
             return False
-        newest = next(
-            (
-                entry
-                for entry in self._store.baselines(place.unit, place.bearing)
-                if entry.estimator is place.estimator and entry.created_ns >= since_ns
-            ),
-            None,
-        )
+        entries = self._store.baselines(place.unit, place.bearing)
+        own = (each for each in entries if each.estimator is place.estimator)
+        newest = next((entry for entry in own if entry.created_ns >= since_ns), None)
         if newest is None:
             return now_ns - since_ns >= self._settings.baseline.min_learning_days * DAY_NS
         until_ns = since_ns + round(self._settings.learning_days * DAY_NS)
@@ -174,12 +169,8 @@ class Learner:
         version = 1 + max((entry.version for entry in entries), default=0)
         whose = (place.unit, place.bearing)
         origin = Origin(*whose, place.estimator.value, version, PADWATCH, now_ns)
-        baseline = learn(
-            found.history,
-            is_healthy,
-            origin,
-            self._settings.baseline.settings(self._settings.reading_h),
-        )
+        settings = self._settings.baseline.settings(self._settings.reading_h)
+        baseline = learn(found.history, is_healthy, origin, settings)
         if not baseline.quantities:
             return None
         doubt = drifted(found.history, is_healthy, baseline, self._settings.alert_change)
