@@ -65,22 +65,17 @@ def test_a_child_that_the_system_has_ended_is_no_fault_of_the_recording(
     recording = open_recording(record([numbered(0, 50)]))
     (tmp_path / "ended.py").write_text(f"import os, signal; os.kill(os.getpid(), signal.{number})")
     monkeypatch.syspath_prepend(tmp_path)
-    with monkeypatch.context() as patch:
-        ended = partial(ConfinedProcess, "ended")
-        patch.setattr(reading, "_idle_or_new", ended)
-        with pytest.raises(
-            ConfigError, match=f"recording: the reading process was ended by {number}"
-        ) as it:
-            list(recording.heads())
-    assert isinstance(it.value.__cause__, cause)
-    with monkeypatch.context() as patch:
-        patch.setattr(reading, "ConfinedProcess", lambda *_, **__: ended())
+    ended, failed = partial(ConfinedProcess, "ended"), "process cannot be started: .*"
+    for name, replaced, message, reason in (
+        ("_idle_or_new", ended, "recording: the reading process was ended by ", cause),
+        ("ConfinedProcess", lambda *_, **__: ended(), failed, OSError),
+    ):
         reading.close_idle_children()
-        with pytest.raises(
-            ConfigError, match=f"reading process cannot be started: .*{number}"
-        ) as it:
-            list(recording.heads())
-    assert isinstance(it.value.__cause__, OSError)
+        with monkeypatch.context() as patch:
+            patch.setattr(reading, name, replaced)
+            with pytest.raises(ConfigError, match=message + number) as it:
+                list(recording.heads())
+        assert isinstance(it.value.__cause__, reason)
     assert len(list(recording.heads())) == 1
 
 
