@@ -13,7 +13,7 @@ from acquisition.modbus.transport import SerialTransport
 
 
 async def test_a_reply_that_comes_too_late_is_never_taken_for_the_next_one(hostile_line, link_on):
-    link = link_on(hostile_line.path, timeout_s=0.1)
+    link = link_on(hostile_line.path, timeout_s=0.5)
     held_back = []
 
     async def keep(request, reply, line):  # noqa: ARG001
@@ -22,7 +22,7 @@ async def test_a_reply_that_comes_too_late_is_never_taken_for_the_next_one(hosti
     await link.open()
     right = await link.read(1, 1)
     hostile_line.lie = keep
-    with pytest.raises(LinkError, match=r"no reply within 0\.1 s"):
+    with pytest.raises(LinkError, match=r"no reply within 0\.5 s"):
         await link.read(0, 1)
     with pytest.raises(LinkError, match="closed"):
         await link.read(1, 1)
@@ -143,7 +143,7 @@ async def test_what_a_serial_port_raises_is_renamed(kind, hostile_line, monkeypa
     def fails(*_: object) -> None:
         raise field_error(kind)
 
-    link = link_on(hostile_line.path, timeout_s=0.05)
+    link = link_on(hostile_line.path, timeout_s=0.3)
     with monkeypatch.context() as patched:
         patched.setattr(serial.Serial, "open", fails)
         with pytest.raises(AcquisitionError):
