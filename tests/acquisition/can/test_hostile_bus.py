@@ -145,20 +145,23 @@ async def test_padwatch_sends_nothing_but_open_and_close(shape, device, source_o
 
 async def test_a_stalled_reader_drops_and_counts_frames_and_finds_the_gap(shape, device, source_of):
     """C7: the event loop is busy while frames keep coming; a bounded queue takes what it can."""
+
+    async def produce() -> None:
+        while True:
+            server.produce(1)
+            await asyncio.sleep(0.001)  # lets the DAQ send
+
     async with SlcanTcpServer(device) as server:
         source = source_of(shape, server.endpoint, queue_frames=500)
         async with source.connect() as stream:
             watch = Watch(stream)
             await watch.up_to(50)
+            producing = asyncio.create_task(produce())
             while not source.refused_frames.get("queue_overflow"):
-                server.produce(1)
-                await asyncio.sleep(0.001)  # lets the DAQ send; the stream is not read
-            while source.refused_frames:
-                before = source.refused_frames["queue_overflow"]
-                server.produce(3)
-                await watch.up_to(device.ledger.n_samples("U1"))
-                if source.refused_frames["queue_overflow"] == before:
-                    break
+                await asyncio.sleep(0.001)  # the stream is not read
+            await watch.up_to(device.ledger.n_samples("U1") + 1)
+            producing.cancel()
+            await watch.up_to(device.ledger.n_samples("U1"))
     assert watch.lost.total() > 0
     n_stored = sum(block.n_samples for block in watch.blocks)
     assert n_stored + watch.lost.total() == device.ledger.n_samples("U1")
