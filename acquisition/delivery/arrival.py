@@ -214,7 +214,7 @@ class HostStamps:
         return self._ns + round((index - self._index) * self._period_ns * self._slope)
 
     def _lay(self, epoch: int, index: int, at_ns: int, slope: float = 1.0) -> None:
-        """Continue the line, or lay it anew, from the time of a sample index on."""
+        """Begin a straight piece of the line at the time of a sample index."""
         self._epoch, self._slope = epoch, slope
         self._index, self._ns, self._least_delay_ns = index, at_ns, math.inf
 

@@ -61,7 +61,7 @@ class BlockJoiner:
     def release(self) -> list[SampleBlock]:
         """Return the complete cells held so far, as at most one block.
 
-        For a pause of the device or a lost link.
+        Call it when the device pauses or its link is lost.
         """
         n_whole = self.n_whole
         if not n_whole:
