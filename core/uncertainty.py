@@ -19,22 +19,17 @@ from core.quality import Quality, Reading
 CONFIDENCE = 0.95
 
 
-class Distribution(StrEnum):
-    """Probability distribution of a contribution."""
-
-    NORMAL = "normal"
-    UNIFORM = "uniform"
-
-
 class Kind(StrEnum):
-    """Kind of contribution: random from one averaging time to the next, or systematic."""
+    """Kind of contribution: random from one averaging time to the next, or systematic.
+
+    Random contributions are normally distributed, systematic ones uniformly.
+    """
 
     RANDOM = "random"
     SYSTEMATIC = "systematic"
 
 
 # names of a module are found faster than members of an enumeration
-_NORMAL, _UNIFORM = Distribution
 _RANDOM, _SYSTEMATIC = Kind
 
 
@@ -44,7 +39,7 @@ class BudgetLine(NamedTuple):
     Parameters
     ----------
     width
-        Standard uncertainty if normal, half-width if uniform, in the unit of the input quantity.
+        Standard uncertainty if random, half-width if systematic, in the unit of the input quantity.
     sensitivity
         Change of the result per unit of the input quantity.
     freedoms
@@ -53,10 +48,14 @@ class BudgetLine(NamedTuple):
 
     name: str
     kind: Kind
-    distribution: Distribution
     width: float
     sensitivity: float
     freedoms: float = math.inf
+
+    @property
+    def distribution(self) -> str:
+        """Probability distribution, "normal" or "uniform"."""
+        return "normal" if self.kind is _RANDOM else "uniform"
 
     @property
     def contribution(self) -> float:
@@ -124,7 +123,7 @@ def random_line(name: str, standard: float, freedoms: float = math.inf) -> Budge
     `standard` is its standard uncertainty in the unit of the result, and `freedoms` the degrees of
     freedom of this uncertainty; infinite if it is not estimated from data.
     """
-    return BudgetLine(name, _RANDOM, _NORMAL, standard, 1.0, freedoms)
+    return BudgetLine(name, _RANDOM, standard, 1.0, freedoms)
 
 
 def systematic_line(name: str, half_width: float, sensitivity: float) -> BudgetLine:
@@ -132,7 +131,7 @@ def systematic_line(name: str, half_width: float, sensitivity: float) -> BudgetL
 
     `sensitivity` is the change of the result per unit of the input quantity.
     """
-    return BudgetLine(name, _SYSTEMATIC, _UNIFORM, half_width, sensitivity)
+    return BudgetLine(name, _SYSTEMATIC, half_width, sensitivity)
 
 
 def coverage_factor(lines: Sequence[BudgetLine], confidence: float = CONFIDENCE) -> float:
@@ -148,13 +147,12 @@ def coverage_factor(lines: Sequence[BudgetLine], confidence: float = CONFIDENCE)
 def _variances(lines: Iterable[BudgetLine]) -> tuple[float, float, float]:
     """Return the random and the systematic variance, and the sum of squares over freedoms."""
     random = systematic = fourth = 0.0
-    for _, kind, distribution, width, sensitivity, freedoms in lines:
+    for _, kind, width, sensitivity, freedoms in lines:
         square = (width * sensitivity) ** 2
-        if distribution is _UNIFORM:
-            square /= 3.0  # GUM, 4.3.7
         if kind is _RANDOM:
             random += square
         else:
+            square /= 3.0  # GUM, 4.3.7
             systematic += square
         fourth += square * square / freedoms
     return random, systematic, fourth
