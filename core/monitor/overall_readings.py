@@ -3,8 +3,6 @@
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from core.machine.unit import Bearing
 from core.quality import Level, Reading, Reason, current_mean, missing, worst
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
@@ -57,51 +55,34 @@ def overall_readings(
 
 
 def recent_readings(
-    segment: Segment, rows: Sequence[int], rate_hz: float
-) -> tuple[RecentReadings, ...]:
-    """Return the vibration of one bearing in the newest parts of a segment, oldest first.
+    segments: Sequence[Segment], rows: Sequence[int], rate_hz: float
+) -> list[RecentReadings]:
+    """Return the vibration of one bearing in the newest parts of segments or polls, oldest first.
 
-    Each entry has the shaft vibration, the newest also the bearing velocities over the whole
-    segment. `rows` are the rows of the bearing's channels. Empty if the segment is a poll.
+    Each entry has the 1× shaft vibration, and that of a segment also the broad-band vibration. The
+    last part of a segment also has the bearing velocities over the whole segment. `rows` are the
+    rows of the bearing's channels.
     """
-    recent, overall, found = segment.recent, segment.overall, []
-    if recent is None or overall is None:
-        return ()
-    for part, stop in enumerate(recent.stop.tolist()):
-        behind_ns = ns_from_s((segment.stop_index - segment.first_index - stop) / rate_hz)
-        readings = {}
-        for place, name in SHAFTS.items():
-            row = rows[place]
-            is_span = not math.isnan(overall.peak_to_peak_um[row])
-            span = recent.peak_to_peak_um[part, row] if is_span else math.nan
-            readings[f"overall_{name}_um_pp"] = segment.reading((row,), float(span))
-            readings[f"order1_{name}_um_pk"] = _turning(
-                segment, _order1(segment, row, float(recent.order1_um_pk[part, row]))
-            )
-        found.append(RecentReadings(segment.stop_ns - behind_ns, readings))
-    speeds = {
-        name: segment.velocities_mm_s_rms[rows[place]] for name, place in BEARING_SPEEDS.items()
-    }
-    newest = found[-1]
-    return (*found[:-1], RecentReadings(newest.time_ns, {**newest.readings, **speeds}))
-
-
-def polled_readings(polls: Sequence[Segment], rows: Sequence[int]) -> tuple[RecentReadings, ...]:
-    """Return the 1× shaft vibration of a bearing in each poll, in the order of the polls.
-
-    `rows` are the rows of the bearing's channels.
-    """
-    return tuple(
-        RecentReadings(
-            poll.stop_ns,
-            {
-                f"order1_{name}_um_pk": _turning(poll, _order1(poll, row, amplitudes_um_pk[row]))
-                for name, row in ((name, rows[place]) for place, name in SHAFTS.items())
-            },
-        )
-        for poll in polls
-        for amplitudes_um_pk in [np.abs(poll.order_phasors_um_pk[:, ORDER1]).tolist()]
-    )
+    found = []
+    for segment in segments:
+        recent, overall, stops = segment.recent, segment.overall, segment.recent.stop.tolist()
+        for part, stop in enumerate(stops):
+            readings = {}
+            for place, name in SHAFTS.items():
+                row = rows[place]
+                readings[f"order1_{name}_um_pk"] = _turning(
+                    segment, _order1(segment, row, float(recent.order1_um_pk[part, row]))
+                )
+                if overall is not None:
+                    is_span = not math.isnan(overall.peak_to_peak_um[row])
+                    span = recent.peak_to_peak_um[part, row] if is_span else math.nan
+                    readings[f"overall_{name}_um_pp"] = segment.reading((row,), float(span))
+            if overall is not None and stop == stops[-1]:
+                for name, place in BEARING_SPEEDS.items():
+                    readings[name] = segment.velocities_mm_s_rms[rows[place]]
+            behind_ns = ns_from_s((segment.stop_index - segment.first_index - stop) / rate_hz)
+            found.append(RecentReadings(segment.stop_ns - behind_ns, readings))
+    return found
 
 
 def _order1(segment: Segment, row: int, amplitude_um_pk: float) -> Reading:

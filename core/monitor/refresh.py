@@ -11,7 +11,7 @@ from core.condition.shaft_readings import measured_growth, measures_growth, posi
 from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import Assessment, AveragingWindow, OrbitTrace
 from core.monitor.bearing_readings import UnitEvaluation
-from core.monitor.overall_readings import polled_readings, recent_readings
+from core.monitor.overall_readings import recent_readings
 from core.quality import worst
 from core.samples.ring import Window
 from core.spectra.resolution import shaft_matrix
@@ -112,10 +112,8 @@ class Refresh:
             },
             clipped_share=self._clipped_share(),
             evidence=found.evidence,
-            recent=(
-                polled_readings(list(self.kept.segments)[-self.kept.result_samples :], rows)
-                if self._is_polled
-                else recent_readings(newest, rows, self.unit.rate_hz)
+            recent=recent_readings(
+                list(self.kept.segments)[-self.kept.result_samples :], rows, self.unit.rate_hz
             ),
         )
 

@@ -19,6 +19,7 @@ from core.machine.unit import Unit
 from core.quality import Level, Quality, Reason, bad
 from core.samples.ring import Window
 from core.spectra.lines import SegmentSettings
+from core.spectra.overall import RecentVibration
 from core.spectra.runout import runout_verdict
 from core.spectra.segments import ORDER1, VORTEX, KeptSegments, Segment, usable_channels
 from core.spectra.speed import running_speed
@@ -143,6 +144,8 @@ class PollTransform(KeptSegments):
         phasors: ComplexArray = amplitude * turned
         phasors[:, ORDER1] *= np.exp(1j * np.deg2rad(angle_deg))
         gap_um, gap_quality = self._of_channels(VectorPart.GAP, window)
+        order1_um_pk = np.abs(phasors[np.newaxis, :, ORDER1])
+        nothing_um: FloatArray = np.full_like(order1_um_pk, np.nan)
         return self.keep(
             Segment(
                 epoch=window.epoch,
@@ -165,7 +168,7 @@ class PollTransform(KeptSegments):
                 runout=self._runout,
                 overall=None,
                 clipped_share=np.zeros(gap_um.size),
-                recent=None,
+                recent=RecentVibration(np.array([window.n_samples]), order1_um_pk, nothing_um),
             )
         )
 

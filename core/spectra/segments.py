@@ -98,7 +98,7 @@ class Segment:
     clipped_share
         (n_channels,) fraction of the samples at an end of the converter's range.
     recent
-        Vibration of the newest parts; None for a poll.
+        Vibration of the newest parts; for a poll, its 1× vibration.
     """
 
     epoch: int
@@ -121,7 +121,7 @@ class Segment:
     runout: Mapping[str, RunoutVerdict]
     overall: Overall | None
     clipped_share: FloatArray
-    recent: RecentVibration | None
+    recent: RecentVibration
 
     def is_grazed(self, row: int) -> bool:
         """Whether a channel is bad only because of a few clipped samples."""
