@@ -96,14 +96,8 @@ class CellTable:
 
     def find(self, cells: CellArray) -> IntArray:
         """Return the table row of each of n cells (n,); -1 for a missing or unsupported cell."""
-        if not self.cells:
-            return np.full(cells.shape[1], -1)
-        low, places = self._places
-        index = cells - low[:, np.newaxis]
-        size = np.array(places.shape)[:, np.newaxis]
-        is_inside = np.all((index >= 0) & (index < size), axis=0)
-        found = places[tuple(np.where(is_inside, index, 0))]
-        return np.where(is_inside, found, -1)
+        columns = zip(*cells.tolist(), strict=True)
+        return np.array([self._rows.get(cell, -1) for cell in columns], np.int64)
 
     @cached_property
     def scatter(self) -> FloatArray:
@@ -133,15 +127,10 @@ class CellTable:
         return FilmConditions(*np.array(rows, np.float64).reshape(-1, 3).T)
 
     @cached_property
-    def _places(self) -> tuple[IntArray, IntArray]:
-        """Lowest bin number of each axis, and table rows indexed by bin number minus the lowest."""
-        bins = np.array([cell.cell for cell in self.cells])
-        low = bins.min(axis=0)
-        places = np.full(tuple(bins.max(axis=0) - low + 1), -1)
-        for place, cell in enumerate(self.cells):
-            if cell.support is not Support.NONE:
-                places[tuple(bins[place] - low)] = place
-        return low, places
+    def _rows(self) -> dict[Cell, int]:
+        """Table row of each supported cell."""
+        rows = enumerate(self.cells)
+        return {cell.cell: row for row, cell in rows if cell.support is not Support.NONE}
 
 
 def cells_between(own: frozenset[Cell], reach: int) -> frozenset[Cell]:

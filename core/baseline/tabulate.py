@@ -1,11 +1,12 @@
 """Calculation of the cell table of a baseline: statistics and support of each cell."""
 
 import itertools
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 
-from core.arrays import FloatArray, IntArray
+from core.arrays import FloatArray
 from core.baseline.cell_table import (
     NODES,
     CellStatistics,
@@ -18,7 +19,7 @@ from core.baseline.grouping import Groups, group_medians
 from core.baseline.settings import BaselineSettings
 from core.baseline.surface import Surface
 from core.baseline.surface_fit import MIN_SCATTER, Fit
-from core.condition.cells import Cell, CellArray, CellGrid, FilmConditions
+from core.condition.cells import Cell, CellGrid, FilmConditions
 
 BELIEVED = 0.1
 """Smallest robust weight with which a group counts towards the support of a cell."""
@@ -96,17 +97,19 @@ def _seen(
     """Return the contents of each cell that has readings."""
     cells, place = np.unique(grid.cells(conditions), axis=1, return_inverse=True)
     place = place.reshape(-1)
-    n_readings, n_days = _support_counts(groups, fit, grid, cells)
+    names: list[Cell] = list(zip(*cells.tolist(), strict=True))
+    n_readings, n_days = _support_counts(groups, fit, grid)
     angle = np.radians(np.nan_to_num(conditions.attitude_deg))
     sines, cosines = (np.bincount(place, part(angle)) for part in (np.sin, np.cos))
     columns = (
-        *(n_readings.tolist(), n_days.tolist(), group_medians(value, place).tolist()),
+        [n_readings[cell] for cell in names],
+        [n_days[cell] for cell in names],
+        group_medians(value, place).tolist(),
         group_medians(conditions.eccentricity_ratio, place).tolist(),
         group_medians(conditions.oil_temperature_c, place).tolist(),
         np.degrees(np.arctan2(sines, cosines)).tolist(),
     )
-    contents = (_Contents(*row) for row in zip(*columns, strict=True))
-    return dict(zip(map(tuple, cells.T.tolist()), contents, strict=True))
+    return dict(zip(names, map(_Contents, *columns), strict=True))
 
 
 def _unseen(
@@ -144,21 +147,13 @@ def _node_std(contents: dict[Cell, _Contents], fit: Fit, grid: CellGrid) -> list
 
 
 def _support_counts(
-    groups: Groups, fit: Fit, grid: CellGrid, cells: CellArray
-) -> tuple[IntArray, IntArray]:
-    """Return the numbers of readings and days of each cell (n_cells,), without rejected groups."""
+    groups: Groups, fit: Fit, grid: CellGrid
+) -> tuple[Counter[Cell], Counter[Cell]]:
+    """Return the numbers of readings and days of each cell, without rejected groups."""
     believed = groups.rows(fit.robust_weight >= BELIEVED)
-    place = _find_columns(grid.cells(believed.conditions), cells)
-    days = np.unique(np.vstack([place, believed.day]), axis=1)[0]
-    n = cells.shape[1]
-    n_readings = np.bincount(place, believed.n_readings, n).astype(np.int64)
-    return n_readings, np.bincount(days, minlength=n)
-
-
-def _find_columns(wanted: CellArray, cells: CellArray) -> IntArray:
-    """Return the index of each wanted column (n,) in `cells`, which `np.unique` has sorted."""
-    low = np.minimum(cells.min(axis=1), wanted.min(axis=1, initial=0))[:, np.newaxis]
-    size = tuple(np.maximum(cells.max(axis=1), wanted.max(axis=1, initial=0)) - low[:, 0] + 1)
-    flat = np.ravel_multi_index(tuple(cells - low), size)
-    found = np.searchsorted(flat, np.ravel_multi_index(tuple(wanted - low), size))
-    return np.asarray(found, np.int64)
+    cells = list(zip(*grid.cells(believed.conditions).tolist(), strict=True))
+    n_readings: Counter[Cell] = Counter()
+    for cell, n in zip(cells, believed.n_readings.tolist(), strict=True):
+        n_readings[cell] += n
+    days = set(zip(cells, believed.day.tolist(), strict=True))
+    return n_readings, Counter(cell for cell, _ in days)
