@@ -5,7 +5,6 @@ of shaft and housing: d_near = g − u for the probe on the positive axis, d_far
 """
 
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 
@@ -14,10 +13,14 @@ from core.machine.unit import GapAccuracy
 from core.quality import Quality, Reading, Reason, uncertain, worst
 from core.uncertainty import Budget, BudgetLine, random_line, systematic_line
 
-NEAR_X, FAR_X, NEAR_Y, FAR_Y, GROWTH, ASYMMETRY = range(6)
-"""Indices of the input quantities from which a displacement is computed; all are lengths in µm."""
-
 NAMES = ("gap x", "opposite gap x", "gap y", "opposite gap y", "thermal growth", "uneven growth")
+"""Names of the input quantities from which a displacement is computed; all are lengths in µm."""
+
+GROWTH, ASYMMETRY = 4, 5
+"""Indices of the input quantities that are not gaps."""
+
+UNITS: tuple[FloatArray, ...] = tuple(np.eye(len(NAMES)))
+"""Weights (6,) of each input quantity alone."""
 
 
 @dataclass(frozen=True)
@@ -105,11 +108,10 @@ class ProbeAxes:
     def lines(self, weights: FloatArray) -> tuple[BudgetLine, ...]:
         """Return the budget lines of the sum of `values_um` with `weights` (6,) (GUM, eq. 10)."""
         return tuple(
-            chain.from_iterable(
-                self._lines(source, float(weight))
-                for source, weight in enumerate(weights)
-                if weight != 0.0
-            )
+            line
+            for source, weight in enumerate(weights.tolist())
+            if weight != 0.0
+            for line in self._lines(source, weight)
         )
 
     def _lines(self, source: int, weight: float) -> list[BudgetLine]:
@@ -132,7 +134,7 @@ class ProbeAxes:
         ]
 
     def _displacement(self, axis: int) -> FloatArray:
-        near, far = _unit(2 * axis), _unit(2 * axis + 1)
+        near, far = UNITS[2 * axis : 2 * axis + 2]
         probes = self._axes[axis]
         if probes.has_both:
             return (far - near) / 2.0
@@ -145,14 +147,9 @@ class ProbeAxes:
     def _growth_of(self, axis: int) -> FloatArray:
         """Return the weights of the growth of a one-probe axis: other axis, else last measured."""
         if self._axes[1 - axis].has_both:
-            return self._own_growth(1 - axis) + _unit(ASYMMETRY)
-        return _unit(GROWTH) + axis * _unit(ASYMMETRY)
+            return self._own_growth(1 - axis) + UNITS[ASYMMETRY]
+        return UNITS[GROWTH] + axis * UNITS[ASYMMETRY]
 
     def _own_growth(self, axis: int) -> FloatArray:
-        return (_unit(2 * axis) + _unit(2 * axis + 1)) / 2.0
-
-
-def _unit(source: int) -> FloatArray:
-    unit = np.zeros(len(NAMES))
-    unit[source] = 1.0
-    return unit
+        near, far = UNITS[2 * axis : 2 * axis + 2]
+        return (near + far) / 2.0

@@ -27,8 +27,6 @@ from core.uncertainty import (
     with_budgets,
 )
 
-_NO_GAPS = (NOT_MEASURED, NOT_MEASURED)
-
 
 def position_results(
     unit: Unit, bearing: Bearing, segments: Sequence[Segment], last_growth: Growth | None
@@ -61,8 +59,8 @@ def position_results(
 
 def measures_growth(bearing: Bearing) -> bool:
     """Whether thermal growth can be measured: an axis has opposite probes with references."""
-    far = [probe_axis(bearing, _NO_GAPS, _NO_GAPS, axis).far for axis in (0, 1)]
-    return far != [None, None]
+    has_opposite = bearing.opposite_x is not None or bearing.opposite_y is not None
+    return has_opposite and bearing.opposite_reference_um is not None
 
 
 def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
