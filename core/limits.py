@@ -99,11 +99,6 @@ class Limits:
         low = (x for x in (self.alert_below, self.danger_below) if x is not None)
         return max(low, default=None)
 
-    def is_within(self, value: float) -> bool:
-        """Whether a value is within all upper and lower limits; a value on a limit is within."""
-        high, low = self._lowest_high, self._highest_low
-        return (high is None or value <= high) and (low is None or value >= low)
-
     def passed(self, value: float, held: AlarmLevel | None) -> AlarmLevel | None:
         """Return the highest level whose limit a value exceeds, or None if it exceeds none.
 

@@ -251,7 +251,7 @@ class UnitAlarms(AlarmBoard):
     def _compare(self, watch: Watch, reading: Reading, now_ns: int, point: OperatingPoint) -> None:
         alarm, value = self.alarm(watch.id), reading.value
         limits = watch.limits.at(point) if watch.limits and alarm.is_settled_inactive else ()
-        if value is not None and limits and all(each.is_within(value) for each in limits):
+        if value is not None and limits and not any(each.passed(value, None) for each in limits):
             return  # fast path: inactive alarm, value within all limits
         condition = watch.judge(reading, point, alarm.condition.level)
         self.update(watch, _at(point, condition), now_ns)
