@@ -20,8 +20,7 @@ from core.condition.operating_state import OperatingState
 from core.monitor.catalogue import CATALOGUE
 from core.units import NS_PER_S
 from service.api.answers import json_of
-from service.api.routes.trend_groups import trend_groups
-from service.api.routes.trends import trend_model
+from service.api.routes.trends import trend_groups, trend_model
 from service.store.buckets import Summaries
 from service.store.port import TrendQuery, ValueRange
 from service.store.rollups.gathering import SET_MARK

@@ -31,10 +31,10 @@ from service.api.problems import (
     problem_schemas,
     refuse_unknown_parameters,
 )
-from service.api.routes.alarm_rates import alarm_rate_router, delivery_router
-from service.api.routes.alarms import alarm_router, operation_router
+from service.api.routes.alarm_rates import alarm_rate_router
+from service.api.routes.alarms import alarm_router
 from service.api.routes.audit import audit_router
-from service.api.routes.baselines import baseline_action_router, baseline_router
+from service.api.routes.baselines import baseline_router
 from service.api.routes.bearings import bearing_router
 from service.api.routes.channels import channel_router
 from service.api.routes.film_history import film_history_router
@@ -233,11 +233,8 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
         film_router(context),
         film_history_router(context),
         baseline_router(context),
-        baseline_action_router(context),
-        operation_router(context),
         recording_router(context),
         recorded_motion_router(context),
-        delivery_router(context),
         audit_router(context),
         session_router(authenticator),
         access_router(context, authenticator),

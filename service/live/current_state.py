@@ -317,6 +317,8 @@ class LiveFilms:
         found = {unit.id: film_rules_of(unit, plant.films) for unit in plant.unit}
         self._rules = {unit: rules for unit, rules in found.items() if isinstance(rules, FilmRules)}
         self.settings = plant.films
+        self.grid = plant.films.baseline.settings().grid
+        """Grid of the cells of operating conditions, common to all units."""
         self.unwatched = {unit: why for unit, why in found.items() if isinstance(why, str)}
         """Reason why the films of a unit are not monitored, by unit."""
         self.n_taken = 0

@@ -13,6 +13,7 @@ from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules
 from core.condition.cells import CellGrid, OperatingPoint
 from core.limits import AlarmLevel
+from service.api.context import Context
 from service.api.values import (
     ApiModel,
     ByName,
@@ -24,7 +25,7 @@ from service.api.values import (
     cell_of,
     condition_model,
 )
-from service.live.alarm_list import AlarmCount, LiveAlarms
+from service.live.alarm_list import AlarmCount
 from service.live.current_state import LiveFilms
 from service.settings.alarm_kinds import LEVEL_NAMES, AlarmKindName, AlarmLevelName, value_unit
 from service.settings.storage import Origin
@@ -205,11 +206,7 @@ class AlarmEventsModel(ApiModel):
 
 
 def alarm_list_model(
-    alarms: LiveAlarms,
-    films: LiveFilms,
-    origin: Origin,
-    query: AlarmQuery,
-    acknowledged: bool | None = None,
+    context: Context, query: AlarmQuery, acknowledged: bool | None = None
 ) -> AlarmListModel:
     """Return the API model of the list of the alarms that match a query.
 
@@ -217,21 +214,22 @@ def alarm_list_model(
     """
     found = [
         alarm
-        for alarm in alarms.shown
+        for alarm in context.alarms.shown
         if acknowledged in (None, alarm.is_acknowledged) and _is_chosen(alarm, query)
     ]
     listed = sorted((a for a in found if a.state is not AlarmState.NORMAL), key=_urgency)
     unjudged = (alarm for alarm in found if alarm.state is AlarmState.NORMAL)
     return AlarmListModel.of(
-        origin=origin,
-        count=alarms.count(),
-        alarms=[alarm_model(alarms, films, alarm) for alarm in listed],
-        unjudged=[alarm_model(alarms, films, alarm) for alarm in unjudged],
+        context,
+        count=context.alarms.count(),
+        alarms=[alarm_model(context, alarm) for alarm in listed],
+        unjudged=[alarm_model(context, alarm) for alarm in unjudged],
     )
 
 
-def alarm_list_revision(alarms: LiveAlarms, films: LiveFilms) -> Callable[[], Hashable]:
+def alarm_list_revision(context: Context) -> Callable[[], Hashable]:
     """Return a function whose value changes with every change of the alarm list."""
+    alarms, films = context.alarms, context.films
 
     @lru_cache(maxsize=1)
     def films_of(revision: int, _: int) -> Hashable:
@@ -241,10 +239,11 @@ def alarm_list_revision(alarms: LiveAlarms, films: LiveFilms) -> Callable[[], Ha
     return lambda: films_of(alarms.revision, films.n_taken)
 
 
-def alarm_model(engine: LiveAlarms, films: LiveFilms, alarm: Alarm) -> AlarmModel:
+def alarm_model(context: Context, alarm: Alarm) -> AlarmModel:
     """Return the API model of an alarm with its current state."""
     identity, condition = alarm.identity, alarm.condition
-    is_judged, grid = engine.is_judged(alarm), grid_of(films)
+    engine, films = context.alarms, context.films
+    is_judged, grid = engine.is_judged(alarm), films.grid
     unseen = "not_connected" if condition.is_known else str(condition.reason)
     judged = "within_limits" if condition.level is None else "active"
     news = _film_news(films, identity)
@@ -307,11 +306,6 @@ def _is_chosen(alarm: Alarm, query: AlarmQuery) -> bool:
 def _film_news(films: LiveFilms, identity: AlarmIdentity) -> FilmNews | None:
     is_film = identity.kind == FILM_STIFFNESS
     return films.newest(identity.unit, identity.subject) if is_film else None
-
-
-def grid_of(films: LiveFilms) -> CellGrid:
-    """Return the grid of operating-condition cells, which is common to all units."""
-    return films.settings.baseline.settings().grid
 
 
 def event_model(stored: StoredEvent, grid: CellGrid) -> AlarmEventModel:

@@ -12,7 +12,7 @@ from core.alarms.alarm import PLANT, AlarmEvent
 from core.alarms.statistics import ChatterRule, figures_of, stale_alarms
 from core.limits import AlarmLevel
 from core.units import DAY_NS
-from service.api.auth.gate import Reach, subject_router
+from service.api.auth.gate import Reach, needs, subject_router
 from service.api.context import Context
 from service.api.parameters import Moment, OnlyUnit, ns_from_datetime, parameter, require_order
 from service.api.problems import ProblemError, problem_responses
@@ -21,6 +21,7 @@ from service.api.values import ApiModel, Time
 from service.live.receivers import ReceiverView
 from service.settings.alarm_kinds import LEVEL_NAMES, AlarmLevelName
 from service.settings.storage import Origin
+from service.store.access.identities import Permission
 from service.store.port import AlarmQuery
 from service.store.store import Store
 
@@ -150,11 +151,10 @@ END = "End of the range; default: now.", "2026-11-21T09:00:00Z"
 
 
 def alarm_rate_router(context: Context) -> APIRouter:
-    """Return the router for alarm performance figures."""
-    router = subject_router("/alarms", "alarms", reach=Reach.ASKED)
-    engine, films = context.alarms, context.films
+    """Return the router for alarm performance figures, and for the delivery of messages."""
+    router = subject_router("", "alarms", reach=Reach.ASKED)
 
-    @router.get("/rates", responses=problem_responses(404))
+    @router.get("/alarms/rates", responses=problem_responses(404))
     async def alarm_rates(
         unit: OnlyUnit = None,
         start: Annotated[Moment | None, parameter(*START)] = None,
@@ -177,19 +177,13 @@ def alarm_rate_router(context: Context) -> APIRouter:
             context.unit(unit)
         units = list(context.units) if unit is None else [unit]
         wanted = AlarmQuery(unit=unit, start_ns=start_ns, end_ns=end_ns)
-        found = await asyncio.to_thread(counted, context.store, wanted, units, engine.chatter_rule)
+        rule = context.alarms.chatter_rule
+        found = await asyncio.to_thread(counted, context.store, wanted, units, rule)
         shown = {*units, PLANT} if unit is None else {unit}
-        stale = [a for a in stale_alarms(engine.alarms, now_ns) if a.identity.unit in shown]
-        return AlarmRatesModel.of(stale=[alarm_model(engine, films, a) for a in stale], **found)
+        stale = [a for a in stale_alarms(context.alarms.alarms, now_ns) if a.identity.unit in shown]
+        return AlarmRatesModel.of(stale=[alarm_model(context, a) for a in stale], **found)
 
-    return router
-
-
-def delivery_router(context: Context) -> APIRouter:
-    """Return the router for the delivery of alarm messages."""
-    router = subject_router("", "alarms", reach=Reach.NO_UNIT)
-
-    @router.get("/delivery")
+    @router.get("/delivery", dependencies=[needs(Permission.READ, Reach.NO_UNIT)])
     async def message_receivers() -> DeliveryModel:
         """List the receivers of alarm messages with their waiting and failed messages."""
         return DeliveryModel.of(context, receivers=await context.receivers())

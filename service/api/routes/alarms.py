@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Sequence
 from dataclasses import fields, replace
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Path, Request, Response
@@ -37,7 +38,6 @@ from service.api.routes.alarm_models import (
     alarm_list_revision,
     alarm_model,
     event_model,
-    grid_of,
 )
 from service.api.tables import Column, Format, column_of, table_content, table_response
 from service.api.values import ActorModel, NoteText, ReasonModel, ReasonText, states_named
@@ -126,6 +126,7 @@ async def chosen_alarms(
 
 ChosenAlarms = Annotated[AlarmQuery, Depends(chosen_alarms)]
 
+ACT = [needs(Permission.ACT_ON_ALARMS)]
 OUTAGE = [needs(Permission.CHANGE_MEASURING)]
 """Permission to take an alarm out of service; the alarm then sends no messages."""
 
@@ -134,6 +135,7 @@ ACTION_PROBLEMS = problem_responses(409, own=UNKNOWN)
 COMMENT_LIMIT = problem_responses(
     own={429: "Too many comments; Retry-After gives the time to wait"}
 )
+COMMENT_PROBLEMS = ACTION_PROBLEMS | COMMENT_LIMIT
 
 
 class Allowances(dict[str, TokenBucket]):
@@ -152,10 +154,9 @@ class Allowances(dict[str, TokenBucket]):
 
 
 def alarm_router(context: Context) -> APIRouter:
-    """Return the router that reads alarms; it must follow other routers for ``/alarms/...``."""
-    router = subject_router("/alarms", "alarms")
-    engine, films = context.alarms, context.films
-    revision = alarm_list_revision(engine, films)
+    """Return the router for alarms; it must follow other routers for ``/alarms/...``."""
+    router, allowances = subject_router("/alarms", "alarms"), Allowances()
+    revision = alarm_list_revision(context)
 
     @router.get("", response_model=AlarmListModel)
     async def alarms(
@@ -170,10 +171,7 @@ def alarm_router(context: Context) -> APIRouter:
         The parameters select alarms; operating state, eccentricity, attitude angle and oil
         temperature are those at which an alarm was raised. `count` is that of the whole plant.
         """
-
-        def make() -> AlarmListModel:
-            return alarm_list_model(engine, films, context.origin, chosen, acknowledged)
-
+        make = partial(alarm_list_model, context, chosen, acknowledged)
         return await context.answers.of(request, revision, make, is_polled=True)
 
     @router.get(
@@ -195,8 +193,8 @@ def alarm_router(context: Context) -> APIRouter:
 
         def read() -> AlarmEventsModel:
             found = context.store.alarm_events(replace(query, limit=query.limit + 1))
-            page, grid = found[: query.limit], grid_of(films)
-            events = [event_model(stored, grid) for stored in page]
+            page = found[: query.limit]
+            events = [event_model(stored, context.films.grid) for stored in page]
             next_before = page[-1].id if len(found) > query.limit else None
             return AlarmEventsModel.of(context, events=events, next_before=next_before)
 
@@ -210,17 +208,9 @@ def alarm_router(context: Context) -> APIRouter:
     async def one_alarm(alarm: AlarmId) -> AlarmModel:
         """Return one alarm, also if it is normal, with its value and limit."""
         try:
-            return alarm_model(engine, films, engine.alarm(alarm))
+            return alarm_model(context, context.alarms.alarm(alarm))
         except LookupError as error:
             raise _unknown(alarm) from error
-
-    return router
-
-
-def operation_router(context: Context) -> APIRouter:
-    """Return the router for operations on alarms; each operation returns the changed alarm."""
-    router = subject_router("/alarms/{alarm}", "alarms", Permission.ACT_ON_ALARMS)
-    allowances = Allowances()
 
     async def done(
         id_: str, asked: ActorModel, kind: type[operation.Action], **more: object
@@ -232,14 +222,14 @@ def operation_router(context: Context) -> APIRouter:
             alarm = await context.operators.operate(id_, action)
         except LookupError as error:
             raise _unknown(id_) from error
-        return alarm_model(context.alarms, context.films, alarm)
+        return alarm_model(context, alarm)
 
-    @router.post("/acknowledge", responses=ACTION_PROBLEMS)
+    @router.post("/{alarm}/acknowledge", responses=ACTION_PROBLEMS, dependencies=ACT)
     async def acknowledge(alarm: AlarmId, asked: AcknowledgeModel) -> AlarmModel:
         """Acknowledge an occurrence of an alarm; repeating the request changes nothing."""
         return await done(alarm, asked, operation.Acknowledge)
 
-    @router.post("/shelve", responses=ACTION_PROBLEMS)
+    @router.post("/{alarm}/shelve", responses=ACTION_PROBLEMS, dependencies=ACT)
     async def shelve(alarm: AlarmId, asked: ShelveModel) -> AlarmModel:
         """Hide an alarm for a limited time; an alarm still active afterwards is announced again."""
         if asked.duration_s > context.max_shelf_s:
@@ -248,27 +238,27 @@ def operation_router(context: Context) -> APIRouter:
         until_ns = context.clock.now_ns() + ns_from_s(asked.duration_s)
         return await done(alarm, asked, operation.Shelve, until_ns=until_ns)
 
-    @router.post("/unshelve", responses=ACTION_PROBLEMS)
+    @router.post("/{alarm}/unshelve", responses=ACTION_PROBLEMS, dependencies=ACT)
     async def unshelve(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """End the shelving of an alarm early."""
         return await done(alarm, asked, operation.Unshelve)
 
-    @router.post("/out-of-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
+    @router.post("/{alarm}/out-of-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
     async def take_out_of_service(alarm: AlarmId, asked: ReasonModel) -> AlarmModel:
         """Hide an alarm until it is returned to service, for example for maintenance."""
         return await done(alarm, asked, operation.TakeOutOfService)
 
-    @router.post("/return-to-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
+    @router.post("/{alarm}/return-to-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
     async def return_to_service(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """Return an alarm to service; an active alarm is announced again."""
         return await done(alarm, asked, operation.ReturnToService)
 
-    @router.post("/reset", responses=ACTION_PROBLEMS)
+    @router.post("/{alarm}/reset", responses=ACTION_PROBLEMS, dependencies=ACT)
     async def reset_latched_alarm(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """Release the latch of an acknowledged alarm whose condition has cleared."""
         return await done(alarm, asked, operation.Reset)
 
-    @router.post("/comment", responses=ACTION_PROBLEMS | COMMENT_LIMIT)
+    @router.post("/{alarm}/comment", responses=COMMENT_PROBLEMS, dependencies=ACT)
     async def comment(request: Request, alarm: AlarmId, asked: CommentModel) -> AlarmModel:
         """Add a comment to the events of an alarm; the state of the alarm does not change."""
         allowances.take(request, context.clock.monotonic_s())

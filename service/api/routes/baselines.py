@@ -1,34 +1,36 @@
 """Routes for the stiffness baselines of a bearing, and for changes of baselines by engineers."""
 
 import asyncio
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from fastapi import APIRouter, Path, Response
+from pydantic import Field
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import CellStatistics
 from core.baseline.history import absolute_and_ratio
 from core.condition.cells import CellGrid
+from core.machine.unit import Estimator
 from service.api.answers import rendered
-from service.api.auth.gate import actor_or, subject_router
+from service.api.auth.gate import actor_or, needs, subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.downloads import file_content
-from service.api.parameters import ns_from_datetime
+from service.api.parameters import Moment, ns_from_datetime
 from service.api.problems import ProblemError, problem_responses
-from service.api.routes.baseline_models import (
-    BaselineCellsModel,
-    BaselineDirectionModel,
-    BaselineModel,
-    BaselinesModel,
-    BaselineStatusName,
-    BaselineVersionModel,
-    RenewModel,
-    learning_model,
-)
 from service.api.routes.films import watched_place
-from service.api.values import CellModel, ReasonModel, cell_model, listed
+from service.api.routes.learning import LearningModel, learning_model
+from service.api.values import (
+    ApiModel,
+    BearingAnswer,
+    CellModel,
+    ReasonModel,
+    Time,
+    cell_model,
+    listed,
+)
 from service.live import commands
+from service.live.models import BaselineOriginModel
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
 from service.store.baselines import (
@@ -39,6 +41,121 @@ from service.store.baselines import (
     versions_after,
 )
 from service.store.documents import BASELINE, FORMAT_VERSION, to_json
+
+BaselineStatusName = Literal["in_force", "rejected", "superseded", "learned"]
+
+
+class BaselineVersionModel(BaselineOriginModel, ApiModel):
+    """Version of the learned baseline of a bearing, without its cells."""
+
+    estimator: Estimator
+
+    status: BaselineStatusName
+    """Status: in force; rejected by an engineer; superseded by another version or by a machine
+    event; or learned and not yet accepted by an engineer."""
+
+    remark: Annotated[str, Field(examples=["x is 5.1 % below that of version 1"])]
+    """Reason why this version was not accepted automatically, remark on its readings, or empty."""
+
+    is_frozen: bool
+    """Whether this version is in force and an engineer has frozen learning."""
+
+
+class BaselinesModel(BearingAnswer):
+    """All baseline versions of a bearing, and their history."""
+
+    estimator: Estimator | None
+
+    in_force: int | None
+    """Number of the version in force; null if no version is in force."""
+
+    is_frozen: bool
+    """Whether an engineer has frozen learning."""
+
+    renewed: Time | None
+    """Time of the newest machine event; earlier readings are not used. Null without an event."""
+
+    acceptance: Literal["automatic", "by_engineer"]
+    """Acceptance of learned baselines: "automatic" if a baseline agrees with the previous one, or
+    always "by_engineer"."""
+
+    learning: LearningModel | None
+    """Progress of learning; null if the bearing is not watched."""
+
+    versions: list[BaselineVersionModel]
+    """Versions of the baseline, newest first."""
+
+    steps: list[StoredStep]
+    """Steps in the history of the baselines, newest first."""
+
+
+class BaselineCellsModel(ApiModel):
+    """Cells of a baseline in the grid of operating conditions, one value per cell in each list."""
+
+    eccentricity_low: list[float]
+    eccentricity_high: list[float]
+    oil_temperature_low_c: list[float]
+    oil_temperature_high_c: list[float]
+    attitude_low_deg: list[float] | None
+    attitude_high_deg: list[float] | None
+    stiffness_of_kb: list[float | None]
+
+    eccentricity_ratio: list[float]
+    """Median eccentricity ratio of the readings in the cell."""
+
+    oil_temperature_c: list[float]
+    """Median oil temperature of the readings in the cell, °C."""
+
+    n_readings: list[int]
+    """Number of readings learned in the cell; 0 in a cell without readings between other cells."""
+
+    n_days: list[int]
+    """Number of days with readings in the cell."""
+
+    stiffness_n_per_m: list[float | None]
+    """Median stiffness of the readings, or of the fitted surface without readings, N/m; null if the
+    bracket stiffness was unknown."""
+
+    scatter_percent: list[float]
+    """Robust standard deviation of single readings about the fitted stiffness surface, %."""
+
+    surface_std_percent: list[float]
+    """Standard uncertainty of the fitted surface at the median condition of the cell, %."""
+
+    support: list[Literal["own", "borrowed", "none"]]
+    """Basis on which new readings in the cell are judged: learned readings of the cell ("own"), of
+    neighbouring cells ("borrowed"), or no basis ("none")."""
+
+
+class BaselineDirectionModel(ApiModel):
+    """Learned stiffness of an oil film in one direction, x or y."""
+
+    scatter_percent: float
+    """Standard deviation of single readings about the fitted surface, %."""
+
+    cells: BaselineCellsModel
+    """Cells with readings, and cells between them."""
+
+
+class BaselineModel(BearingAnswer):
+    """Baseline of a bearing: learned stiffness by cell of the operating-condition grid."""
+
+    about: BaselineVersionModel
+    x: BaselineDirectionModel | None
+    y: BaselineDirectionModel | None
+
+    eccentricity_width: float | None
+    """Width of the cells in eccentricity ratio; null if nothing was learned."""
+
+    oil_temperature_width_c: float | None
+    """Width of the cells in oil temperature, K; null if nothing was learned."""
+
+
+class RenewModel(ReasonModel):
+    """Request to renew the baseline after a machine event."""
+
+    event_time: Annotated[Moment, Field(strict=False, examples=["2026-11-21T08:00:00Z"])]
+    """End of the machine event, RFC 3339 with offset; only later readings are used."""
 
 
 def version_model(
@@ -108,7 +225,7 @@ ACTION_PROBLEMS = problem_responses(
     }
 )
 
-PATH = "/units/{unit}/bearings/{bearing}/baselines"
+CHANGE = [needs(Permission.CHANGE_MEASURING)]
 
 EXPORTED = file_content(
     "application/json",
@@ -119,8 +236,18 @@ EXPORTED = file_content(
 
 
 def baseline_router(context: Context) -> APIRouter:
-    """Return the router that reads baselines."""
-    router = subject_router(PATH, "baselines")
+    """Return the router for baselines; each action on baselines returns the changed baselines."""
+    router = subject_router("/units/{unit}/bearings/{bearing}/baselines", "baselines")
+
+    async def done(
+        unit: str, bearing: str, action: commands.BaselineAction, asked: ReasonModel
+    ) -> BaselinesModel:
+        """Execute an action on baselines; return the baselines after the action is stored."""
+        if isinstance(action, commands.Accept | commands.Reject):
+            await asyncio.to_thread(_require_version, context, unit, bearing, action.version)
+        place = watched_place(context, unit, bearing)
+        await context.operators.act(place, action, actor_or(asked.actor), asked.reason)
+        return await asyncio.to_thread(_baselines, context, unit, bearing)
 
     @router.get("", response_model=BaselinesModel)
     async def baselines(unit: UnitId, bearing: BearingId) -> Response:
@@ -143,40 +270,33 @@ def baseline_router(context: Context) -> APIRouter:
         headers = {"Content-Disposition": f'attachment; filename="{name}"'}
         return Response(found, headers=headers, media_type="application/json")
 
-    return router
-
-
-def baseline_action_router(context: Context) -> APIRouter:
-    """Return the router for actions on baselines; each action returns the changed baselines."""
-    router = subject_router(PATH, "baselines", Permission.CHANGE_MEASURING)
-
-    @router.post("/{version}/accept", responses=ACTION_PROBLEMS)
+    @router.post("/{version}/accept", responses=ACTION_PROBLEMS, dependencies=CHANGE)
     async def accept_baseline(
         unit: UnitId, bearing: BearingId, version: Version, asked: ReasonModel
     ) -> BaselinesModel:
         """Accept a baseline version, which is in force from the next reading."""
-        return await _done(context, unit, bearing, commands.Accept(version), asked)
+        return await done(unit, bearing, commands.Accept(version), asked)
 
-    @router.post("/{version}/reject", responses=ACTION_PROBLEMS)
+    @router.post("/{version}/reject", responses=ACTION_PROBLEMS, dependencies=CHANGE)
     async def reject_baseline(
         unit: UnitId, bearing: BearingId, version: Version, asked: ReasonModel
     ) -> BaselinesModel:
         """Reject a version; if it was in force, none is in force until another is accepted."""
-        return await _done(context, unit, bearing, commands.Reject(version), asked)
+        return await done(unit, bearing, commands.Reject(version), asked)
 
-    @router.post("/freeze", responses=ACTION_PROBLEMS)
+    @router.post("/freeze", responses=ACTION_PROBLEMS, dependencies=CHANGE)
     async def freeze_baseline(
         unit: UnitId, bearing: BearingId, asked: ReasonModel
     ) -> BaselinesModel:
         """Suspend the learning of baselines; the version in force does not change."""
-        return await _done(context, unit, bearing, commands.Freeze(), asked)
+        return await done(unit, bearing, commands.Freeze(), asked)
 
-    @router.post("/thaw", responses=ACTION_PROBLEMS)
+    @router.post("/thaw", responses=ACTION_PROBLEMS, dependencies=CHANGE)
     async def thaw_baseline(unit: UnitId, bearing: BearingId, asked: ReasonModel) -> BaselinesModel:
         """Resume learning after a freeze, until the end of the learning period."""
-        return await _done(context, unit, bearing, commands.Thaw(), asked)
+        return await done(unit, bearing, commands.Thaw(), asked)
 
-    @router.post("/renew", responses=ACTION_PROBLEMS)
+    @router.post("/renew", responses=ACTION_PROBLEMS, dependencies=CHANGE)
     async def renew_baseline(unit: UnitId, bearing: BearingId, asked: RenewModel) -> BaselinesModel:
         """Start a new baseline after a machine event, such as an overhaul.
 
@@ -186,20 +306,9 @@ def baseline_action_router(context: Context) -> APIRouter:
         if from_ns < 0:
             detail = f"event_time must not be before 1970, got {rfc3339(from_ns)}"
             raise ProblemError(422, "Wrong parameter", detail, "event_time")
-        return await _done(context, unit, bearing, commands.Renew(from_ns), asked)
+        return await done(unit, bearing, commands.Renew(from_ns), asked)
 
     return router
-
-
-async def _done(
-    context: Context, unit: str, bearing: str, action: commands.BaselineAction, asked: ReasonModel
-) -> BaselinesModel:
-    """Execute an action on baselines; return the baselines after the action is stored."""
-    if isinstance(action, commands.Accept | commands.Reject):
-        await asyncio.to_thread(_require_version, context, unit, bearing, action.version)
-    place = watched_place(context, unit, bearing)
-    await context.operators.act(place, action, actor_or(asked.actor), asked.reason)
-    return await asyncio.to_thread(_baselines, context, unit, bearing)
 
 
 def _baselines(context: Context, unit: str, bearing: str) -> BaselinesModel:

@@ -18,8 +18,7 @@ from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange, at_most
 from service.api.problems import problem_responses
-from service.api.routes.film_models import VerdictName
-from service.api.routes.films import watched_place
+from service.api.routes.films import VerdictName, watched_place
 from service.api.tables import Column, Format, column_of, table_content, table_response
 from service.api.values import (
     ApiModel,

@@ -13,8 +13,7 @@ from service.api.auth.gate import subject_router
 from service.api.context import Context
 from service.api.parameters import parameter
 from service.api.routes.bearings import ResultModel, result_model
-from service.api.routes.film_models import FilmBriefModel
-from service.api.routes.films import film_brief
+from service.api.routes.films import FilmBriefModel, film_brief
 from service.api.routes.plant import BasicUnitModel, LinkModel
 from service.api.values import (
     STATE_NAMES,

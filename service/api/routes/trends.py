@@ -1,34 +1,98 @@
-"""Route for trends: quantities of a bearing over time."""
+"""Route for trends: quantities of a bearing over time, also grouped by operating condition."""
 
 import asyncio
-from collections.abc import Iterator, Sequence
-from dataclasses import fields
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
 from core.condition.cells import CellGrid
-from core.monitor.catalogue import quantity_named
-from core.units import ns_from_s
+from core.condition.operating_state import OperatingState
+from core.monitor.catalogue import Quantity, quantity_named
+from core.units import NS_PER_S, ns_from_s
 from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange, at_most
 from service.api.problems import ProblemError
-from service.api.routes.trend_groups import (
-    GroupName,
-    QuantityTrend,
-    TrendColumns,
-    TrendGroupModel,
-    columns_of,
-    quantities_among,
-    trend_groups,
-)
 from service.api.tables import Column, ColumnKind, Format, table_content, table_response
-from service.api.values import BearingHistory, Time, TimeNs, states_named
-from service.store.port import Trend, TrendQuery
-from service.store.series import columns_of as stored_columns
+from service.api.values import (
+    LEVEL_NAMES,
+    STATE_NAMES,
+    ApiModel,
+    BearingHistory,
+    LevelName,
+    Time,
+    TimeNs,
+    bounds,
+    states_named,
+)
+from service.runtime.models import SERVED
+from service.store.port import Trend, TrendQuery, TrendSeries, ValueRange
+from service.store.series import U_RANDOM, U_SYSTEMATIC, columns_of
+from service.store.store import Store
+
+GroupName = Literal["state", "eccentricity", "oil_temperature"]
+
+
+@dataclass(frozen=True)
+class QuantityTrend:
+    """Values of one quantity over time; every list has one value per time."""
+
+    __pydantic_config__ = SERVED
+
+    unit: str
+    """Unit of the values; for an amplitude, also the detector."""
+
+    minimum: list[float | None]
+    """Minimum of the usable readings; null without usable readings."""
+
+    maximum: list[float | None]
+    """Maximum of the usable readings; null without usable readings."""
+
+    mean: list[float | None]
+    """Mean of the usable readings; null without usable readings."""
+
+    count: list[int]
+    """Number of usable readings."""
+
+    worst_level: list[LevelName | None]
+    """Worst quality level of the readings; null without readings."""
+
+    u_random: list[float | None] | None
+    """Mean of the random standard uncertainties; null for a quantity without uncertainty."""
+
+    u_systematic: list[float | None] | None
+    """Mean of the systematic standard uncertainties; null for a quantity without uncertainty."""
+
+
+class TrendColumns(ApiModel):
+    """Trends of several quantities at common times."""
+
+    bucket_s: float | None
+    """Width of the time intervals (buckets) that combine readings, s; null for single readings."""
+
+    time: list[TimeNs]
+    """Time of each reading or start of each bucket."""
+
+    series: dict[str, QuantityTrend]
+    """Values of the requested quantities, by name of the quantity."""
+
+
+class TrendGroupModel(TrendColumns):
+    """Trends of the readings in one operating state, or one interval of a grouping quantity."""
+
+    name: Annotated[str, Field(examples=["full_load"])]
+    """Name of the group: operating state, or bounds of the interval."""
+
+    low: float | None
+    """Lower bound of eccentricity ratio, or oil temperature in °C; null for operating states."""
+
+    high: float | None
+    """Upper bound of eccentricity ratio, or oil temperature in °C; null for operating states."""
 
 
 class TrendModel(TrendColumns, BearingHistory):
@@ -46,6 +110,101 @@ class TrendModel(TrendColumns, BearingHistory):
     groups: list[TrendGroupModel] | None
     """Trends of each group with readings; null without ``group_by``. Readings whose grouping
     quantity is unknown belong to no group."""
+
+
+MAX_GROUPS = 60
+
+SURVEY_POINTS = 5000
+
+BIN_TOLERANCE = 1e-9
+"""If a value is closer to a bound than this, in bin widths, the bins on both sides are read."""
+
+
+def _columns_of(trend: Trend) -> dict[str, Any]:
+    """Return the fields of `TrendColumns` except the times, which the trend has."""
+    quantities = filter(None, map(quantity_named, trend.series))  # not the uncertainties
+    return {
+        "bucket_s": trend.bucket_ns and trend.bucket_ns / NS_PER_S,
+        "series": {each.name: _series(each, trend.series) for each in quantities},
+    }
+
+
+def _series(quantity: Quantity, columns: Mapping[str, TrendSeries]) -> QuantityTrend:
+    series, uncertainties = vars(columns[quantity.name]), {}
+    for suffix in (U_RANDOM, U_SYSTEMATIC):
+        found = columns.get(quantity.name + suffix)
+        uncertainties[suffix.lstrip(".")] = found and found.mean
+    levels = [LEVEL_NAMES.get(level) for level in series["worst_level"]]
+    return QuantityTrend(quantity.unit, **series | uncertainties | {"worst_level": levels})
+
+
+AXES: dict[GroupName, tuple[str, str]] = {
+    "eccentricity": ("eccentricity_ratio", "eccentricity_width"),
+    "oil_temperature": ("oil_temperature_c", "temperature_width_c"),
+}
+"""Grouping quantity, as in `TrendQuery`, and field of `CellGrid` with the width of its bins."""
+
+
+def trend_groups(
+    store: Store, query: TrendQuery, by: GroupName, grid: CellGrid
+) -> list[TrendGroupModel]:
+    """Return the trend of each group that contains readings, in the order of states or intervals.
+
+    `by` is the quantity that determines the group of a reading; the grid of operating conditions
+    gives the widths of the intervals. Raises `ProblemError` with status 422 if there are more than
+    `MAX_GROUPS` groups.
+    """
+    found = []
+    for name, low, high, part in _parts(store, query, by, grid):
+        if (trend := store.trend(part)).time_ns:
+            columns = _columns_of(trend)
+            found.append(TrendGroupModel.of(trend, name=name, low=low, high=high, **columns))
+    return found
+
+
+def _parts(
+    store: Store, query: TrendQuery, by: GroupName, grid: CellGrid
+) -> Iterator[tuple[str, float | None, float | None, TrendQuery]]:
+    """Yield name, lower bound, upper bound and query of each group."""
+    if by == "state":
+        for state in query.states or tuple(OperatingState):
+            yield STATE_NAMES[state], None, None, replace(query, states=(state,))
+        return
+    quantity, field = AXES[by]
+    width = getattr(grid, field)
+    for number in _bins(store, query, quantity, width):
+        low, high = bounds(number, width)
+        yield f"{low:g} to {high:g}", low, high, _narrowed(query, quantity, low, high)
+
+
+def _narrowed(query: TrendQuery, quantity: str, low: float, high: float) -> TrendQuery:
+    """Return the query limited to a quantity from `low`, included, to `high`, excluded."""
+    requested, below = getattr(query, quantity), math.nextafter(high, -math.inf)
+    within = ValueRange(
+        low if requested.low is None else max(low, requested.low),
+        below if requested.high is None else min(below, requested.high),
+    )
+    changed: dict[str, Any] = {quantity: within}
+    return replace(query, **changed)
+
+
+def _bins(store: Store, query: TrendQuery, quantity: str, width: float) -> list[int]:
+    """Return the numbers of the bins that may contain readings, from a coarse trend.
+
+    These are the bins between the minimum and the maximum of each bucket of the trend.
+    """
+    survey = replace(query, quantities=(quantity,), max_points=SURVEY_POINTS)
+    series = store.trend(survey).series[quantity]
+    bins: set[int] = set()
+    for low, high in zip(series.minimum, series.maximum, strict=True):
+        if low is not None and high is not None:
+            first = math.floor(low / width - BIN_TOLERANCE)
+            last = math.floor(high / width + BIN_TOLERANCE)
+            bins |= set(range(first, min(last, first + MAX_GROUPS) + 1))
+    if len(bins) > MAX_GROUPS:
+        detail = f"more than {MAX_GROUPS} groups; request a narrower range"
+        raise ProblemError(422, "Wrong parameter", detail, "group_by")
+    return sorted(bins)
 
 
 def trend_table(found: TrendModel) -> list[Column]:
@@ -81,7 +240,6 @@ MAX_POINTS = 5000
 MAX_QUANTITIES = 40
 HOLE_HOPS = 2.5
 """Maximum time between successive results that a trend shows without a gap, in result periods."""
-
 
 Cursor = Annotated[
     str | None,
@@ -144,7 +302,7 @@ def trend_router(context: Context) -> APIRouter:
         query = TrendQuery(
             unit=unit,
             bearing=bearing,
-            quantities=stored_columns(quantities_among(_known(quantity))),
+            quantities=columns_of(_known(quantity)),
             start_ns=start_ns,
             end_ns=times[1],
             max_points=max_points,
@@ -154,26 +312,22 @@ def trend_router(context: Context) -> APIRouter:
             states=states_named(state),
             is_page=cursor is not None,
         )
-        grid = context.films.settings.baseline.settings().grid
-        make = partial(_read, context, query, group_by, grid)
+
+        def read() -> TrendModel:
+            store, grid = context.store, context.films.grid
+            past_end_ns, trend = store.films.past_end_ns(unit, bearing), store.trend(query)
+            groups = None if group_by is None else trend_groups(store, query, group_by, grid)
+            return trend_model(query, trend, groups, past_end_ns)
+
         if wanted == "json":
             revision = partial(context.past_revision, unit, times)
             is_fixed = "last" not in request.query_params  # otherwise the range ends now
-            return await context.answers.of(request, revision, make, is_polled=is_fixed)
-        found = await asyncio.to_thread(make)
+            return await context.answers.of(request, revision, read, is_polled=is_fixed)
+        found = await asyncio.to_thread(read)
         columns = await asyncio.to_thread(trend_table, found)
         return table_response(wanted, columns, f"trends-{unit}-{bearing}", found.next_cursor)
 
     return router
-
-
-def _read(
-    context: Context, query: TrendQuery, group_by: GroupName | None, grid: CellGrid
-) -> TrendModel:
-    past_end_ns = context.store.films.past_end_ns(query.unit, query.bearing)
-    whole = context.store.trend(query)
-    groups = None if group_by is None else trend_groups(context.store, query, group_by, grid)
-    return trend_model(query, whole, groups, past_end_ns)
 
 
 def trend_model(
@@ -190,17 +344,18 @@ def trend_model(
     is_past = past_end_ns is not None and past_end_ns >= query.start_ns
     return TrendModel.of(
         query,
-        columns_of(trend),
         trend,
+        **_columns_of(trend),
         simulated_until=past_end_ns if is_past else None,
         next_cursor=None if trend.next_ns is None else str(trend.next_ns),
         groups=groups,
     )
 
 
-def _known(quantities: list[str]) -> tuple[str, ...]:
-    for name in quantities:
-        if quantity_named(name) is None:
+def _known(names: list[str]) -> Iterator[Quantity]:
+    for name in dict.fromkeys(names):
+        found = quantity_named(name)
+        if found is None:
             detail = f"quantity {name!r} is not in the catalogue; see /api/v1/quantities"
             raise ProblemError(422, "Wrong parameter", detail, "quantity")
-    return tuple(dict.fromkeys(quantities))
+        yield found
