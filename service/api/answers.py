@@ -61,14 +61,12 @@ def tag_of(*parts: bytes) -> str:
     return f'W/"{blake2b(b" ".join(parts), digest_size=12).hexdigest()}"'
 
 
-def is_known(tag: str, if_none_match: str | None) -> bool:
+def is_known(tag: str, if_none_match: str) -> bool:
     """Whether an If-None-Match header contains an entity tag: the client has cached the answer.
 
-    `if_none_match` is the value of the header: comma-separated entity tags, or ``*``; None without
+    `if_none_match` is the value of the header: comma-separated entity tags, or ``*``; empty without
     the header.
     """
-    if if_none_match is None:
-        return False
     named = {each.strip().removeprefix("W/") for each in if_none_match.split(",")}
     return "*" in named or tag.removeprefix("W/") in named
 
@@ -164,7 +162,7 @@ class Answers:
         url = scope["path"].encode() + b"?" + scope["query_string"]
         tag = tag_of(self.started.encode(), url, repr(revision()).encode())
         key = (tag, encoding_of(headers.get("accept-encoding", "")))
-        if is_known(tag, headers.get("if-none-match")):
+        if is_known(tag, headers.get("if-none-match", "")):
             return key, Response(status_code=304, headers={"ETag": tag})
         if (kept := self._kept.get(key)) is not None:
             self._kept.move_to_end(key)
@@ -350,8 +348,8 @@ def _tagged(head: Message, message: Message, asked: Headers) -> Message:
     headers, body = MutableHeaders(scope=head), message.get("body", b"")
     headers["ETag"] = tag_of(body)
     _add_cache_headers(headers)
-    if is_known(headers["ETag"], asked.get("if-none-match")):
-        head["status"], body = 304, b""
+    if is_known(headers["ETag"], asked.get("if-none-match", "")):
+        head["status"] = 304
         del headers["Content-Length"], headers["Content-Type"]
         return {"type": "http.response.body", "body": b""}
     body, added = encoded(body, encoding_of(asked.get("accept-encoding", "")))

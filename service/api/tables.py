@@ -168,11 +168,8 @@ def parquet_file(columns: Sequence[Column]) -> bytes:
         pa.field(each.name, ARROW_TYPES[each.kind], metadata={"unit": each.unit or ""})
         for each in columns
     ]
-    arrays = [
-        pa.array(each.values, type=field.type) for each, field in zip(columns, fields, strict=True)
-    ]
     sink = BytesIO()
-    table = pa.table(arrays, schema=pa.schema(fields))
+    table = pa.table({each.name: each.values for each in columns}, schema=pa.schema(fields))
     pq.write_table(table, sink, compression="zstd")
     return sink.getvalue()
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Response
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 from pydantic_core import from_json
 
 from service.api.answers import rendered
@@ -17,6 +17,20 @@ from service.api.values import ApiModel, Time
 from service.store.access.audit_entries import MAX_NAME, AuditEntry, Source
 from service.store.access.identities import Permission
 from service.store.audit import AuditQuery, AuditStore, by_time
+
+
+def _document(text: object) -> object:
+    """Return the object in a stored JSON text; other text as ``{"text": text}``."""
+    if not isinstance(text, str):
+        return text
+    try:
+        document = from_json(text, allow_inf_nan=False)
+    except ValueError:
+        document = text
+    return document if isinstance(document, dict) else {"text": text}
+
+
+Document = Annotated[dict[str, Any] | None, BeforeValidator(_document)]
 
 
 class AuditEntryModel(ApiModel):
@@ -43,10 +57,10 @@ class AuditEntryModel(ApiModel):
     object: Annotated[str, Field(examples=["U1:ujb_shaft_x:channel_not_ok"])]
     """Object of the action, such as the identifier of an alarm."""
 
-    before: Annotated[dict[str, Any] | None, Field(examples=[{"state": "unacknowledged"}])]
+    before: Annotated[Document, Field(examples=[{"state": "unacknowledged"}])]
     """State of the object before the action; null without a state."""
 
-    after: Annotated[dict[str, Any] | None, Field(examples=[{"state": "shelved"}])]
+    after: Annotated[Document, Field(examples=[{"state": "shelved"}])]
     """State of the object after the action; null without a state."""
 
     previous_hash: str
@@ -73,7 +87,6 @@ TEXTS = (
     *("actor", "source", "peer", "action", "object", "before", "after", "reason"),
     *("previous_hash", "hash"),
 )
-
 
 Page = Sequence[tuple[str, AuditEntry]]
 """Entries with the names of their chains."""
@@ -147,7 +160,7 @@ def audit_router(context: Context) -> APIRouter:
             errors = [each for each in (context.plant().audit_error, *own) if each]
             return await rendered(
                 lambda: AuditModel(
-                    entries=[_model(*each) for each in page],
+                    entries=[AuditEntryModel.of(entry, chain=chain) for chain, entry in page],
                     next_before=cursor,
                     head_error="; ".join(errors) or None,
                 )
@@ -176,19 +189,3 @@ async def audit_query(
         start_ns=max(start_ns, AuditQuery.start_ns),
         end_ns=min(end_ns, AuditQuery.end_ns),
     )
-
-
-def _model(chain: str, entry: AuditEntry) -> AuditEntryModel:
-    before, after = _document(entry.before), _document(entry.after)
-    return AuditEntryModel.of(entry, chain=chain, before=before, after=after)
-
-
-def _document(text: str | None) -> dict[str, Any] | None:
-    """Return the object in a stored JSON text; other text as ``{"text": text}``; None for None."""
-    if text is None:
-        return None
-    try:
-        document = from_json(text, allow_inf_nan=False)
-    except ValueError:
-        document = text
-    return document if isinstance(document, dict) else {"text": text}

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from fastapi import APIRouter, Response
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from acquisition.errors import ConfigError
 from core.arrays import FloatArray
@@ -23,8 +23,6 @@ from service.live.samples import newest_blocks, sample_window
 from service.live.status import HELD_S
 from service.recordings.library import RecordingEntry
 from service.recordings.motion import (
-    Order1,
-    RecordedMotion,
     ShaftMotion,
     channels_for,
     motion_of,
@@ -32,6 +30,19 @@ from service.recordings.motion import (
 )
 from service.settings.core_values import machine_of
 from service.settings.units import UnitSettings
+
+DECIMALS = 3
+"""Number of decimals of displacements in µm, finer than a tenth of a converter count."""
+
+SENSES = {1: "x_to_y", -1: "y_to_x", 0: "straight"}
+
+
+def _rounded(values: FloatArray | None) -> list[float | None] | None:
+    return None if values is None else listed(np.round(values, DECIMALS))
+
+
+ShaftX = Annotated[list[float | None], BeforeValidator(_rounded), Field(validation_alias="x_um")]
+ShaftY = Annotated[list[float | None], BeforeValidator(_rounded), Field(validation_alias="y_um")]
 
 
 class EllipseModel(ApiModel):
@@ -46,7 +57,7 @@ class EllipseModel(ApiModel):
     angle_deg: float
     """Angle of the major axis from the x axis towards the y axis, -90 to 90 degrees."""
 
-    sense: Literal["x_to_y", "y_to_x", "straight"]
+    sense: Annotated[Literal["x_to_y", "y_to_x", "straight"], BeforeValidator(SENSES.get)]
     """Sense of rotation along the orbit; "straight" if the orbit is a line."""
 
 
@@ -58,10 +69,10 @@ class MotionOrder1Model(ApiModel):
     frequency_hz: float
     """Running speed, Hz."""
 
-    shaft_x_um: list[float | None]
+    shaft_x_um: ShaftX
     """1× displacement in x for each sample, µm; null with too few neighbouring samples."""
 
-    shaft_y_um: list[float | None]
+    shaft_y_um: ShaftY
     """1× displacement in y for each sample, µm; null with too few neighbouring samples."""
 
 
@@ -72,10 +83,10 @@ class MotionModel(SampleRange, BearingAnswer):
     received: Time | None
     n_samples: int
 
-    shaft_x_um: list[float | None]
+    shaft_x_um: ShaftX
     """Displacement in x without its mean, µm; null if the sample is missing or bad."""
 
-    shaft_y_um: list[float | None]
+    shaft_y_um: ShaftY
     """Displacement in y without its mean, µm; null if the sample is missing or bad."""
 
     clearance_um: float
@@ -99,66 +110,25 @@ class MotionModel(SampleRange, BearingAnswer):
     order1: MotionOrder1Model | None
     """1× component of the motion; null if the speed is unknown or the samples are too few."""
 
-    mark: list[float] | None
+    mark: Annotated[list[float] | None, BeforeValidator(_rounded), Field(validation_alias="marks")]
     """Positions of the key-phase pulses, in samples from the first sample, interpolated; null for a
     unit without a key-phase."""
 
 
-DECIMALS = 3
-"""Number of decimals of displacements in µm, finer than a tenth of a converter count."""
-
-SENSES = {1: "x_to_y", -1: "y_to_x", 0: "straight"}
-
-
-def motion_model(
-    unit: str,
-    bearing: Bearing,
-    motion: ShaftMotion,
-    received_ns: int | None = None,
-    recording: str | None = None,
-    recorded: RecordedMotion | None = None,
-) -> MotionModel:
+def motion_model(unit: str, bearing: Bearing, motion: ShaftMotion, **origin: object) -> MotionModel:
     """Return the API model of the motion of a shaft in a bearing of a unit.
 
-    Parameters
-    ----------
-    received_ns
-        Arrival time of the newest sample, UTC nanoseconds since 1970; None for a recording.
-    recording
-        Name of the recording; None for the newest samples.
-    recorded
-        Position of the samples in the recording; None for the newest samples.
+    `origin` are the fields `recording`, `offset_s`, `total_s` and `received` of the model.
     """
-    marks = motion.marks
     return MotionModel.of(
         motion,
         motion.window,
         unit=unit,
         bearing=bearing.id,
-        recording=recording,
-        offset_s=recorded and recorded.offset_s,
-        total_s=recorded and recorded.total_s,
-        received=received_ns,
         n_samples=motion.x_um.size,
-        shaft_x_um=_rounded(motion.x_um),
-        shaft_y_um=_rounded(motion.y_um),
         clearance_um=bearing.clearance_um,
-        order1=None if motion.order1 is None else _order1(motion.order1),
-        mark=None if marks is None else np.round(marks, DECIMALS).tolist(),
+        **origin,
     )
-
-
-def _order1(found: Order1) -> MotionOrder1Model:
-    return MotionOrder1Model.of(
-        found,
-        shaft_x_um=_rounded(found.x_um),
-        shaft_y_um=_rounded(found.y_um),
-        ellipse=EllipseModel.of(found.ellipse, sense=SENSES[found.ellipse.sense]),
-    )
-
-
-def _rounded(values_um: FloatArray) -> list[float | None]:
-    return listed(np.round(values_um, DECIMALS))
 
 
 MAX_SAMPLES = 60_000
@@ -245,7 +215,8 @@ def _newest(
     n_wanted = max(1, round(seconds * blocks[-1].rate_hz))
     held, first_index, n_samples = newest_blocks(blocks, n_wanted)
     found = motion_of(sample_window(held, rows, first_index, n_samples), machine, bearing)
-    return motion_model(settings.id, bearing, found, received_ns)
+    newest = {"recording": None, "offset_s": None, "total_s": None, "received": received_ns}
+    return motion_model(settings.id, bearing, found, **newest)
 
 
 def _recorded(
@@ -255,7 +226,8 @@ def _recorded(
     unit = recording.manifest.unit
     machine = machine_of(context.unit(unit))
     found = recorded_motion(recording, machine, bearing, start_s, seconds)
-    return motion_model(unit, bearing, found.motion, recording=name, recorded=found)
+    position = {"offset_s": found.offset_s, "total_s": found.total_s}
+    return motion_model(unit, bearing, found.motion, recording=name, received=None, **position)
 
 
 def _described(context: Context, kept: RecordingEntry) -> tuple[str, float]:

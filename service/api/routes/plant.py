@@ -36,10 +36,10 @@ class DeviceClockModel(ApiModel):
     """Deviation of the sampling rate, timed by the host clock, from its nominal value, ppm; null
     during the first minute, and for a device that samples on request."""
 
-    drift_uncertainty_ppm: float | None
+    drift_uncertainty_ppm: Annotated[float | None, Field(validation_alias="u_drift_ppm")]
     """Standard uncertainty of the drift, ppm; null if the drift is null."""
 
-    n_stamp_faults: int
+    n_stamp_faults: Annotated[int, Field(validation_alias="n_faults")]
     """Number of blocks whose time stamp was discarded because it contradicts the sample index."""
 
     stamp_fault: StampFault | None
@@ -65,7 +65,7 @@ class SourceModel(LinkModel):
     received: Time | None
     rejected: dict[str, int]
 
-    last_sample_time: Time | None
+    last_sample_time: Annotated[Time | None, Field(validation_alias="last_sample_ns")]
     """Time of the newest sample by the device clock; null without a sample."""
 
     n_offered: int
@@ -117,15 +117,8 @@ class SourceHealthModel(SourceModel):
 def source_model(live: LiveUnits, unit: str) -> SourceModel:
     """Return the API model of the data source of a unit: link, counts of samples, and clock."""
     status = live.status(unit)
-    clock = status.clock and DeviceClockModel.of(
-        status.clock,
-        status,
-        drift_uncertainty_ppm=status.clock.u_drift_ppm,
-        n_stamp_faults=status.clock.n_faults,
-    )
-    return SourceModel.of(
-        status, status.account, last_sample_time=status.last_sample_ns, clock=clock
-    )
+    clock = status.clock and DeviceClockModel.of(status.clock, status)
+    return SourceModel.of(status, status.account, clock=clock)
 
 
 class GapModel(ApiModel):
@@ -274,13 +267,12 @@ def _unit(context: Context, unit: str) -> UnitModel:
 
 
 def _health(context: Context, settings: UnitSettings) -> SourceHealthModel:
-    arriving = source_model(context.live, settings.id)
     return SourceHealthModel.of(
-        arriving,
+        source_model(context.live, settings.id),
         context.plant().sources.get(settings.id, SourceCounts()),
+        context.live.status(settings.id),
         unit=settings.id,
         kind=settings.source.kind,
-        n_failed=context.live.status(settings.id).n_failed,
         rate_hz=settings.sampling_hz,
         poll_period_s=getattr(settings.source, "poll_period_s", None),
     )
