@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from core.arrays import FloatArray, IntArray
 from core.baseline.grouping import Groups, bisquare, robust_std
@@ -115,6 +114,8 @@ def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
 
     `bend_std` is the prior standard deviation of the change of slope of ln k between knots.
     """
+    from scipy.linalg import cho_solve  # slow import, not needed at start-up
+
     offset = float(np.median(groups.value))
     points = _Points.of(groups, shape, offset)
     prior = prior_precision(shape, bend_std)
@@ -154,6 +155,8 @@ class _Points:
 
         `precision` (n,) is the inverse variance of each row; `prior` is from `prior_precision`.
         """
+        from scipy.linalg import cho_factor, cho_solve  # slow import, not needed at start-up
+
         weighted = self.design * (self.trust * precision)[:, np.newaxis]
         factor, _ = cho_factor(self.design.T @ weighted + prior, lower=True)
         return cho_solve((factor, True), weighted.T @ self.y), factor

@@ -5,6 +5,8 @@ A model states the meaning of a field only if it is not that of this table.
 
 from typing import Any
 
+from service.runtime import models
+
 MEANINGS = {
     # places and names
     "id": "Identifier.",
@@ -85,8 +87,9 @@ MEANINGS = {
 """Descriptions of fields in JSON schemas, by name of the field."""
 
 
-def describe_fields(schema: dict[str, Any]) -> None:
-    """Add the meanings of fields without a description to the JSON schema of a model."""
+def describe_fields(schema: dict[str, Any], model: type[Any]) -> None:
+    """Add the docstrings of fields, and the meanings of those without, to a model's JSON schema."""
+    models.describe_fields(schema, model)
     for name, field in schema.get("properties", {}).items():
         if "$ref" not in field and name in MEANINGS:
             field.setdefault("description", MEANINGS[name])

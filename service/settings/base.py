@@ -7,6 +7,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, field_validator
 
+from service.runtime.models import describe_fields
+
 CONTROL = re.compile(r"[\x00-\x08\x0a-\x1f\x7f-\x9f]")
 """Control characters except the tab, which is a valid column delimiter of an imported file."""
 
@@ -53,7 +55,7 @@ class Settings(BaseModel):
         frozen=True,
         extra="forbid",
         allow_inf_nan=False,
-        use_attribute_docstrings=True,
+        json_schema_extra=describe_fields,
         defer_build=True,  # most models are only part of another, which contains their validators
     )
 

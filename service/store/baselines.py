@@ -60,8 +60,13 @@ class StoredStep:
     reason: str
     """Reason given by the person or program that acted; may be empty."""
 
-    from_ns: Annotated[TimeNs | None, Field(serialization_alias="event_time")] = None
-    """For "renewed", time of the machine event; earlier readings are not used."""
+    from_ns: Annotated[
+        TimeNs | None,
+        Field(
+            serialization_alias="event_time",
+            description='For "renewed", time of the machine event; earlier readings are not used.',
+        ),
+    ] = None
 
 
 @dataclass(frozen=True)
