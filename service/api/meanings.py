@@ -5,7 +5,7 @@ A model states the meaning of a field only if it is not that of this table.
 
 from typing import Any
 
-from service.runtime import models
+from service.settings import base
 
 MEANINGS = {
     # places and names
@@ -89,7 +89,7 @@ MEANINGS = {
 
 def describe_fields(schema: dict[str, Any], model: type[Any]) -> None:
     """Add the docstrings of fields, and the meanings of those without, to a model's JSON schema."""
-    models.describe_fields(schema, model)
+    base.describe_fields(schema, model)
     for name, field in schema.get("properties", {}).items():
         if "$ref" not in field and name in MEANINGS:
             field.setdefault("description", MEANINGS[name])

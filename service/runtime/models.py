@@ -1,12 +1,7 @@
 """Base of the models of answers and documents, and configuration of served dataclasses."""
 
-import ast
-import inspect
 import math
-from contextlib import suppress
 from enum import Enum
-from itertools import pairwise
-from textwrap import dedent
 from types import SimpleNamespace
 from typing import Annotated, Any, Self
 
@@ -21,24 +16,7 @@ from pydantic import (
 )
 
 from service.runtime.times import rfc3339
-
-
-def describe_fields(schema: dict[str, Any], model: type[Any]) -> None:
-    """Add the docstrings of the fields of a model to its JSON schema, as their descriptions.
-
-    pydantic's ``use_attribute_docstrings`` does the same when a class is made: a quarter of the
-    start of a process, most of which never make a schema.
-    """
-    properties = schema.get("properties", {})
-    for kind in model.__mro__:
-        with suppress(OSError, TypeError):  # its source does not exist
-            [definition] = ast.parse(dedent(inspect.getsource(kind))).body
-            for field, text in pairwise(getattr(definition, "body", ())):
-                match field, text:
-                    case ast.AnnAssign(ast.Name(name)), ast.Expr(ast.Constant(str(words))):
-                        served = name if name in properties else name.removesuffix("_ns")
-                        if served in properties:
-                            properties[served].setdefault("description", inspect.cleandoc(words))
+from service.settings.base import describe_fields
 
 
 class ValueModel(BaseModel):

@@ -1,13 +1,16 @@
 """Base class of the settings models, their validation errors, and shared checks."""
 
+import ast
+import inspect
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import fields
+from itertools import pairwise
+from textwrap import dedent
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, field_validator
-
-from service.runtime.models import describe_fields
 
 CONTROL = re.compile(r"[\x00-\x08\x0a-\x1f\x7f-\x9f]")
 """Control characters except the tab, which is a valid column delimiter of an imported file."""
@@ -46,6 +49,24 @@ Identifier = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.
 
 Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 """Fraction between 0 and 1, both excluded."""
+
+
+def describe_fields(schema: dict[str, Any], model: type[Any]) -> None:
+    """Add the docstrings of the fields of a model to its JSON schema, as their descriptions.
+
+    pydantic's ``use_attribute_docstrings`` does the same when a class is made: a quarter of the
+    start of a process, most of which never make a schema.
+    """
+    properties = schema.get("properties", {})
+    for kind in model.__mro__:
+        with suppress(OSError, TypeError):  # its source does not exist
+            [definition] = ast.parse(dedent(inspect.getsource(kind))).body
+            for field, text in pairwise(getattr(definition, "body", ())):
+                match field, text:
+                    case ast.AnnAssign(ast.Name(name)), ast.Expr(ast.Constant(str(words))):
+                        served = name if name in properties else name.removesuffix("_ns")
+                        if served in properties:
+                            properties[served].setdefault("description", inspect.cleandoc(words))
 
 
 class Settings(BaseModel):
