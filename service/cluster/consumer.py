@@ -23,7 +23,7 @@ from service.cluster.session import (
     stream_name,
     subject,
 )
-from service.measuring.recorder import Findings, Recorder
+from service.measuring.recorder import Recorder
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.metrics import Families
 from service.runtime.periodic import TroubleLog
@@ -169,7 +169,7 @@ class Consumer:
             refused = [m for number, m in pairs if not await progress.take(number, m.data)]
             if not progress.is_replaying:
                 position = progress.position()
-                self._recorder.put(Findings(position=position))
+                self._recorder.put([position])
                 await self._recorder.reached(position)
             for message in batch:
                 with suppress(Error):  # stored; an unacknowledged message is redelivered

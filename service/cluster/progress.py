@@ -3,7 +3,6 @@
 from collections import Counter, deque
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import replace
 
 import structlog
 from pydantic import TypeAdapter, ValidationError
@@ -17,7 +16,7 @@ from service.live.status import LinkState
 from service.measuring.acquirer import LinkNews
 from service.measuring.analyser import VERSION, Analyser, UnitMemory
 from service.measuring.live_view import LiveView
-from service.measuring.recorder import Findings, Recorder
+from service.measuring.recorder import Recorder
 from service.store.sharing import StreamPosition
 
 log = structlog.get_logger()
@@ -260,8 +259,8 @@ class UnitProgress:
         findings = await self._analyser.analyse(message.block, self._sampled_s(message))
         self.sequence = sequence
         self._note(sequence, message.block)
-        if findings != Findings():
-            self._recorder.put(replace(findings, position=self.position()))
+        if findings:
+            self._recorder.put([*findings, self.position()])
 
     def _note(self, sequence: int, block: SampleBlock) -> None:
         """Add a message to the window of the messages that restore the state by a replay."""

@@ -23,7 +23,6 @@ from core.limits import Judgement
 from core.monitor.assessment import Assessment
 from core.samples.blocks import SampleBlock
 from service.live.alarm_list import is_shared, reporting_unit
-from service.measuring.recorder import Findings
 from service.measuring.service_alarms import (
     HealthProbe,
     RefusedMessages,
@@ -69,7 +68,7 @@ class AlarmEngine:
     units
         Alarms of each unit, by unit id.
     put
-        Function that queues findings for the store.
+        Function that queues changes of alarms for the store.
     listener
         Function that receives each block with the changes of alarms that it caused.
     service
@@ -83,7 +82,7 @@ class AlarmEngine:
     def __init__(
         self,
         units: Mapping[str, UnitAlarms],
-        put: Callable[[Findings], None],
+        put: Callable[[Sequence[AlarmNews]], None],
         clock: Clock,
         listener: Listener | None = None,
         service: ServiceAlarms | None = None,
@@ -232,7 +231,7 @@ class AlarmEngine:
         """Announce and store changes of alarms that were not caused by a block."""
         self._announce(news)
         if news:
-            self._put(Findings(alarms=news))
+            self._put(news)
 
     def _announce(self, news: list[AlarmNews]) -> None:
         now_ns = self._clock.now_ns()
@@ -292,7 +291,7 @@ async def alarm_engine(
     plant: PlantFile,
     origin: Origin,
     store: Store,
-    put: Callable[[Findings], None],
+    put: Callable[[Sequence[AlarmNews]], None],
     clock: Clock,
     listener: Listener | None = None,
     look: HealthProbe | None = None,
@@ -308,7 +307,7 @@ async def alarm_engine(
     plant, origin, store, clock
         Plant file, origin of the data (live or replay), store of the alarms, and host clock.
     put, listener
-        Functions that queue findings for the store, and receive each block with its changes.
+        Functions that queue changes for the store, and receive each block with its changes.
     look
         Function that returns the health of the service; not called during a replay.
     part

@@ -18,7 +18,7 @@ from service.measuring.acquirer import Acquirer, Bus, LinkNews
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.films import FilmMonitor
 from service.measuring.live_view import LiveView
-from service.measuring.recorder import Findings, Recorder
+from service.measuring.recorder import Finding, Recorder
 from service.measuring.sources import WatchedUnit
 from service.runtime.heartbeats import Heartbeats, Pulse
 from service.runtime.metrics import MEASURED
@@ -93,7 +93,7 @@ class Analyser:
         for unit in monitors:
             ASSESSMENTS.labels(unit)  # a unit without results has a count of zero
 
-    async def analyse(self, block: SampleBlock, sampled_s: float) -> Findings:
+    async def analyse(self, block: SampleBlock, sampled_s: float) -> list[Finding]:
         """Analyse a block, last sampled at the monotonic time ``sampled_s``; return findings."""
         monitor = self.monitors[block.unit]
         block = self._counts[block.unit].placed(block)
@@ -107,9 +107,7 @@ class Analyser:
             self._live.set_assessment(assessment, sampled_s)
         self._live.set_received(block, monitor.account, sampled_s)
         news = self.alarms.take(block, assessments, self._films.conditions(films))
-        if assessments or gaps or news:
-            return Findings(assessments, gaps, news, films)
-        return Findings()
+        return [*assessments, *gaps, *news, *films]
 
     async def replay(
         self, block: SampleBlock, sampled_s: float, account: SampleAccount | None = None

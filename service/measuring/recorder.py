@@ -4,13 +4,13 @@ import asyncio
 import json
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import structlog
@@ -83,33 +83,8 @@ class NotStoredError(Exception):
     """Error raised if changes of alarms were not stored; the message states why."""
 
 
-@dataclass(frozen=True)
-class Findings:
-    """Results of one block, stored in one transaction, and the stream position after the block.
-
-    The results are assessments, gaps in the samples, changes of alarms, and film readings.
-    """
-
-    assessments: Sequence[Assessment] = ()
-    gaps: Sequence[UnitGap] = ()
-    alarms: Sequence[AlarmNews] = ()
-    films: Sequence[FilmNews] = ()
-    position: StreamPosition | None = None
-
-    @property
-    def parts(self) -> Iterator["Findings"]:
-        """These findings split into findings of one row each, in the order of storing."""
-        yield from (Findings(alarms=[news]) for news in self.alarms)
-        yield from (Findings([assessment]) for assessment in self.assessments)
-        yield from (Findings(gaps=[gap]) for gap in self.gaps)
-        yield from (Findings(films=[news]) for news in self.films)
-        if self.position is not None:
-            yield Findings(position=self.position)
-
-    @property
-    def row(self) -> object:
-        """First row of the findings; the only row of a part."""
-        return next(iter((*self.alarms, *self.assessments, *self.gaps, *self.films, self.position)))
+Finding: TypeAlias = Assessment | UnitGap | AlarmNews | FilmNews | StreamPosition
+"""Finding of the analysis; the position on the stream follows the other findings of its block."""
 
 
 COMMITS = Histogram(
@@ -144,12 +119,12 @@ class Recorder:
     live: LiveView
     clock: Clock
     folder: Path
-    capacity: int = 5000
+    capacity: int = 10_000
     on_stored: Callable[[], None] = lambda: None
     finds_again: bool = field(default=False, kw_only=True)
 
     def __post_init__(self) -> None:
-        self._waiting: deque[Findings] = deque()
+        self._waiting: deque[Finding] = deque()
         self._alarms: deque[AlarmNews] = deque()
         self._n_writing = 0
         self._waits_since_s = 0.0
@@ -171,14 +146,16 @@ class Recorder:
             return 0.0
         return self.clock.monotonic_s() - self._waits_since_s
 
-    def put(self, findings: Findings) -> None:
-        """Queue findings for writing."""
+    def put(self, findings: Iterable[Finding]) -> None:
+        """Queue findings for writing; those of one call are stored in one transaction."""
         if not (self._waiting or self._alarms):
             self._waits_since_s = self.clock.monotonic_s()
-        if findings.assessments or findings.gaps or findings.films or findings.position:
-            self._waiting.append(replace(findings, alarms=()))
+        for finding in findings:
+            if isinstance(finding, AlarmNews):
+                self._alarms.append(finding)
+            else:
+                self._waiting.append(finding)
         self._drop_oldest()
-        self._alarms += findings.alarms
         while len(self._alarms) > MAX_NEWS:
             self._resolve(self._alarms.popleft(), "the queue to the store is full")
             self.live.note_unstored(1, GIVEN_UP)
@@ -201,7 +178,7 @@ class Recorder:
         """Wait without limit until a queued stream position is on the disk."""
         async with self._progress:
             await self._progress.wait_for(
-                lambda: all(findings.position is not position for findings in self._waiting)
+                lambda: all(finding is not position for finding in self._waiting)
             )
 
     async def require_store(self) -> None:
@@ -248,7 +225,7 @@ class Recorder:
     async def _write(self) -> bool:
         batch, alarms = list(self._waiting), list(self._alarms)
         self._n_writing = len(batch)
-        append = partial(self._append, [Findings(alarms=alarms), *batch])
+        append = partial(self._append, [*alarms, *batch])
         try:
             refused = await asyncio.get_running_loop().run_in_executor(self._thread, append)
         except StoreError as error:
@@ -268,8 +245,7 @@ class Recorder:
             self.live.note_unstored(len(refused), reason)
             log.error("the database refused results", n_parked=len(refused), reason=reason)
         self._n_writing = 0
-        for findings in batch:
-            self.live.note_stored(findings.assessments, findings.gaps)
+        self.live.note_stored(_only(Assessment, batch), _only(UnitGap, batch))
         _drop(self._waiting, batch)
         _drop(self._alarms, alarms)
         reasons = {id(row): reason for row, reason in refused}
@@ -280,11 +256,11 @@ class Recorder:
         await self._notify()
         return True
 
-    def _append(self, batch: Iterable[Findings]) -> list[tuple[object, str]]:
+    def _append(self, batch: Sequence[Finding]) -> list[tuple[object, str]]:
         """Store findings; write refused rows to the file, and return pairs of row and reason."""
         refused: list[tuple[object, str]] = []
         began_s = self.clock.monotonic_s()
-        self._append_parts([part for findings in batch for part in findings.parts], refused)
+        self._append_rows(batch, refused)
         COMMITS.observe(self.clock.monotonic_s() - began_s)
         if refused:
             path = self.folder / FILE
@@ -294,25 +270,25 @@ class Recorder:
                 raise StoreError(f"cannot write {path}: {error}") from error
         return refused
 
-    def _append_parts(self, parts: Sequence[Findings], refused: list[tuple[object, str]]) -> None:
-        """Store parts in one transaction; if the transaction is refused, store each half."""
+    def _append_rows(self, rows: Sequence[Finding], refused: list[tuple[object, str]]) -> None:
+        """Store findings in one transaction; if the transaction is refused, store each half."""
+        found = _only(Assessment, rows)
         try:
             self.store.append(
-                [row for part in parts for row in part.assessments],
-                [row for part in parts for row in part.gaps],
-                [row for part in parts for row in part.alarms],
-                [row for part in parts for row in part.films],
-                [part.position for part in parts if part.position],
+                found,
+                _only(UnitGap, rows),
+                _only(AlarmNews, rows),
+                _only(FilmNews, rows),
+                _only(StreamPosition, rows),
             )
         except RefusedRowError as error:
-            middle = len(parts) // 2
+            middle = len(rows) // 2
             if middle:
-                self._append_parts(parts[:middle], refused)
-                self._append_parts(parts[middle:], refused)
+                self._append_rows(rows[:middle], refused)
+                self._append_rows(rows[middle:], refused)
                 return
             self.store.append([], [])  # raises if the store refuses every write
-            refused.append((parts[0].row, str(error)))
-            found = parts[0].assessments
+            refused.append((rows[0], str(error)))
             if any(assessment.spectrum.frequency_hz.size for assessment in found):
                 with suppress(RefusedRowError):  # the spectrum may be the refused part
                     self.store.append([replace(a, spectrum=NO_SPECTRUM) for a in found], [])
@@ -326,6 +302,10 @@ class Recorder:
     async def _notify(self) -> None:
         async with self._progress:
             self._progress.notify_all()
+
+
+def _only(kind: type[T], findings: Iterable[Finding]) -> list[T]:
+    return [finding for finding in findings if isinstance(finding, kind)]
 
 
 def _drop(queue: deque[T], written: Sequence[T]) -> None:

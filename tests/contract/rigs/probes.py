@@ -10,7 +10,6 @@ import numpy as np
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reading, Reason, bad
 from rigs.blocks import given_block
-from service.measuring.recorder import Findings
 
 ALARMS = "/api/v1/alarms"
 PROBE = "U1:ujb_shaft_x:channel_not_ok"
@@ -49,7 +48,7 @@ class Probes:
         )
         news = self._service.alarms.take(block, results)
         if news:
-            self._service.recorder.put(Findings(alarms=news))
+            self._service.recorder.put(news)
 
     async def stored(self) -> None:
         """Wait until all news are on the disk."""

@@ -13,7 +13,6 @@ from starlette.requests import Request
 from service.api.answers import Answers, json_of
 from service.api.server import SECURITY_HEADERS, AddedHeaders
 from service.live.status import LinkState
-from service.measuring.recorder import Findings
 from service.runtime.asker import ASKER
 from service.runtime.times import rfc3339
 
@@ -176,7 +175,7 @@ async def test_a_range_in_the_past_is_not_read_again_for_new_results(running, as
 
     last = max(assessments, key=lambda one: one.time_ns)
     later = replace(last, time_ns=last.time_ns + 1_000_000_000)
-    running.recorder.put(Findings([later]))
+    running.recorder.put([later])
     await running.recorder.settled()
 
     assert (await ask(running, closed, tags[0])).status_code == 304

@@ -13,7 +13,6 @@ from harness.stream_rig import ground_of
 from service.app.analysis import Analysis
 from service.cluster.progress import UnitProgress, memories_of, usable
 from service.cluster.session import identity_of
-from service.measuring.recorder import Findings
 from service.settings.plant import PlantFile, load_plant_file
 from service.store.sqlite import SqliteStore
 
@@ -44,7 +43,7 @@ class Life:
     async def store(self) -> None:
         """Store everything, with how far it is."""
         if not self.progress.is_replaying:
-            self.analysis.recorder.put(Findings(position=self.progress.position()))
+            self.analysis.recorder.put([self.progress.position()])
         await self.analysis.recorder.flush()
 
     async def close(self) -> None:

@@ -38,7 +38,7 @@ from core.limits import AlarmLevel, Judgement, unknown
 from core.quality import GOOD, Reason, bad
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.live_view import LiveView
-from service.measuring.recorder import Findings, Recorder
+from service.measuring.recorder import Recorder
 from service.store.port import AlarmQuery
 from service.store.sqlite import SqliteStore
 
@@ -141,7 +141,7 @@ class Life:
         before = kept(self.engine.alarms)
         news = self.engine.take(block, [], films)
         if news:
-            self.recorder.put(Findings(alarms=news))
+            self.recorder.put(news)
         after = kept(self.engine.alarms)
         assert after[PROBE][0] == int(is_bad)
         for id_, condition in ((id_, found["x"]) for id_, found in films.items()):

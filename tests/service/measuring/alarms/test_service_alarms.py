@@ -17,7 +17,7 @@ from core.samples.gaps import SampleAccount
 from service.cluster.silent_units import SILENT_AFTER_S, SilentUnits
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.live_view import LiveView
-from service.measuring.recorder import Findings, Recorder
+from service.measuring.recorder import Recorder
 from service.measuring.service_alarms import (
     ServiceAlarms,
     ServiceHealth,
@@ -217,7 +217,7 @@ def _findings(alarm: Alarm) -> Any:
     event = AlarmEvent(
         alarm.identity, 1, AlarmChange.COMMENTED, None, alarm.state, alarm.state, 0, 0
     )
-    return Findings(alarms=[AlarmNews(replace(alarm, n_events=1), [event])])
+    return [AlarmNews(replace(alarm, n_events=1), [event])]
 
 
 async def test_news_that_comes_during_a_write_is_stored_without_any_news_after_it(stored):

@@ -22,13 +22,7 @@ from core.limits import AlarmLevel, Judgement
 from core.monitor.assessment import Assessment
 from core.samples.gaps import Gap
 from service.measuring import recorder as recording
-from service.measuring.recorder import (
-    COMMITS,
-    FILE,
-    Findings,
-    NotStoredError,
-    Recorder,
-)
+from service.measuring.recorder import COMMITS, FILE, NotStoredError, Recorder
 from service.store.access.audit_entries import ActedNews
 from service.store.port import TrendQuery, UnitGap
 
@@ -117,7 +111,7 @@ async def test_only_results_that_nobody_finds_again_are_said_to_be_lost(plant, f
     parts = (plant.store, plant.live, plant.clock, plant.path.parent)
     recorder = Recorder(*parts, finds_again=finds_again)
     break_store(plant)
-    recorder.put(Findings([assessment()]))
+    recorder.put([assessment()])
     with structlog.testing.capture_logs() as logs:
         await recorder.flush()
     assert said in [(line["log_level"], line["event"]) for line in logs]
@@ -129,7 +123,7 @@ async def test_what_does_not_fit_while_the_store_is_away_is_counted(plant):
     results = [assessment(at(n), order1_k_eff_xx_n_per_m=float(n)) for n in range(5)]
     break_store(plant)
     for result in results:
-        plant.recorder.put(Findings([result]))
+        plant.recorder.put([result])
 
     await plant.recorder.flush()
     mend_store(plant)
@@ -146,7 +140,7 @@ async def test_a_write_that_fails_is_not_timed(plant):
 
     before = n_timed()
     break_store(plant)
-    plant.recorder.put(Findings([assessment()]))
+    plant.recorder.put([assessment()])
     await plant.recorder.flush()
     assert n_timed() == before
 
@@ -161,11 +155,11 @@ async def test_what_is_being_written_is_never_given_up(plant):
     with closing(sqlite3.connect(plant.path)) as blocker:
         blocker.execute("BEGIN IMMEDIATE")
         for gap_ in gaps[:3]:
-            plant.recorder.put(Findings([], [gap_]))
+            plant.recorder.put([gap_])
         writing = asyncio.create_task(plant.recorder.flush())
         await until(plant.store._lock.locked)
         for gap_ in gaps[3:]:
-            plant.recorder.put(Findings([], [gap_]))
+            plant.recorder.put([gap_])
         blocker.rollback()
         await writing
     await plant.recorder.flush()
@@ -179,12 +173,12 @@ async def test_stopping_in_the_middle_of_a_write_loses_nothing_and_writes_nothin
     blocker = sqlite3.connect(plant.path)
     blocker.execute("BEGIN IMMEDIATE")
     recording = asyncio.create_task(plant.recorder.run())
-    plant.recorder.put(Findings([], gaps[:3]))
+    plant.recorder.put(gaps[:3])
     await until(plant.store._lock.locked)
 
     recording.cancel()
     await asyncio.wait([recording])
-    plant.recorder.put(Findings([], gaps[3:]))
+    plant.recorder.put(gaps[3:])
     blocker.rollback()
     blocker.close()
     await plant.recorder.flush()
@@ -212,10 +206,10 @@ def without_coverage(found: Assessment) -> Assessment:
 )
 async def test_a_row_that_cannot_be_stored_is_parked_and_all_else_is_stored(plant, spoil, why):
     results = [assessment(at(n), order1_k_eff_xx_n_per_m=float(n)) for n in range(5)]
-    plant.recorder.put(Findings([*results[:2], spoil(results[2])], [gap()], [news_of("sx")]))
+    plant.recorder.put([*results[:2], spoil(results[2]), gap(), news_of("sx")])
     nameless, of_a_person = news_of("\ud800"), news_of("\ud801")
     acted = ActedNews(of_a_person.alarm, of_a_person.events, peer="192.0.2.7")
-    plant.recorder.put(Findings(results[3:], alarms=[nameless, acted, news_of("sy")]))
+    plant.recorder.put([*results[3:], nameless, acted, news_of("sy")])
 
     await plant.recorder.flush()
 
@@ -245,7 +239,7 @@ async def test_a_damaged_page_of_spectra_costs_the_spectra_alone(plant):
         file.seek((page - 1) * size)
         file.write(b"\xff" * size)
     damaged = type(plant)(plant.path)
-    damaged.recorder.put(Findings([assessment(at(9000), order1_k_eff_xx_n_per_m=1.0)]))
+    damaged.recorder.put([assessment(at(9000), order1_k_eff_xx_n_per_m=1.0)])
 
     await damaged.recorder.flush()
 
@@ -256,7 +250,7 @@ async def test_a_damaged_page_of_spectra_costs_the_spectra_alone(plant):
 
 
 async def test_who_waits_for_the_disk_is_told_what_will_never_be_there(plant, monkeypatch):
-    plant.recorder.put(Findings(alarms=[news_of("\ud800")]))
+    plant.recorder.put([news_of("\ud800")])
     refused = asyncio.create_task(plant.recorder.stored())
     await asyncio.sleep(0)
     await plant.recorder.flush()
@@ -264,10 +258,10 @@ async def test_who_waits_for_the_disk_is_told_what_will_never_be_there(plant, mo
         await refused
 
     monkeypatch.setattr(recording, "MAX_NEWS", 1)
-    plant.recorder.put(Findings(alarms=[news_of("sx")]))
+    plant.recorder.put([news_of("sx")])
     given_up = asyncio.create_task(plant.recorder.stored())
     await asyncio.sleep(0)
-    plant.recorder.put(Findings(alarms=[news_of("sy")]))
+    plant.recorder.put([news_of("sy")])
     written = asyncio.create_task(plant.recorder.stored())
     with pytest.raises(NotStoredError, match="queue to the store is full"):
         await given_up
