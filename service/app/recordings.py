@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import AsyncGenerator, AsyncIterator, Iterable
-from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from contextlib import aclosing, asynccontextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -107,32 +107,19 @@ class PlayedOut:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link and yield its blocks, until the recording or the DAQ ends.
+        """Yield the blocks of the link, which opens with the first, until recording or DAQ end.
 
-        Raises `LinkError` or `ConfigError` if the wrapped source raises it before the end of the
-        recording.
+        The blocks raise `LinkError` or `ConfigError` if the wrapped source raises it before the end
+        of the recording.
         """
-        async with AsyncExitStack() as stack:
-            blocks = None
-            try:
-                blocks = await stack.enter_async_context(self.source.connect())
-            except LinkError:
-                if not self._is_over:
-                    raise
-            yield await stack.enter_async_context(aclosing(self._until_over(blocks)))
+        async with aclosing(self._until_over()) as blocks:
+            yield blocks
 
-    async def _until_over(
-        self, blocks: AsyncIterator[SampleBlock] | None
-    ) -> AsyncGenerator[SampleBlock, None]:
-        if blocks is None:
-            return
+    async def _until_over(self) -> AsyncGenerator[SampleBlock, None]:
         try:
-            async for block in blocks:
-                yield replace(block, clock=None)  # the device reports the times of the recording
+            async with self.source.connect() as blocks:
+                async for block in blocks:
+                    yield replace(block, clock=None)  # the device reports times of the recording
         except LinkError:
-            if not self._is_over:
+            if not (self.over.is_set() or (self.gone is not None and self.gone.is_set())):
                 raise
-
-    @property
-    def _is_over(self) -> bool:
-        return self.over.is_set() or (self.gone is not None and self.gone.is_set())
