@@ -72,8 +72,8 @@ class OrbitTrace:
 
 
 @dataclass(frozen=True)
-class Assessment:
-    """Results of one evaluation of a bearing.
+class BearingResult:
+    """Results of one evaluation of a bearing, without spectrum, orbit and recent values.
 
     Parameters
     ----------
@@ -88,18 +88,12 @@ class Assessment:
         Uncertainty budgets, by quantity; only of readings with known uncertainty.
     estimators
         Estimator that `stiffness` was taken from, by axes "xx" and "yy"; None without a value.
-    spectrum
-        Cross-spectrum of the displacements at the Fourier bins, µm²; empty for a rack.
-    orbit
-        Shaft orbit; None without speed, usable probes or waveforms.
     runout
         Whether the slow-roll vector was subtracted from 1× of the newest segment, by "shaft_x" and
         "shaft_y".
     clipped_share
         Fraction of the newest segment's samples at an end of the converter's range, by "shaft_x",
         "shaft_y", "bearing_x" and "bearing_y"; empty without waveforms.
-    recent
-        Vibration of the newest parts of the averaging window, oldest first; empty if unavailable.
     evidence
         Kind of the input: waveforms, or vectors of a rack. Without waveforms there is no coherence,
         and equation (5) does not distinguish noise from motion.
@@ -116,10 +110,26 @@ class Assessment:
     readings: Mapping[str, Reading]
     budgets: Mapping[str, Budget]
     estimators: Mapping[str, Estimator | None]
-    spectrum: CrossSpectrum
-    orbit: OrbitTrace | None
     runout: Mapping[str, RunoutVerdict]
     clipped_share: Mapping[str, float] = field(default_factory=dict)
-    recent: Sequence[RecentReadings] = ()
     evidence: Evidence = Evidence.WAVEFORMS
     condition: BearingCondition | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assessment(BearingResult):
+    """Results of one evaluation of a bearing.
+
+    Parameters
+    ----------
+    spectrum
+        Cross-spectrum of the displacements at the Fourier bins, µm²; empty for a rack.
+    orbit
+        Shaft orbit; None without speed, usable probes or waveforms.
+    recent
+        Vibration of the newest parts of the averaging window, oldest first; empty if unavailable.
+    """
+
+    spectrum: CrossSpectrum
+    orbit: OrbitTrace | None
+    recent: Sequence[RecentReadings] = ()

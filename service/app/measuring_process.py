@@ -168,7 +168,7 @@ async def run_service(
         await audit.begin()
         held = [*(unit.id for unit in plant.unit), PLANT]
         supervision = Supervision(host, beats, live.status, units)
-        reports = SocketReports([*held, SHARED], analysis.snapshots, analysis.snapshot, clock)
+        reports = SocketReports([*held, SHARED], analysis.snapshots, analysis.snapshot)
         parts = (analysis.executor, live, analysis.soundness, analysis.metrics)
         questions = Questions(*parts, supervision.announce)
         end = MeasuringEnd(reports.report, questions.answer, REPORT_EVERY_S)

@@ -44,17 +44,13 @@ class LiveClient:
         A baseline that has come into force and cannot be read is not shown; the next report with
         results of its unit tries again.
         """
-        known = [each for each in report.units if each.unit in self.units.units]
-        baselines = {
-            each.unit: await self.films.read_baselines(each.unit, each.snapshot)
-            for each in known
-            if each.snapshot is not None
-        }
-        for each in known:
+        for each in report.units:
+            if each.unit not in self.units.units:
+                continue
             if each.snapshot is not None:
+                await self.films.take(each.unit, each.snapshot)
                 self.units.set_results(each.unit, each.snapshot.bearings)
                 self.alarms.take(each.unit, each.snapshot)
-                self.films.take(each.unit, each.snapshot, baselines[each.unit])
             self.units.update(
                 each.unit, report.process, report.number, each.link, is_direct=is_direct
             )

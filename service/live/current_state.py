@@ -14,15 +14,14 @@ from core.alarms.alarm import PLANT
 from core.baseline.baseline import BearingBaseline
 from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules
-from core.monitor.assessment import Assessment
+from core.monitor.assessment import Assessment, BearingResult
 from core.quality import Reason
 from core.samples.blocks import SampleBlock
-from core.spectra.cross_spectrum import NO_SPECTRUM
 from core.units import NS_PER_S, ns_from_s
 from service.live.alarm_list import SHARED
 from service.live.commands import FilmPlace, NotAvailableError
 from service.live.exchange import MeasuringGoneError
-from service.live.snapshot import BearingSnapshot, UnitLink, UnitSnapshot
+from service.live.snapshot import UnitLink, UnitSnapshot
 from service.live.status import (
     CurrentBearing,
     LinkState,
@@ -48,15 +47,12 @@ CHECK_S = 0.2
 
 NOT_ANALYSED = "no process is analysing this unit"
 
-NOT_REPORTED = UnitStatus(LinkState.NOT_CONNECTED, NOT_ANALYSED)
-
-
-NO_LINK = UnitLink(UnitStatus(), None, {})
+NO_LINK = UnitLink(UnitStatus(), None, {}, 0.0)
 
 
 @dataclass(frozen=True)
 class LatestReport:
-    """Latest report on a unit, and the link status derived from the report.
+    """Latest report on a unit.
 
     Parameters
     ----------
@@ -65,8 +61,8 @@ class LatestReport:
     sent_s
         Time at which the report was sent, by the monotonic clock of this process, s. None for the
         first report of a process, whose age is unknown.
-    status
-        Link status of the unit, valid while reports arrive.
+    link
+        Link of the unit, with the arrival time of its newest block, valid while reports arrive.
     results
         Newest result of each bearing, by bearing id.
     received_ns
@@ -79,8 +75,7 @@ class LatestReport:
     beat: tuple[str, int] | None = None
     sent_s: float | None = None
     link: UnitLink = NO_LINK
-    status: UnitStatus = NO_LINK.status
-    results: Mapping[str, Assessment] = field(default_factory=dict)
+    results: Mapping[str, BearingResult] = field(default_factory=dict)
     received_ns: Mapping[str, int] = field(default_factory=dict)
     n_changes: int = 0
 
@@ -154,48 +149,38 @@ class LiveUnits:
         if latest.beat == beat:
             return
         now_s = self._clock.monotonic_s()
-        delay_s = self._delay_s(process, link.said_s, now_s)
+        # The delay is relative to the fastest report of the process, because the offset of the two
+        # monotonic clocks is constant. The common delay of all reports is unobservable; reading the
+        # database twice a second keeps it below half a second.
+        delay = self._delays.setdefault(process, LeastDelay(MAX_DRIFT))
+        delay_s = max(0.0, delay.late_s(now_s - link.said_s, now_s))
         is_first = latest.beat is None or latest.beat[0] != process
         sent_s = None if is_first and not is_direct else now_s - delay_s
-        status, received_ns = link.status, latest.received_ns
+        received_ns = latest.received_ns
         if sent_s is not None:
-            sent_ns = self._clock.now_ns() - ns_from_s(now_s - sent_s)
+            sent_ns = self._clock.now_ns() - ns_from_s(delay_s)
             ages_s = link.result_ages_s.items()
             # the arrival time of a result stays the same, although reports differ in their delays
             found_ns = {b: sent_ns - ns_from_s(age_s) for b, age_s in ages_s}
             received_ns = {**found_ns, **received_ns}
             if link.data_age_s is not None:
-                status = replace(status, received_ns=sent_ns - ns_from_s(link.data_age_s))
+                data_ns = sent_ns - ns_from_s(link.data_age_s)
+                link = replace(link, status=replace(link.status, received_ns=data_ns))
         self.n_reports += 1
         self._latest[unit] = replace(
-            latest, beat=beat, sent_s=sent_s, link=link, status=status, received_ns=received_ns
+            latest, beat=beat, sent_s=sent_s, link=link, received_ns=received_ns
         )
 
-    def _delay_s(self, process: str, said_s: float | None, now_s: float) -> float:
-        """Return the delay of a report, s, relative to the fastest report of the same process.
-
-        The offset of the two monotonic clocks is constant. The common delay of all reports is
-        unobservable; reading the database twice a second keeps it below half a second.
-        """
-        if said_s is None:
-            return 0.0
-        delay = self._delays.setdefault(process, LeastDelay(MAX_DRIFT))
-        return max(0.0, delay.late_s(now_s - said_s, now_s))
-
-    def set_results(self, unit: str, results: Mapping[str, BearingSnapshot]) -> None:
+    def set_results(self, unit: str, results: Mapping[str, BearingResult]) -> None:
         """Set the newest results of a unit, by bearing id."""
-        found = {
-            bearing: Assessment(unit, bearing, spectrum=NO_SPECTRUM, orbit=None, **vars(state))
-            for bearing, state in results.items()
-        }
         latest = self._latest[unit]
         times_ns = {bearing: known.time_ns for bearing, known in latest.results.items()}
-        same = {b for b, result in found.items() if times_ns.get(b) == result.time_ns}
+        same = {b for b, result in results.items() if times_ns.get(b) == result.time_ns}
         self._latest[unit] = replace(
             latest,
-            results=found,
+            results=results,
             received_ns={b: then_ns for b, then_ns in latest.received_ns.items() if b in same},
-            n_changes=latest.n_changes + (len(same) < len(found)),
+            n_changes=latest.n_changes + (len(same) < len(results)),
         )
 
     def past_revision(self, unit: str, end_ns: int) -> Hashable:
@@ -230,14 +215,10 @@ class LiveUnits:
 
     def status(self, unit: str) -> UnitStatus:
         """Return the link status of a unit; "not connected" while no reports on the unit arrive."""
-        latest = self._latest[unit]
-        if latest.beat is None:
-            return NOT_REPORTED
+        status = self._latest[unit].link.status
         if self.is_alive(unit):
-            return latest.status
-        return replace(
-            latest.status, state=LinkState.NOT_CONNECTED, reason=NOT_ANALYSED, since_ns=None
-        )
+            return status
+        return replace(status, state=LinkState.NOT_CONNECTED, reason=NOT_ANALYSED, since_ns=None)
 
     @property
     def can_ask(self) -> bool:
@@ -345,11 +326,11 @@ class LiveFilms:
         """Return the baseline in force for a bearing; None if no baseline is in force."""
         return self._baselines.get((unit, bearing))
 
-    async def read_baselines(self, unit: str, state: UnitSnapshot) -> Mapping[str, BearingBaseline]:
-        """Return the baselines in force of a unit snapshot by bearing id, new ones from the store.
+    async def take(self, unit: str, state: UnitSnapshot) -> None:
+        """Update the films of a unit from its snapshot; new baselines are read from the store.
 
         A baseline that the store does not have or that cannot be read is left out; the latter is
-        logged.
+        logged. The state changes after the last read.
         """
         found = {}
         for bearing, version in state.baselines.items():
@@ -361,14 +342,8 @@ class LiveFilms:
                     log.error("baselines cannot be read", unit=unit, reason=str(error))
                     continue
             if baseline is not None:
-                found[bearing] = baseline
-        return found
-
-    def take(
-        self, unit: str, state: UnitSnapshot, baselines: Mapping[str, BearingBaseline]
-    ) -> None:
-        """Update the films of a unit from its snapshot and its baselines in force by bearing id."""
+                found[unit, bearing] = baseline
         self.n_taken += 1
         self._newest |= {(unit, bearing): news for bearing, news in state.films.items()}
         others = {key: held for key, held in self._baselines.items() if key[0] != unit}
-        self._baselines = others | {(unit, b): found for b, found in baselines.items()}
+        self._baselines = others | found

@@ -142,15 +142,15 @@ class MeasuringEnd:
     Parameters
     ----------
     report
-        Function that returns a report on changes since the last call, or None without changes;
-        the argument is True at the first call on a connection, for a complete report.
+        Function that returns a report on changes since the last call; the argument is True at the
+        first call on a connection, for a complete report.
     answer
         Function that returns the answer to a question.
     period_s
         Time between two calls of `report`, s.
     """
 
-    report: Callable[[bool], object | None]
+    report: Callable[[bool], object]
     answer: Callable[[Question], Awaitable[object]]
     period_s: float
     _places: asyncio.Semaphore = field(
@@ -181,16 +181,15 @@ class MeasuringEnd:
         is_first = True
         while True:
             # a slow reader delays the next report, which then has all changes
-            if (found := self.report(is_first)) is not None:
-                content = pickle.dumps(found, pickle.HIGHEST_PROTOCOL)
-                try:
-                    async with asyncio.timeout(TAKEN_WITHIN_S):
-                        await _write(writer, content)
-                except TimeoutError:
-                    log.error("the serving process does not read reports; it is restarted")
-                    return
-                except ConnectionError:
-                    return  # it has ended
+            content = pickle.dumps(self.report(is_first), pickle.HIGHEST_PROTOCOL)
+            try:
+                async with asyncio.timeout(TAKEN_WITHIN_S):
+                    await _write(writer, content)
+            except TimeoutError:
+                log.error("the serving process does not read reports; it is restarted")
+                return
+            except ConnectionError:
+                return  # it has ended
             is_first = False
             await asyncio.sleep(self.period_s)
 

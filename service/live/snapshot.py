@@ -3,7 +3,7 @@
 import pickle
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import version
 
@@ -11,13 +11,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from core.alarms.alarm import Alarm
 from core.change.film_judge import FilmNews
-from core.condition.cells import BearingCondition
-from core.machine.unit import Estimator
-from core.monitor.assessment import AveragingWindow
-from core.quality import Quality, Reading
-from core.spectra.runout import RunoutVerdict
-from core.spectra.segments import Evidence
-from core.spectra.speed import SpeedSource
+from core.monitor.assessment import BearingResult
 from core.uncertainty import Budget
 from service.live.receivers import ReceiverView
 from service.live.status import StoredResults, UnitStatus
@@ -34,13 +28,13 @@ class UnreadableSnapshotError(Exception):
 
 
 class PickledBudgets(Mapping[str, Budget]):
-    """Uncertainty budgets by quantity, unpickled at the first access.
+    """Uncertainty budgets by quantity, pickled, and unpickled at the first access.
 
     They are a third of a snapshot, and hardly ever read.
     """
 
-    def __init__(self, pickled: bytes) -> None:
-        self._pickled = pickled
+    def __init__(self, budgets: Mapping[str, Budget]) -> None:
+        self._pickled = pickle.dumps(budgets, pickle.HIGHEST_PROTOCOL)
 
     @cached_property
     def _budgets(self) -> Mapping[str, Budget]:
@@ -55,32 +49,6 @@ class PickledBudgets(Mapping[str, Budget]):
 
     def __len__(self) -> int:
         return len(self._budgets)
-
-
-@dataclass(frozen=True)
-class BearingSnapshot:
-    """Newest result of a bearing: an `Assessment` without spectrum, orbit and recent values.
-
-    `time_ns` is the end of the averaged samples, ns since 1970 UTC. Mappings are by quantity,
-    `runout` and `clipped_share` by channel. `condition` is None if unknown.
-    """
-
-    time_ns: int
-    window: AveragingWindow
-    speed_source: SpeedSource
-    quality: Quality
-    readings: Mapping[str, Reading]
-    budgets: Mapping[str, Budget]
-    estimators: Mapping[str, Estimator | None]
-    runout: Mapping[str, RunoutVerdict]
-    clipped_share: Mapping[str, float]
-    evidence: Evidence
-    condition: BearingCondition | None
-
-    def __reduce__(self) -> tuple[object, ...]:
-        values = {each.name: getattr(self, each.name) for each in fields(self)}
-        values["budgets"] = PickledBudgets(pickle.dumps(self.budgets, pickle.HIGHEST_PROTOCOL))
-        return type(self), tuple(values.values())
 
 
 @dataclass(frozen=True)
@@ -99,12 +67,19 @@ class UnitSnapshot:
         Baseline version in force, by bearing id.
     """
 
-    bearings: Mapping[str, BearingSnapshot]
+    bearings: Mapping[str, BearingResult]
     alarms: tuple[Alarm, ...]
     judged: frozenset[str]
     chattering: frozenset[str]
     films: Mapping[str, FilmNews]
     baselines: Mapping[str, int]
+
+    def __reduce__(self) -> tuple[object, ...]:
+        bearings = {
+            bearing: replace(result, budgets=PickledBudgets(result.budgets))
+            for bearing, result in self.bearings.items()
+        }
+        return type(self), tuple({**vars(self), "bearings": bearings}.values())
 
 
 @dataclass(frozen=True)
@@ -117,11 +92,10 @@ class UnitLink:
         Age of the newest samples in seconds; None before the first.
     result_ages_s
         Age of the newest result in seconds, by bearing id.
+    said_s
+        Monotonic time of the process at which the state was published, s.
     store_error
         Present error of the database in the process that analyses the unit, or None.
-    said_s
-        Monotonic time of the process at which the state was published; None in states of older
-        versions.
     stored
         Results of the unit that this process has stored.
     """
@@ -129,8 +103,8 @@ class UnitLink:
     status: UnitStatus
     data_age_s: float | None
     result_ages_s: Mapping[str, float]
+    said_s: float
     store_error: str | None = None
-    said_s: float | None = None
     stored: StoredResults = field(default_factory=StoredResults)
 
 

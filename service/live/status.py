@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from core.monitor.assessment import Assessment
+from core.monitor.assessment import BearingResult
 from core.monitor.catalogue import CATALOGUE
 from core.quality import Quality, Reading, Reason, bad, missing
 from core.samples.blocks import DeviceClock, StampFault
@@ -91,7 +91,7 @@ class CurrentBearing:
         1970 UTC; None if unknown.
     """
 
-    assessment: Assessment | None
+    assessment: BearingResult | None
     age_s: float | None
     received_ns: int | None
     quality: Quality
@@ -115,7 +115,7 @@ def why_not_current(state: LinkState, age_s: float | None, stale_after_s: float)
 
 
 def current_bearing(
-    assessment: Assessment | None,
+    assessment: BearingResult | None,
     age_s: float | None,
     why_not: Reason | None,
     received_ns: int | None = None,

@@ -8,6 +8,7 @@ from core.monitor.assessment import Assessment
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import SampleAccount
 from service.live.samples import BlockHistory
+from service.live.snapshot import UnitLink
 from service.live.status import (
     HELD_S,
     HELD_SAMPLES,
@@ -31,7 +32,9 @@ class LiveView:
         self._clock = clock
         self._stale_after_s = stale_after_s
         self._status = {unit: UnitStatus() for unit in units}
-        self._assessments: dict[tuple[str, str], tuple[float, Assessment]] = {}
+        self._results: dict[str, dict[str, tuple[float, Assessment]]] = {
+            u: {} for u in self._status
+        }
         self._blocks: dict[str, BlockHistory] = {}
         self._received_s: dict[str, float] = {}
         self._revisions = dict.fromkeys(self._status, 0)
@@ -47,10 +50,6 @@ class LiveView:
         for unit, time_ns in newest_ns.items():
             before = self._stored[unit]
             self._stored[unit] = StoredResults(before.n_writes + 1, max(before.newest_ns, time_ns))
-
-    def stored(self, unit: str) -> StoredResults:
-        """Return the number of writes and the time of the newest stored result of a unit."""
-        return self._stored[unit]
 
     def note_unstored(self, n_findings: int, reason: str) -> None:
         """Count findings that were lost because they could not be stored; keep the reason."""
@@ -89,9 +88,8 @@ class LiveView:
     def set_assessment(self, assessment: Assessment, sampled_s: float | None = None) -> None:
         """Set a bearing's newest result; ``sampled_s`` is its monotonic time, by default now."""
         self._revisions[assessment.unit] += 1
-        key = (assessment.unit, assessment.bearing)
         since_s = self._clock.monotonic_s() if sampled_s is None else sampled_s
-        self._assessments[key] = (since_s, assessment)
+        self._results[assessment.unit][assessment.bearing] = (since_s, assessment)
 
     def revision(self, unit: str) -> int:
         """Return a counter that increases with each result and change of the link of a unit."""
@@ -112,16 +110,24 @@ class LiveView:
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
         """Return the newest result of a bearing, possibly out of date; None before the first."""
-        entry = self._assessments.get((unit, bearing))
+        entry = self._results.get(unit, {}).get(bearing)
         return entry[1] if entry else None
 
-    def result_age_s(self, unit: str, bearing: str) -> float | None:
-        """Return the age of the newest result of a bearing in seconds; None before the first."""
-        entry = self._assessments.get((unit, bearing))
-        return None if entry is None else self._clock.monotonic_s() - entry[0]
+    def link(self, unit: str) -> UnitLink:
+        """Return the link of a unit with the ages of its data; without data for other names."""
+        now_s, results = self._clock.monotonic_s(), self._results.get(unit, {})
+        return UnitLink(
+            self._status.get(unit, UnitStatus()),
+            self.data_age_s(unit),
+            {bearing: now_s - since_s for bearing, (since_s, _) in results.items()},
+            now_s,
+            self.store_error,
+            self._stored.get(unit, StoredResults()),
+        )
 
     def current(self, unit: str, bearing: str) -> CurrentBearing:
         """Return the newest result of a bearing; all readings are missing if it is out of date."""
-        result, age_s = self.assessment(unit, bearing), self.result_age_s(unit, bearing)
-        why_not = why_not_current(self._status[unit].state, age_s, self._stale_after_s)
-        return current_bearing(result, age_s, why_not)
+        link = self.link(unit)
+        age_s = link.result_ages_s.get(bearing)
+        why_not = why_not_current(link.status.state, age_s, self._stale_after_s)
+        return current_bearing(self.assessment(unit, bearing), age_s, why_not)

@@ -3,7 +3,7 @@
 from core.alarms.judgements import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Bearing
-from core.monitor.assessment import Assessment
+from core.monitor.assessment import BearingResult
 from core.quality import Level, Reason
 from core.stiffness.order_line import AMPLITUDES
 from core.units import s_from_ns
@@ -105,7 +105,7 @@ NOT_STEADY = (Reason.NON_STATIONARY, Reason.SPEED_IMPLAUSIBLE, Reason.FEW_SEGMEN
 """Quality reasons with which an uncertain amplitude cannot be a reference."""
 
 
-def measured_vectors(assessment: Assessment | None) -> VectorReference:
+def measured_vectors(assessment: BearingResult | None) -> VectorReference:
     """Return the 1× vectors of a result as the reference for the operating state of the result.
 
     Raises `ReferenceRefusedError` if there is no result, an amplitude has no value, or the machine
@@ -122,7 +122,7 @@ def measured_vectors(assessment: Assessment | None) -> VectorReference:
     )
 
 
-def _vector(assessment: Assessment, place: str) -> OrderVector:
+def _vector(assessment: BearingResult, place: str) -> OrderVector:
     name, phase = f"order1_{place}_um_pk", assessment.readings[f"order1_{place}_phase_deg"]
     amplitude = assessment.readings[name]
     reason = amplitude.quality.reason

@@ -98,9 +98,8 @@ class Service:
 
     async def told(self) -> None:
         """Let the measuring side report, and the serving side take the report."""
-        if (report := self.reports.report(False)) is not None:
-            copied = pickle.loads(pickle.dumps(report))  # noqa: S301
-            await self.serving.take(copied, is_direct=True)
+        copied = pickle.loads(pickle.dumps(self.reports.report(False)))  # noqa: S301
+        await self.serving.take(copied, is_direct=True)
 
     @cached_property
     def client(self) -> httpx2.AsyncClient:
@@ -209,7 +208,7 @@ async def build(plant: PlantFile, store: SqliteStore, access: AccessStore, folde
             evidence=evidence.status,
         )
 
-    reports = SocketReports(ids, builder, plant_now, clock)
+    reports = SocketReports(ids, builder, plant_now)
     context = Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},

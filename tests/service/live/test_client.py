@@ -21,7 +21,7 @@ async def test_a_baseline_that_cannot_be_read_hides_no_result(assessment, steppe
     found = replace(assessment(), unit=UNIT, bearing=BEARING)
     bearings = {BEARING: bearing_snapshot(found)}
     snapshot = UnitSnapshot(bearings, (), frozenset(), frozenset(), {}, {BEARING: 2})
-    link = UnitLink(UnitStatus(LinkState.CONNECTED), 0.0, {BEARING: 0.0})
+    link = UnitLink(UnitStatus(LinkState.CONNECTED), 0.0, {BEARING: 0.0}, 0.0)
     report = Report("one", 1, (UnitReport(UNIT, link, 1, snapshot),), None)
     path = tmp_path / "data" / "padwatch.sqlite3"
     with closing(SqliteStore(path)) as store:

@@ -38,7 +38,7 @@ class Reports:
         self._n += 1
         said_s = self._clock.monotonic_s() + 3600.0
         ages = {} if age_s is None else {"UJB": age_s}
-        found = UnitLink(status, age_s, ages, said_s=said_s, stored=stored or StoredResults())
+        found = UnitLink(status, age_s, ages, said_s, stored=stored or StoredResults())
         link = link_of_document(link_document(found))
         self._live.update("U1", self._process, self._n, link, is_direct=True)
 
