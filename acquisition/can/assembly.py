@@ -73,7 +73,6 @@ class FrameAssembler:
         self._axis = SampleAxis(plan.rate_hz, Epochs(begun_ns, trusts_device=is_exact))
         self._senders = DuplicateSenderDetector()
         self._counters = CounterFollower(plan, self._axis, self.refused, self._senders)
-        self._sets = FrameSets(plan, self.refused, self._senders)
         self._builder = BlockBuilder(plan)
         self._early: dict[str | int, float] = {}
         self._reported_epoch: int | None = None
@@ -84,7 +83,7 @@ class FrameAssembler:
     def _begin_count(self) -> None:
         """Drop incomplete and unconfirmed samples and side values, at the start of a new epoch."""
         self._epoch = self._axis.epoch
-        self._sets.begin()
+        self._sets = FrameSets(self._plan, self.refused, self._senders)
         self._held: list[Instant] = []
         self._next, self._last_wave = 0, self._plan.n_waves
         self._begin_timing()

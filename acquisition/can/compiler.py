@@ -11,7 +11,7 @@ from acquisition.can.layout import (
     wave_channel,
 )
 from acquisition.can.plan import EPOCH, MAX_INSTANTS_PER_S, QUANTITIES, MessagePlan, Part, Plan
-from acquisition.can.settings import CanChannel, CanSettings, CanSlowChannel
+from acquisition.can.settings import CanSettings, CanSlowChannel
 from acquisition.delivery.units import known_unit, spellings
 from acquisition.errors import ConfigError
 from core.samples.calibration import UnitCalibration
@@ -70,7 +70,10 @@ class _Compiler:
 
     def _decoder(self) -> WaveformDecoder:
         settings = self._settings
-        found = [self._signals_of(channel) for channel in settings.channels]
+        found = [
+            [self._own_signal(path, f"signals.{channel.id}") for path in channel.signals]
+            for channel in settings.channels
+        ]
         channels = []
         for channel, calibration, signals in zip(
             settings.channels, self._calibration.channels, found, strict=True
@@ -92,25 +95,19 @@ class _Compiler:
         in_counts = all(is_counts(signal) for signals in found for signal in signals)
         return WaveformDecoder(tuple(channels), in_counts)
 
-    def _signals_of(self, channel: CanChannel) -> list[DbcSignal]:
-        key = f"signals.{channel.id}"
-        if not channel.signals:
-            raise ConfigError(f"{key}: must name one signal for each sample in a frame")
-        return [self._own_signal(path, key) for path in channel.signals]
-
     def _add_counter(self, path: str, step: int) -> None:
         signal = self._integer(path, "counters")
         n_bits = signal.source.length
         if n_bits < _MIN_COUNTER_BITS:
             least = f"at least {_MIN_COUNTER_BITS} bits, got {n_bits}"
             raise ConfigError(f"counters: {path} must have {least}")
+        read = scalar_reader(signal)
         for part in self._parts_of(signal):
             if part.counter is not None:
                 raise ConfigError(
                     f"counters: message {part.message} has a second counter {path}; list only one"
                 )
-            part.counter, part.counter_step = scalar_reader(signal), step
-            part.modulus = step << n_bits
+            part.counter, part.modulus = (lambda data: int(read(data)) * step), step << n_bits
 
     def _add_frame_samples(self) -> None:
         settings = self._settings

@@ -20,12 +20,11 @@ larger one is a restart or a pause of the device. The drift allows for a wrong s
 
 
 class _CountedFrame(NamedTuple):
-    """Frame with its counter in samples, 0 to ``modulus - 1``."""
+    """Frame with its counter in samples, 0 to ``part.modulus - 1``."""
 
     part: Part
     data: bytes
     counter: int
-    modulus: int
     epoch: int | None
     arrived_ns: int
 
@@ -74,9 +73,8 @@ class CounterFollower:
         """
         if part.counter is None:
             return []
-        counter, modulus = int(part.counter(data)) * part.counter_step, part.modulus
         epoch = int(part.epoch(data)) if part.epoch else None
-        frame = _CountedFrame(part, data, counter, modulus, epoch, arrived_ns)
+        frame = _CountedFrame(part, data, int(part.counter(data)), epoch, arrived_ns)
         if self._axis.index is None:
             return self._first(frame)
         if self._doubted and self._confirms(frame):
@@ -92,7 +90,7 @@ class CounterFollower:
         return [PlacedFrame(part, data, index)]
 
     def _first(self, frame: _CountedFrame) -> list[PlacedFrame]:
-        if frame.modulus < self._plan.widest_modulus:
+        if frame.part.modulus < self._plan.widest_modulus:
             self._refused[Refusal.BEFORE_START] += 1
             return []
         if frame.epoch is not None:
@@ -103,14 +101,15 @@ class CounterFollower:
 
     def _near_index(self, frame: _CountedFrame) -> int | None:
         """Return the sample index of a frame close to the newest frame; None for other frames."""
-        axis, newest, half = self._axis, self._axis.index or 0, frame.modulus // 2
+        axis, newest, modulus = self._axis, self._axis.index or 0, frame.part.modulus
+        half = modulus // 2
         if axis.elapsed(frame.arrived_ns) > min(_SILENCE_S * self._rate_hz, half):
             return None
-        ahead = axis.forward(frame.counter, frame.modulus)
+        ahead = axis.forward(frame.counter, modulus)
         if ahead <= min(self._near_samples, half):
             axis.stand_at(newest + ahead, frame.arrived_ns)
             return newest + ahead
-        behind = frame.modulus - ahead
+        behind = modulus - ahead
         return newest - behind if behind <= min(self._near_samples, half // 2) else None
 
     def _confirms(self, frame: _CountedFrame) -> bool:
@@ -119,7 +118,7 @@ class CounterFollower:
         repeats = last.part is frame.part and last.counter == frame.counter
         if repeats or (frame.epoch is not None and frame.epoch != self._epoch_of(self._doubted)):
             return False
-        modulus = min(last.modulus, frame.modulus)
+        modulus = min(last.part.modulus, frame.part.modulus)
         ahead = (frame.counter - last.counter) % modulus
         return ahead <= min(self._near_samples, modulus // 2)
 
@@ -131,10 +130,11 @@ class CounterFollower:
         """Continue at the counter of frames that confirm each other, after a gap or a restart."""
         self._doubted = []
         axis, epoch = self._axis, self._epoch_of(frames)
-        widest = max(frames, key=lambda frame: frame.modulus)
-        left = (axis.index or 0, widest.modulus, axis.at_ns, self._epoch)
+        widest = max(frames, key=lambda frame: frame.part.modulus)
+        modulus = widest.part.modulus
+        left = (axis.index or 0, modulus, axis.at_ns, self._epoch)
         if epoch == self._epoch and self._is_gap(frames, widest):
-            index = (axis.index or 0) + axis.jump(widest.counter, widest.modulus, widest.arrived_ns)
+            index = (axis.index or 0) + axis.jump(widest.counter, modulus, widest.arrived_ns)
         else:
             axis.epochs.begin(epoch if epoch != self._epoch else None)
             index = widest.counter
@@ -149,7 +149,7 @@ class CounterFollower:
         axis, reports = self._axis, self._plan.reports_epoch
         if reports and all(frame.epoch is None for frame in frames):
             return True
-        counter, modulus, at_ns = widest.counter, widest.modulus, widest.arrived_ns
+        counter, modulus, at_ns = widest.counter, widest.part.modulus, widest.arrived_ns
         if counter >= (axis.index or 0) % modulus:
             return True
         if reports and axis.forward(counter, modulus) <= modulus // 2:
@@ -164,7 +164,7 @@ class CounterFollower:
         index, modulus, left_ns, left_epoch = self._left
         silent_s = (frame.arrived_ns - left_ns) / NS_PER_S
         ahead = (frame.counter - index) % modulus
-        is_same = left_epoch == epoch and modulus == frame.modulus
+        is_same = left_epoch == epoch and modulus == frame.part.modulus
         return (
             is_same
             and silent_s <= _SILENCE_S
@@ -172,6 +172,6 @@ class CounterFollower:
         )
 
     def _nearest(self, frame: _CountedFrame, index: int) -> int:
-        place = index + signed_distance(frame.counter, index, frame.modulus)
+        place = index + signed_distance(frame.counter, index, frame.part.modulus)
         self._axis.stand_at(max(self._axis.index or 0, place), frame.arrived_ns)
         return place

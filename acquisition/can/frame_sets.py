@@ -97,7 +97,7 @@ class _Pending:
 
 
 class FrameSets:
-    """Collector of the frames of each sample instant; returns complete instants in order.
+    """Collector of the frames of each sample instant of an epoch; returns complete ones in order.
 
     `refused` are the counts of refused frames, which are updated in place.
     """
@@ -106,16 +106,11 @@ class FrameSets:
         self, plan: Plan, refused: RefusalCounts, senders: DuplicateSenderDetector
     ) -> None:
         self._plan, self._refused, self._senders = plan, refused, senders
-        self.begin()
-
-    def begin(self) -> None:
-        """Reset the collector for a new epoch."""
-        n_waves = self._plan.n_waves
         self.pending: dict[int, _Pending] = {}
-        self._seen: list[dict[int, bytes]] = [{} for _ in range(n_waves)]
-        self.stop = -1 if self._plan.counted else 0
+        self._seen: list[dict[int, bytes]] = [{} for _ in range(plan.n_waves)]
+        self.stop = -1 if plan.counted else 0
         self._n_incomplete = self._n_lost = 0
-        self._n_unusable = [0] * n_waves
+        self._n_unusable = [0] * plan.n_waves
 
     def refuse(self, wave: int) -> None:
         """Count the samples of a wrong-length frame; `wave` is the index of its message."""

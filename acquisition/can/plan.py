@@ -32,9 +32,7 @@ class Part:
     wave
         Index of the part among the parts with waveforms; None if it has no waveforms.
     counter
-        Reader of the counter, in frames or samples; None without a counter.
-    counter_step
-        Samples per counter increment.
+        Reader of the counter, in samples; None without a counter.
     modulus
         Period of the counter in samples; 0 without a counter.
     n_samples
@@ -48,7 +46,6 @@ class Part:
     message: str
     wave: int | None = None
     counter: ScalarReader | None = None
-    counter_step: int = 1
     modulus: int = 0
     n_samples: ScalarReader | None = None
     epoch: ScalarReader | None = None

@@ -41,11 +41,7 @@ class SideTable:
 
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
-        self.clear()
-
-    def clear(self) -> None:
-        """Delete all values, at the start of a new epoch."""
-        self._entries: dict[str | int, list[_Entry]] = {key: [] for key in self._plan.quantities}
+        self._entries: dict[str | int, list[_Entry]] = {key: [] for key in plan.quantities}
 
     def set(self, key: str | int, start: int, value: float, hold: int | None) -> None:
         """Store a value that is valid for `hold` samples from sample `start` on.
@@ -115,15 +111,13 @@ class BlockBuilder:
     """
 
     def __init__(self, plan: Plan) -> None:
-        self._plan = plan
-        self.side = SideTable(plan)
-        self._stamps = HostStamps(plan.rate_hz)
-        self._rejected: RefusalCounts = Counter()
+        self._plan, self._stamps = plan, HostStamps(plan.rate_hz)
+        self.begin_epoch()
 
     def begin_epoch(self) -> None:
         """Delete side values and refusal counts at the start of a new epoch."""
-        self.side.clear()
-        self._rejected.clear()
+        self.side = SideTable(self._plan)
+        self._rejected: RefusalCounts = Counter()
 
     def blocks(self, epoch: int, instants: Sequence[Instant], arrived_ns: int) -> list[SampleBlock]:
         """Return the blocks of sample instants, given in index order and of one epoch.

@@ -21,18 +21,17 @@ from acquisition.modbus.framing import PendingRequest
 from acquisition.modbus.requests import (
     BUSY,
     EXCEPTION_BIT,
+    FIFO_HEAD,
     READ_HOLDING_REGISTERS,
     ReadRequest,
     Span,
     exception_error,
-    fifo_registers,
     fifo_request,
     identification_objects,
     identification_request,
     span_requests,
 )
 from acquisition.modbus.transport import (
-    ExpectedIdentification,
     Identification,
     Identity,
     LinkSettings,
@@ -163,7 +162,7 @@ class ModbusClient:
         Raises LinkError if the device states more than 31 registers.
         """
         replies = await self._replies([fifo_request(address) for address in addresses])
-        return [fifo_registers(reply) for reply in replies]
+        return [reply[FIFO_HEAD.size :] for reply in replies]
 
     async def identify(self) -> Identification:
         """Read vendor, product code and revision by function 43/14.
@@ -184,7 +183,7 @@ class ModbusClient:
         )
 
     async def _misfit(self, identity: Identity) -> str | None:
-        if isinstance(identity, ExpectedIdentification):
+        if isinstance(identity, Identification):
             return identity.misfit(await self.identify())
         found = await self.read(identity.address, len(identity.words), identity.function)
         return identity.misfit(found)

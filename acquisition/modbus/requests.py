@@ -50,7 +50,9 @@ _MEI = 0x0E
 _READ_BASIC = 1
 _READ_CODES = (_READ_BASIC, 2, 3, 4)
 _IDENTIFICATION_HEAD = struct.Struct(">7B")
-_FIFO_HEAD = struct.Struct(">BHH")
+FIFO_HEAD = struct.Struct(">BHH")
+"""Function code, byte count and number of registers of a FIFO reply, before the registers."""
+
 _SPAN_REQUEST = struct.Struct(">BHH")
 
 
@@ -158,18 +160,18 @@ class ReadRequest:
 
 def _fifo_bytes(reply: memoryview) -> int:
     """Return the length of a FIFO reply in bytes; that of its head while the head is incomplete."""
-    if len(reply) < _FIFO_HEAD.size:
-        return _FIFO_HEAD.size
+    if len(reply) < FIFO_HEAD.size:
+        return FIFO_HEAD.size
     n_bytes: int
     n_registers: int
-    _, n_bytes, n_registers = _FIFO_HEAD.unpack_from(reply)
+    _, n_bytes, n_registers = FIFO_HEAD.unpack_from(reply)
     if n_registers > MAX_FIFO_REGISTERS:
         raise FrameError(f"FIFO count must be 0 to {MAX_FIFO_REGISTERS}, got {n_registers}")
     if n_bytes != 2 + 2 * n_registers:
         raise FrameError(
             f"byte count is {n_bytes}, expected {2 + 2 * n_registers} for FIFO count {n_registers}"
         )
-    return _FIFO_HEAD.size + 2 * n_registers
+    return FIFO_HEAD.size + 2 * n_registers
 
 
 def _identification_bytes(reply: memoryview, expected: bytes) -> int:
@@ -212,11 +214,6 @@ def fifo_request(address: int) -> ReadRequest:
 def identification_request(first_object: int = 0) -> ReadRequest:
     """Return the request for the basic identification (43/14) from object `first_object` on."""
     return ReadRequest(bytes((READ_IDENTIFICATION, _MEI, _READ_BASIC, first_object)))
-
-
-def fifo_registers(reply: bytes) -> bytes:
-    """Return the registers of a FIFO reply as big-endian words."""
-    return reply[_FIFO_HEAD.size :]
 
 
 def identification_objects(reply: bytes) -> tuple[dict[int, bytes], int | None]:

@@ -3,7 +3,7 @@
 import asyncio
 import random
 from collections.abc import AsyncGenerator, AsyncIterator, Mapping, Sequence
-from contextlib import asynccontextmanager
+from contextlib import aclosing, asynccontextmanager
 from dataclasses import replace
 
 from acquisition.clock import Clock
@@ -144,24 +144,18 @@ class JoinedSource:
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
         """Open both links, with the errors of the waveform source; close them on exit."""
-        async with self._source.connect() as blocks, self._slow.watch():
-            joined = self._joined(blocks)
-            try:
-                yield joined
-            finally:
-                await joined.aclose()
+        async with (
+            self._source.connect() as blocks,
+            self._slow.watch(),
+            aclosing(self._joined(blocks)) as joined,
+        ):
+            yield joined
 
     async def _joined(
         self, blocks: AsyncIterator[SampleBlock]
     ) -> AsyncGenerator[SampleBlock, None]:
         async for block in blocks:
             yield replace(block, elsewhere={**block.elsewhere, **self._slow.current()})
-
-
-def only_slow(calibration: UnitCalibration, ids: frozenset[str]) -> UnitCalibration:
-    """Return the calibration of the slow-value device: only the slow channels `ids`."""
-    slow = tuple(channel for channel in calibration.slow if channel.id in ids)
-    return replace(calibration, channels=(), slow=slow)
 
 
 def without_slow(calibration: UnitCalibration, ids: frozenset[str]) -> UnitCalibration:

@@ -13,11 +13,14 @@ from acquisition.modbus.requests import READ_HOLDING_REGISTERS
 
 @dataclass(frozen=True)
 class Identification:
-    """Identification read by function 43/14; a text is empty if the device does not report it."""
+    """Identification by function 43/14, as read or as expected.
 
-    vendor: str
-    product_code: str
-    revision: str
+    A text is empty if the device does not report it; an expected text of None matches any text.
+    """
+
+    vendor: str | None = None
+    product_code: str | None = None
+    revision: str | None = None
 
     @classmethod
     def of_objects(cls, objects: Mapping[int, bytes]) -> "Identification":
@@ -25,16 +28,7 @@ class Identification:
         texts = (objects.get(number, b"") for number in range(3))
         return cls(*(text.decode("ascii", "backslashreplace").strip("\0 ") for text in texts))
 
-
-@dataclass(frozen=True, kw_only=True)
-class ExpectedIdentification:
-    """Expected identification by function 43/14; a field of None matches any value."""
-
-    vendor: str | None = None
-    product_code: str | None = None
-    revision: str | None = None
-
-    def misfit(self, found: Identification) -> str | None:
+    def misfit(self, found: "Identification") -> str | None:
         """Return a description of the first field of `found` that differs; None if all match."""
         for field in fields(self):
             expected, value = getattr(self, field.name), getattr(found, field.name)
@@ -70,7 +64,7 @@ class ExpectedRegisters:
         return f"registers from {self.address} are {found}, expected {wanted}"
 
 
-Identity: TypeAlias = ExpectedRegisters | ExpectedIdentification
+Identity: TypeAlias = ExpectedRegisters | Identification
 
 
 def _hex(content: bytes) -> str:

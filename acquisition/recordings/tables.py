@@ -47,14 +47,6 @@ def blocks_schema(unit: RecordedUnit) -> Any:
     return pa.schema(_required(types))
 
 
-def samples_table(counts: RawArray, unit: RecordedUnit) -> Any:
-    """Return the pyarrow table of samples (n_channels, n_samples), one column per channel.
-
-    Samples are converter counts, or engineering units from devices that deliver those.
-    """
-    return pa.table(list(counts), schema=samples_schema(unit))
-
-
 def blocks_table(heads: Heads, rejected: Sequence[Sequence[Rejection]], unit: RecordedUnit) -> Any:
     """Return a pyarrow table with one row per block: its header, and the rejections before it."""
     columns = [

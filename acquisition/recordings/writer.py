@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+import pyarrow as pa
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import (
@@ -30,7 +31,7 @@ from acquisition.recordings.tables import (
     blocks_table,
     blocks_writer,
     foreign_errors_of,
-    samples_table,
+    samples_schema,
     samples_writer,
 )
 from core.arrays import FloatArray, RawArray
@@ -193,7 +194,8 @@ class RecordingWriter:
         if self._samples_file is None:
             self._samples_file = samples_writer(self._aside / SAMPLES, self.unit)
         counts: Any = np.concatenate(self._counts, axis=1)
-        self._samples_file.write_table(samples_table(counts[:, :n_samples], self.unit))
+        schema = samples_schema(self.unit)
+        self._samples_file.write_table(pa.table(list(counts[:, :n_samples]), schema=schema))
         rest = counts[:, n_samples:].copy()
         self._counts, self._n_waiting = [rest], rest.shape[1]
 

@@ -8,7 +8,7 @@ from acquisition.clock import Clock
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
 from acquisition.modbus.polled_source import PolledSettings, PolledSource, vector_calibration
 from acquisition.modbus.ring_source import RingSettings, RingSource
-from acquisition.modbus.slow_values import JoinedSource, PolledSlowValues, only_slow, without_slow
+from acquisition.modbus.slow_values import JoinedSource, PolledSlowValues, without_slow
 from acquisition.source import SampleSource
 from core.monitor.monitor import UnitMonitor
 from core.samples.calibration import UnitCalibration
@@ -95,7 +95,7 @@ def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:
     if slow is None:
         return _main_source(unit, calibration, clock)
     ids = frozenset(slow.mapped_channels)
-    channels = only_slow(calibration, ids).slow
+    channels = [channel for channel in calibration.slow if channel.id in ids]
     return JoinedSource(
         _main_source(unit, without_slow(calibration, ids), clock),
         PolledSlowValues(link_settings(PolledSettings, slow), slow.registers, channels, clock),

@@ -3,8 +3,8 @@
 from typing import TypeVar
 
 from acquisition.modbus.transport import (
-    ExpectedIdentification,
     ExpectedRegisters,
+    Identification,
     Identity,
     LinkSettings,
     SerialTransport,
@@ -45,7 +45,7 @@ def identity_of(settings: IdentitySettings | None) -> Identity | None:
         case SignatureIdentity():
             return ExpectedRegisters(**settings.values_for(ExpectedRegisters))
         case IdentificationIdentity():
-            return ExpectedIdentification(**settings.values_for(ExpectedIdentification))
+            return Identification(**settings.values_for(Identification))
         case None:
             return None
 

@@ -19,10 +19,8 @@ from acquisition.recordings.imports.job import (
 )
 from acquisition.recordings.imports.rows import Rows
 from acquisition.recordings.imports.times import TimeArray, from_start, numbers_to_ns
+from acquisition.recordings.manifest import MAX_SAMPLES
 from core.arrays import FloatArray, SampleArray
-
-MAX_SAMPLES = 2**29
-"""Maximum number of samples per channel, as in a recording."""
 
 _SAME_GAIN = 1e-6
 """Relative tolerance for equal gains; smaller differences are rounding errors in files."""

@@ -19,11 +19,11 @@ from acquisition.modbus.connection import ReplyProtocol
 from acquisition.modbus.polled_source import PolledSettings, PolledSource
 from acquisition.modbus.register_map import Signature
 from acquisition.modbus.requests import Span
-from acquisition.modbus.transport import ExpectedIdentification, LinkSettings, TcpTransport
+from acquisition.modbus.transport import Identification, LinkSettings, TcpTransport
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice
 
-ACME = ExpectedIdentification(vendor="Acme")
+ACME = Identification(vendor="Acme")
 SIGNED = map_of(signature=(Signature(cell=Cell(address=1), expected=42.0),))
 
 
@@ -134,7 +134,7 @@ def port() -> Iterator[int]:
 async def test_it_is_a_lost_link_each_time_and_nothing_else(port):
     settings = LinkSettings(
         transport=TcpTransport(host="127.0.0.1", port=port),
-        identity=ExpectedIdentification(vendor="any"),
+        identity=Identification(vendor="any"),
     )
     for _ in range(N_TRIES):
         link = ModbusClient(settings)

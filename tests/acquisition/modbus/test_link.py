@@ -8,7 +8,6 @@ from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.requests import Span
 from acquisition.modbus.transport import (
-    ExpectedIdentification,
     ExpectedRegisters,
     Identification,
     LinkSettings,
@@ -120,8 +119,8 @@ async def test_the_expected_device_is_read_and_another_one_is_not(linked, bench_
     for identity in (
         ExpectedRegisters(address=101, words=(0x0203, 0x0405)),
         ExpectedRegisters(address=101, words=(0x0203,), function=4),
-        ExpectedIdentification(vendor="Acme"),
-        ExpectedIdentification(product_code="DAQ-12", revision="1.4"),
+        Identification(vendor="Acme"),
+        Identification(product_code="DAQ-12", revision="1.4"),
     ):
         link = linked(identity=identity)
         await link.open()
@@ -138,12 +137,12 @@ async def test_the_expected_device_is_read_and_another_one_is_not(linked, bench_
             ExpectedRegisters(address=101, words=(0x0203, 0x0406)),
             "registers from 101 are 0x0203 0x0405, expected 0x0203 0x0406",
         ),
-        (ExpectedIdentification(vendor="Emca"), "vendor is 'Acme', expected 'Emca'"),
+        (Identification(vendor="Emca"), "vendor is 'Acme', expected 'Emca'"),
         (
-            ExpectedIdentification(vendor="Acme", product_code="DAQ-24"),
+            Identification(vendor="Acme", product_code="DAQ-24"),
             "product_code is 'DAQ-12', expected 'DAQ-24'",
         ),
-        (ExpectedIdentification(revision="1.5"), "revision is '1.4', expected '1.5'"),
+        (Identification(revision="1.5"), "revision is '1.4', expected '1.5'"),
     ],
 )
 async def test_another_device_is_refused_with_found_and_expected(identity, complaint, linked):
@@ -155,7 +154,7 @@ async def test_another_device_is_refused_with_found_and_expected(identity, compl
 async def test_a_device_without_identification_is_not_the_expected_one(linked, bench):
     bench.identification = {}
     with pytest.raises(ConfigError, match=r"illegal function.*the device identification"):
-        await linked(identity=ExpectedIdentification(vendor="Acme")).open()
+        await linked(identity=Identification(vendor="Acme")).open()
 
 
 async def test_an_identification_that_is_no_text_is_shown_and_does_no_harm(linked, bench):

@@ -14,7 +14,7 @@ from acquisition.errors import LinkError
 from acquisition.modbus.cells import Cell, NumberType
 from acquisition.modbus.polled_source import PolledSettings
 from acquisition.modbus.register_map import MapValue, RegisterMap
-from acquisition.modbus.slow_values import JoinedSource, PolledSlowValues, only_slow, without_slow
+from acquisition.modbus.slow_values import JoinedSource, PolledSlowValues, without_slow
 from acquisition.modbus.transport import TcpTransport
 from acquisition.simulated.devices.map_device import MapDevice
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
@@ -203,6 +203,4 @@ def test_a_calibration_is_divided_between_the_two_devices(counts_calibration):
     whole = counts_calibration(n_slow=3)
     ids = frozenset({"slow1"})
 
-    assert [c.id for c in only_slow(whole, ids).slow] == ["slow1"]
-    assert only_slow(whole, ids).channels == ()
     assert [c.id for c in without_slow(whole, ids).slow] == ["slow0", "slow2"]

@@ -11,7 +11,7 @@ from acquisition.modbus.fifo_assembly import FifoKind, FifoLayout
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
 from acquisition.modbus.polled_source import PolledSettings, PolledSource, vector_calibration
 from acquisition.modbus.register_map import FlagCheck, MapValue, Meaning, RegisterMap, Together
-from acquisition.modbus.slow_values import JoinedSource, PolledSlowValues, only_slow, without_slow
+from acquisition.modbus.slow_values import JoinedSource, PolledSlowValues, without_slow
 from acquisition.modbus.transport import TcpTransport
 from acquisition.simulated.devices.fifo_device import FifoDevice
 from acquisition.simulated.devices.map_device import MapDevice
@@ -132,9 +132,8 @@ class _FifoRig(Rig):
     async def __aenter__(self) -> "_FifoRig":
         self.step_samples = 50
         ids = frozenset(SLOW)
-        beside = MapDevice(
-            SlowFeed(self._feed.slow), registers(()), (), only_slow(self._calibration, ids)
-        )
+        calibration = replace(self._calibration, channels=())
+        beside = MapDevice(SlowFeed(self._feed.slow), registers(()), (), calibration)
         self._device = FifoDevice(self._feed, self.layout, depth_samples=4000, step_samples=50)
         self._server = self._serve(self._device)
         await self.plug_in()

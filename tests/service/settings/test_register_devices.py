@@ -17,8 +17,8 @@ from acquisition.modbus.fifo_source import FifoSettings
 from acquisition.modbus.polled_source import PolledSettings
 from acquisition.modbus.ring_source import RingSettings
 from acquisition.modbus.transport import (
-    ExpectedIdentification,
     ExpectedRegisters,
+    Identification,
     LinkSettings,
     SerialTransport,
 )
@@ -181,7 +181,7 @@ UNIT_COMPUTED = {"channels", "bearings", "slow_channels", "rotation_sense", "has
         (MappedDeviceSettings, PolledSettings, LINK_FIELDS),
         (ModbusLinkSettings, SerialTransport, set()),
         (SignatureIdentity, ExpectedRegisters, set()),
-        (IdentificationIdentity, ExpectedIdentification, set()),
+        (IdentificationIdentity, Identification, set()),
         (UnitSettings, Unit, UNIT_COMPUTED),
         (CanSettings, CanLinkSettings, set()),
         (CanSettings, CanAdapterSettings, {"link", "dbc_text", "channels", "queue_frames"}),

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from acquisition.modbus.transport import ExpectedIdentification, ExpectedRegisters
+from acquisition.modbus.transport import ExpectedRegisters, Identification
 from core.spectra.polls import VectorPart, VectorRow
 from service.settings.adapter_values import identity_of
 from service.settings.base import MisfitError
@@ -180,7 +180,7 @@ def test_an_identity_reaches_the_adapter_as_it_was_written():
         address=1000, words=(0x0102, 7), function=4
     )
     identification = {"kind": "identification", "vendor": "Acme", "revision": "1.4"}
-    assert identity_of(IDENTITY.validate_python(identification)) == ExpectedIdentification(
+    assert identity_of(IDENTITY.validate_python(identification)) == Identification(
         vendor="Acme", revision="1.4"
     )
     assert identity_of(None) is None
