@@ -3,7 +3,7 @@
 import asyncio
 import random
 import signal
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from typing import Annotated
 
 import typer
@@ -15,6 +15,7 @@ from acquisition.recordings.reader import open_recording
 from acquisition.recordings.writer import RecordingWriter
 from acquisition.source import SampleSource
 from service.app.recordings import recording_writer
+from service.app.storage import database_path
 from service.cli.options import (
     JsonOutput,
     NewRecording,
@@ -28,7 +29,8 @@ from service.cli.options import (
 from service.measuring.sources import source_of
 from service.runtime.process import made_by
 from service.settings.plant import load_plant_file
-from service.settings.sources.devices import ModbusVectorSettings
+from service.settings.sources.devices import ModbusFifoSettings, ModbusVectorSettings
+from service.store.holds import exclusive_use
 
 MAX_SECONDS = 7 * 86_400.0
 
@@ -51,9 +53,11 @@ def record(
     """Record a unit's samples exactly as its DAQ delivers them.
 
     Ctrl-C and SIGTERM end the recording early and keep it. So does a lost link, with exit code 1,
-    unless --reconnect is given: then the recording ends when its length has passed.
+    unless --reconnect is given: then the recording ends when its length has passed. Refused for a
+    device whose queue is emptied by reading, while the service of the plant file runs.
     """
-    settings = one_unit(load_plant_file(plant_file), unit, plant_file)
+    plant = load_plant_file(plant_file)
+    settings = one_unit(plant, unit, plant_file)
     if isinstance(settings.source, ModbusVectorSettings):
         words = 'a source of kind "modbus_vector" reports vectors instead of samples'
         fail(f"unit {settings.id} cannot be recorded: {words}", code=2)
@@ -64,7 +68,10 @@ def record(
     writer = recording_writer(settings, out, made_by())
     clock = SystemClock()
     policy = ReconnectPolicy(seconds, clock) if reconnect else None
-    problem = uvloop.run(record_blocks(source_of(settings, clock), writer, seconds, policy))
+    queue = isinstance(settings.source, ModbusFifoSettings) and settings.source.reading == "removes"
+    # a running service would lose the samples that are taken from a queue
+    with exclusive_use(database_path(plant)) if queue else nullcontext():
+        problem = uvloop.run(record_blocks(source_of(settings, clock), writer, seconds, policy))
     manifest = open_recording(out).manifest
     n_bytes = sum(file.size for file in manifest.files.values())
     line = (

@@ -18,12 +18,14 @@ from acquisition.recordings.source import RecordingSource
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.app.recordings import recording_writer, selection_of
+from service.app.storage import database_path
 from service.cli.offline.reanalysis import assessment_document, refreshes
 from service.cli.record import ReconnectPolicy, record_blocks
 from service.measuring.simulated_sources import simulated_feed as feed_of
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.plant import PlantFile, load_plant_file
 from service.settings.units import UnitSettings
+from service.store.holds import exclusive_use
 
 SMALL = "[analysis]\nsegment_samples = 4096\nn_segments = 4\n\n[service]"
 
@@ -52,6 +54,18 @@ def recording(plant: PlantFile, tmp_path: Path) -> Path:
         for _ in range(310):
             writer.write(feed.advance(60))
     return tmp_path / "run"
+
+
+def test_samples_are_not_taken_from_the_queue_that_a_running_service_reads(plant_path, tmp_path):
+    queue = 'kind = "modbus_fifo"\nhost = "127.0.0.1"\nlayout = "per_channel"\naddresses = ' + str(
+        [*range(1, 13)]
+    )
+    text = plant_path.read_text(encoding="utf-8").replace('kind = "simulated"', queue)
+    plant_path.write_text(text, encoding="utf-8")
+    with exclusive_use(database_path(load_plant_file(plant_path))):
+        result = padwatch("record", plant_path, "--unit", "U1", "--out", tmp_path / "run")
+    assert (result.exit_code, "another padwatch" in result.output) == (1, True), result.output
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.long
