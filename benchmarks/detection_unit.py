@@ -21,7 +21,7 @@ from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.backtest import DecisionHistory, decide_all, operation_history
 from core.change.cause import Attribution, UnitReadings, attribute
-from core.change.damping_cause import FilmEvidence, cause_by_damping, line_finding
+from core.change.damping_cause import cause_by_damping, line_finding
 from core.change.decision import Verdict, outcomes
 from core.change.evidence import NO_EVIDENCE, Finding
 from core.change.film_judge import MAX_RECENT
@@ -124,7 +124,7 @@ class LearnedUnit:
         found = attribute(place, self.response, newest, brackets)
         before = later.rows(max(0, row - EVIDENCE_ROWS), row + 1)
         lines = self.lines(later, row)
-        evidence = {p: self._evidence(before, *p) for p in self.places()}
+        evidence = {each: self._findings(before, *each) for each in self.watched()}
         return cause_by_damping(place, found, evidence, lines)
 
     def lines(self, later: Later, row: int) -> dict[str, LineFinding]:
@@ -147,11 +147,6 @@ class LearnedUnit:
                     found.append((int(settled[end - 1]), d, now))
                 active[d] = now
         return found
-
-    def _evidence(self, later: Later, bearing: str, direction: str) -> FilmEvidence:
-        return FilmEvidence(
-            *(self._findings(later, bearing, f"{name}_{direction}") for name in ("k", "ck"))
-        )
 
     def _findings(self, later: Later, bearing: str, quantity: str) -> list[Finding]:
         history, learned, found = (

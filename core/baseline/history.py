@@ -26,7 +26,6 @@ class FilmQuantity:
     logarithm of the quantity and its random standard uncertainty.
     """
 
-    name: str
     direction: str
     value: str
     uncertainty: str
@@ -43,7 +42,7 @@ class FilmQuantity:
 
 
 QUANTITIES = {
-    f"{name}_{d}": FilmQuantity(f"{name}_{d}", d, value, uncertainty)
+    f"{name}_{d}": FilmQuantity(d, value, uncertainty)
     for name, value, uncertainty in (("k", "ln_k", "u_random"), ("ck", "ln_ck", "u_ck"))
     for d in DIRECTIONS
 }

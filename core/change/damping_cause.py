@@ -8,10 +8,11 @@ through three bearings (`core.change.shaft_line`), a transducer is distinguished
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
-from core.baseline.history import DIRECTIONS
+from core.baseline.history import QUANTITIES
 from core.change.cause import MIN_RELATIVE_CHANGE, PROBE_REASON, Attribution, Cause, UnitReadings
 from core.change.evidence import Finding
 from core.change.settings import percent_of
@@ -33,15 +34,8 @@ ALIKE = 0.35
 """Largest difference of the changes in x and y, relative to the larger one, to count as alike."""
 
 
-@dataclass(frozen=True)
-class FilmEvidence:
-    """Mean deviations of ln k and of ln c/k of a film in one direction, over each time scale."""
-
-    k: Sequence[Finding]
-    ck: Sequence[Finding]
-
-
-NO_EVIDENCE = FilmEvidence((), ())
+Evidence: TypeAlias = Mapping[tuple[str, str], Sequence[Finding]]
+"""Mean deviations over each time scale, by bearing id and name of one of the `QUANTITIES`."""
 
 
 @dataclass(frozen=True)
@@ -111,13 +105,12 @@ class _Bearing:
 
 
 def _bearing(
-    evidence: Mapping[FilmDirection, FilmEvidence], bearing: str, time_scale_h: float | None = None
+    evidence: Evidence, bearing: str, time_scale_h: float | None = None
 ) -> _Bearing | None:
     """Return the changes of a bearing over a time scale, by default the most telling one."""
-    films = [evidence.get((bearing, direction), NO_EVIDENCE) for direction in DIRECTIONS]
     columns = [
-        {finding.time_scale_h: finding for finding in findings}
-        for findings in (films[0].k, films[1].k, films[0].ck, films[1].ck)
+        {finding.time_scale_h: finding for finding in evidence.get((bearing, name), ())}
+        for name in QUANTITIES
     ]
     found = []
     for scale_h in set.intersection(*map(set, columns)):
@@ -157,7 +150,7 @@ def line_finding(
 def cause_by_damping(
     film: FilmDirection,
     found: Attribution,
-    evidence: Mapping[FilmDirection, FilmEvidence],
+    evidence: Evidence,
     lines: Mapping[str, LineFinding],
 ) -> Attribution:
     """Return the cause of a change that c/k indicates, or `found` if it indicates none.
@@ -167,7 +160,7 @@ def cause_by_damping(
     film, found
         Bearing id and direction of the changed film, and cause found from the shaft motion.
     evidence
-        Mean deviations by bearing and direction. Bearings without c/k in x and y do not count.
+        Mean deviations of all films. Bearings without c/k in x and y do not count.
     lines
         Findings on the transducers from the line of the shaft, by direction.
     """

@@ -11,8 +11,9 @@ from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.history import DIRECTIONS, QUANTITIES, are_ratios
 from core.change.cause import Attribution, Cause, UnitReadings, attribute
-from core.change.damping_cause import FilmEvidence, cause_by_damping, line_finding
+from core.change.damping_cause import cause_by_damping, line_finding
 from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, outcomes, step
+from core.change.evidence import Finding
 from core.change.film_reading import FilmReading
 from core.change.settings import ChangeLimits, FilmRules, percent_of
 from core.change.shaft_line import WINDOWS, LineFinding, LineVerdict
@@ -181,12 +182,9 @@ class FilmJudge:
         self._baselines: dict[str, BearingBaseline] = {}
         self._decisions: dict[tuple[str, str], Decision] = {}
         self._films = [(bearing, d) for bearing in rules.estimators for d in DIRECTIONS]
-        stiffness = [brackets_n_per_m[bearing] for bearing, _ in self._films]
-        self._has_bracket = {
-            b: k is not None for (b, _), k in zip(self._films, stiffness, strict=True)
-        }
-        known = [k for k in stiffness if k is not None]
-        self._brackets = np.array(known) if len(known) == len(stiffness) else None
+        self._brackets_n_per_m = brackets_n_per_m
+        known = [k for bearing, _ in self._films if (k := brackets_n_per_m[bearing]) is not None]
+        self._brackets = np.array(known) if len(known) == len(self._films) else None
         self._recent: deque[FloatArray] = deque(maxlen=MAX_RECENT)
         self._gains: dict[str, LineFinding] = {}
 
@@ -342,25 +340,21 @@ class FilmJudge:
         columns = newest[-MEAN_READINGS:] or [np.full((9, len(self._films)), np.nan)]
         readings = UnitReadings.of(np.stack(columns, axis=-1))
         found = attribute(film, self.response, readings, self._brackets)
-        evidence = {each: self._evidence(*each) for each in self._films}
-        return cause_by_damping(film, found, evidence, lines)
-
-    def _evidence(self, bearing: str, direction: str) -> FilmEvidence:
-        """Return the mean deviations of a film over each time scale."""
-        k, ck = (
-            self._decisions[bearing, name].evidence.findings(learned)
-            if (learned := self._learned(bearing, name))
-            else ()
-            for name in (f"k_{direction}", f"ck_{direction}")
+        places = [(bearing, name) for bearing in self._rules.estimators for name in QUANTITIES]
+        return cause_by_damping(
+            film, found, {each: self._findings(*each) for each in places}, lines
         )
-        return FilmEvidence(k, ck)
+
+    def _findings(self, bearing: str, name: str) -> Sequence[Finding]:
+        """Return the mean deviations of a quantity of a film over each time scale."""
+        learned = self._learned(bearing, name)
+        return self._decisions[bearing, name].evidence.findings(learned) if learned else ()
 
     def _is_comparable(self, baseline: BearingBaseline) -> bool:
         stiffness = [each for name in ("k_x", "k_y") if (each := baseline.of(name))]
         cells = [cell.location for each in stiffness for cell in each.table.cells]
-        return bool(
-            np.all(are_ratios(np.array(cells)) != self._has_bracket[baseline.origin.bearing])
-        )
+        has_bracket = self._brackets_n_per_m[baseline.origin.bearing] is not None
+        return bool(np.all(are_ratios(np.array(cells)) != has_bracket))
 
     def _learned(self, bearing: str, quantity: str) -> QuantityBaseline | None:
         baseline = self._baselines.get(bearing)

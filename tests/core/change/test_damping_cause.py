@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from core.change.cause import PROBE_REASON, Attribution, Cause
-from core.change.damping_cause import FilmEvidence, cause_by_damping
+from core.change.damping_cause import cause_by_damping
 from core.change.evidence import Finding
 from core.change.shaft_line import LineFinding, LineVerdict
 
@@ -14,24 +14,21 @@ HOLDS = LineFinding(LineVerdict.HOLDS, 0.02, 0.03)
 NO_LINE = LineFinding()
 
 
-def evidence(k_x: float, k_y: float, ck: float, ck_std: float = 0.002) -> dict[str, FilmEvidence]:
-    """Changes of one bearing over one time scale, by direction."""
-    return {
-        direction: FilmEvidence([Finding(16.0, k, 0.008)], [Finding(16.0, ck, ck_std)])
-        for direction, k in (("x", k_x), ("y", k_y))
-    }
+def evidence(k_x: float, k_y: float, ck: float, ck_std: float = 0.002) -> dict[str, list[Finding]]:
+    """Changes of one bearing over one time scale, by quantity."""
+    both = {f"ck_{direction}": [Finding(16.0, ck, ck_std)] for direction in "xy"}
+    return {"k_x": [Finding(16.0, k_x, 0.008)], "k_y": [Finding(16.0, k_y, 0.008)], **both}
 
 
 def told(
-    own: dict[str, FilmEvidence],
+    own: dict[str, list[Finding]],
     others: tuple[float, ...] = (0.0, 0.0),
     line: LineFinding = HOLDS,
     found: Attribution = BY_MOTION,
 ) -> Attribution:
-    films = {("UJB", direction): one for direction, one in own.items()}
+    films = {("UJB", name): one for name, one in own.items()}
     for bearing, k in zip(("LJB", "TJB"), others, strict=False):
-        alike = evidence(k, k, 0.0).items()
-        films |= {(bearing, direction): one for direction, one in alike}
+        films |= {(bearing, name): one for name, one in evidence(k, k, 0.0).items()}
     return cause_by_damping(("UJB", "x"), found, films, {"x": line, "y": HOLDS})
 
 
@@ -87,5 +84,5 @@ def test_without_a_line_a_bracket_is_not_told_from_transducers():
 
 def test_without_damping_the_motion_of_the_shaft_alone_tells():
     assert told({}) == BY_MOTION
-    k_only = {d: FilmEvidence(one.k, ()) for d, one in evidence(-0.3, -0.3, 0.0).items()}
-    assert told(k_only) == BY_MOTION
+    changes = evidence(-0.3, -0.3, 0.0)
+    assert told({name: changes[name] for name in ("k_x", "k_y")}) == BY_MOTION
