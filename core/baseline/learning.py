@@ -9,7 +9,7 @@ from core.baseline.grouping import Groups, group_readings
 from core.baseline.history import QUANTITIES, StiffnessHistory
 from core.baseline.scatter import time_scatter, with_scatter
 from core.baseline.settings import BaselineSettings
-from core.baseline.surface_fit import MIN_SCATTER, Fit, fit_surface, refit, surface_shape
+from core.baseline.surface_fit import MIN_SCATTER, Fit, fit_surface, refit
 from core.baseline.tabulate import tabulate
 from core.condition.cells import FilmConditions
 from core.units import DAY_NS
@@ -107,24 +107,17 @@ def _learn_quantity(
     groups = group_readings(time_ns, conditions, value, settings.grid)
     if np.unique(groups.day).size < settings.min_learning_days:
         return None
-    grid, knots = settings.grid, settings.knot_cells
-    shape = surface_shape(
-        groups,
-        knots * grid.eccentricity_width,
-        knots * grid.temperature_width_c,
-        settings.has_attitude,
-    )
-    fit = fit_surface(groups, shape, settings.bend_std)
+    fit = fit_surface(groups, settings)
     table = tabulate(conditions, value, groups, fit, settings)
     deviation = held_out_deviations(time_ns, conditions, value, groups, fit, table, settings)
     counted = np.isfinite(deviation)
-    deviation, place = deviation[counted], table.find(grid.cells(conditions))[counted]
+    deviation, place = deviation[counted], table.find(settings.grid.cells(conditions))[counted]
     slope, day = fit.surface.slope(table.middle), time_ns[counted] // DAY_NS
     table = with_scatter(table, slope, place, day, deviation)
     scatter = table.scatter[place]
     return QuantityBaseline(
         quantity=name,
-        grid=grid,
+        grid=settings.grid,
         surface=fit.surface,
         attitude_covariance=fit.attitude_covariance,
         table=table,

@@ -6,7 +6,9 @@ import numpy as np
 
 from core.arrays import FloatArray, IntArray
 from core.baseline.grouping import Groups, bisquare, robust_std
+from core.baseline.settings import BaselineSettings
 from core.baseline.surface import ATTITUDE_TERMS, KnotAxis, Surface, SurfaceShape
+from core.condition.cells import FilmConditions
 
 MAX_STDS = 3.0
 """Number of standard deviations at which deviations are clipped in the fit of the scatter."""
@@ -103,22 +105,20 @@ class Fit:
         part = self.covariance[-ATTITUDE_TERMS:, -ATTITUDE_TERMS:]
         return tuple(tuple(row) for row in part.tolist())
 
-    def std(self, design: FloatArray) -> FloatArray:
-        """Return the standard uncertainty (n,) of the surface; `design` is (n, n_coefficients)."""
+    def std(self, conditions: FilmConditions) -> FloatArray:
+        """Return the standard uncertainty of the surface at n conditions (n,)."""
+        design = self.surface.shape.design(conditions)
         variance = np.einsum("ij,jk,ik->i", design, self.covariance, design)
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
-def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
-    """Return a surface fitted robustly to groups.
-
-    `bend_std` is the prior standard deviation of the change of slope of ln k between knots.
-    """
+def fit_surface(groups: Groups, settings: BaselineSettings) -> Fit:
+    """Return a surface fitted robustly to groups; `settings` give its knots and smoothness."""
     from scipy.linalg import cho_solve  # slow import, not needed at start-up
 
-    offset = float(np.median(groups.value))
+    shape, offset = _surface_shape(groups, settings), float(np.median(groups.value))
     points = _Points.of(groups, shape, offset)
-    prior = prior_precision(shape, bend_std)
+    prior = _prior_precision(shape, settings.bend_std)
     coefficients, robust = _resisting(points, prior)
     for _ in range(SLOPE_ROUNDS):
         slope = Surface(shape, offset, tuple(coefficients.tolist())).slope(groups.conditions)
@@ -153,7 +153,7 @@ class _Points:
     def solve(self, precision: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the coefficients, and the lower Cholesky factor of their precision matrix.
 
-        `precision` (n,) is the inverse variance of each row; `prior` is from `prior_precision`.
+        `precision` (n,) is the inverse variance of each row; `prior` is from `_prior_precision`.
         """
         from scipy.linalg import cho_factor, cho_solve  # slow import, not needed at start-up
 
@@ -193,15 +193,12 @@ def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Sur
     shape, offset = fit.surface.shape, fit.surface.offset
     points = _Points.of(groups, shape, offset)
     precision = is_used * fit.robust_weight / (fit.group_std**2 * fit.clustering)
-    coefficients, _ = points.solve(precision, prior_precision(shape, bend_std))
+    coefficients, _ = points.solve(precision, _prior_precision(shape, bend_std))
     return Surface(shape, offset, tuple(coefficients.tolist()))
 
 
-def prior_precision(shape: SurfaceShape, bend_std: float) -> FloatArray:
-    """Return the inverse prior covariance of the coefficients (n_coefficients, n_coefficients).
-
-    `bend_std` is the prior standard deviation of the change of slope of ln k between knots.
-    """
+def _prior_precision(shape: SurfaceShape, bend_std: float) -> FloatArray:
+    """Return the inverse prior covariance of the coefficients (n_coefficients, n_coefficients)."""
     n_e, n_t = shape.eccentricity.n_splines, shape.temperature.n_splines
     along_e, along_t = _differences(n_e, bend_std), _differences(n_t, bend_std)
     tensor = np.kron(along_e, np.eye(n_t)) + np.kron(np.eye(n_e), along_t)
@@ -230,17 +227,13 @@ def _clustering(
     return max(found)
 
 
-def surface_shape(
-    groups: Groups, knot_e: float, knot_t_c: float, has_attitude: bool
-) -> SurfaceShape:
-    """Return the shape of a surface whose knots cover all groups.
-
-    `knot_e` and `knot_t_c` are the knot spacings in eccentricity ratio and oil temperature, °C.
-    """
+def _surface_shape(groups: Groups, settings: BaselineSettings) -> SurfaceShape:
+    """Return the shape of a surface whose knots cover all groups."""
+    conditions, grid, knots = groups.conditions, settings.grid, settings.knot_cells
     return SurfaceShape(
-        _axis(groups.conditions.eccentricity_ratio, knot_e),
-        _axis(groups.conditions.oil_temperature_c, knot_t_c),
-        has_attitude,
+        _axis(conditions.eccentricity_ratio, knots * grid.eccentricity_width),
+        _axis(conditions.oil_temperature_c, knots * grid.temperature_width_c),
+        settings.has_attitude,
     )
 
 

@@ -58,7 +58,7 @@ def tabulate(
     middle = [
         (c.eccentricity_ratio, c.oil_temperature_c, c.attitude_deg) for c in contents.values()
     ]
-    std = fit.std(fit.surface.shape.design(FilmConditions(*np.array(middle).T)))
+    std = fit.std(FilmConditions(*np.array(middle).T))
     nodes = _node_std(contents, fit, settings.grid)
     return CellTable(
         tuple(
@@ -142,8 +142,7 @@ def _node_std(contents: dict[Cell, _Contents], fit: Fit, grid: CellGrid) -> list
         )
         for along_e, along_t in itertools.product(along, along)
     )
-    columns = (fit.std(fit.surface.shape.design(node)).tolist() for node in nodes)
-    return list(zip(*columns, strict=True))
+    return list(zip(*(fit.std(node).tolist() for node in nodes), strict=True))
 
 
 def _support_counts(
