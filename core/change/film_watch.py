@@ -73,17 +73,14 @@ class FilmWatch:
         if last_ns is not None and now_ns <= last_ns:
             if last_ns - now_ns <= ns_from_s(self._rules.operating.longest_gap_s):
                 return  # repeated assessment, or a clock set back slightly
-            self._restart()
+            # keep the decisions and reset all times after the clock was set back
+            self.restore_operation(UNKNOWN_OPERATION, {})
+            self._slot = None
+            self.judge.forget_times()
         speed_rpm, power_mw = (value_or_nan(readings[key]) for key in ("speed_rpm", "power_mw"))
         self._operation = step_operation(
             self._operation, now_ns, speed_rpm, power_mw, self._rules.operating
         )
-
-    def _restart(self) -> None:
-        """Keep the decisions and reset all times after the clock was set back."""
-        self.restore_operation(UNKNOWN_OPERATION, {})
-        self._slot = None
-        self.judge.forget_times()
 
     def _condition(self, assessment: Assessment) -> BearingCondition:
         readings, limits = assessment.readings, self._rules.operating

@@ -122,9 +122,6 @@ class LineFinding:
         return f"{gain}{self.distance_um:.2f} ± {self.std_um:.2f} µm off the line of the shaft"
 
 
-UNKNOWN = LineFinding()
-
-
 @dataclass(frozen=True)
 class ShaftLine:
     """Learned linear equation of the 1× motion of a stiff shaft at three bearings, by direction.
@@ -173,7 +170,8 @@ class ShaftLine:
             if rows.size
         ]
         broken = [each for each in found if each.significance >= BROKEN]
-        return max(broken, key=lambda x: x.significance, default=found[-1] if found else UNKNOWN)
+        usual = found[-1] if found else LineFinding()
+        return max(broken, key=lambda each: each.significance, default=usual)
 
     def _finding(
         self, shaft: ComplexArray, motion: ComplexArray, ln_k: FloatArray, rise: FloatArray
@@ -252,28 +250,19 @@ def _learned(direction: str, bearings: Sequence[str], motion: ComplexArray) -> S
     n = motion.shape[-1] // MEANS_OF
     means = motion[..., : n * MEANS_OF].reshape(*motion.shape[:2], n, MEANS_OF).mean(axis=-1)
     signals = np.concatenate([means[:, 0], means[:, 1]])
-    found = _fit(signals)
     left = np.empty(n, dtype=np.complex128)
     for part in np.array_split(np.arange(n), PARTS):
         coefficients, offset = _fit(np.delete(signals, part, axis=1))
         left[part] = coefficients @ signals[:, part] - offset
-    coefficients, offset = found
+    coefficients, offset = _fit(signals)
     std_um = max(float(np.sqrt(np.mean(np.abs(left) ** 2))), MIN_STD_UM)
     probe, accelerometer = np.split(coefficients, 2)
     is_line = std_um <= MAX_STD_SHARE * float(np.median(np.abs(signals[0] + signals[3])))
     is_line &= bool(np.all(np.abs(accelerometer / probe - 1.0) <= MAX_GAIN_DIFFERENCE))
-    return (
-        ShaftLine(
-            direction,
-            tuple(bearings),
-            tuple(probe.tolist()),
-            tuple(accelerometer.tolist()),
-            (offset.real, offset.imag),
-            std_um,
-        )
-        if is_line
-        else None
-    )
+    if not is_line:
+        return None
+    columns = tuple(probe.tolist()), tuple(accelerometer.tolist())
+    return ShaftLine(direction, tuple(bearings), *columns, (offset.real, offset.imag), std_um)
 
 
 def _fit(signals: ComplexArray) -> tuple[FloatArray, complex]:
