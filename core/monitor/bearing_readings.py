@@ -98,8 +98,7 @@ class UnitEvaluation:
         `position` is the shaft position in the bearing, from `position_results`.
         """
         found = self._bearings[bearing.id]
-        readings, budgets, film = found.readings(position, self._films.get(bearing.id))
-        readings |= found.doubted(readings, budgets, film)
+        readings, budgets = found.readings(position, self._films.get(bearing.id))
         chosen = {
             axes: preferred_stiffness(readings, bearing.preference, axes) for axes in ("xx", "yy")
         }
@@ -203,16 +202,14 @@ class _Bearing:
         phased = self._lines[ORDER1].phases_known
         return Evidence.AMPLITUDE_AND_PHASE if phased else Evidence.AMPLITUDE_ONLY
 
-    def readings(
-        self, position: Found, found: DynamicStiffness | Reason | None
-    ) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
-        """Return all readings but the preferred stiffness, their budgets, and the film or None.
+    def readings(self, position: Found, found: DynamicStiffness | Reason | None) -> Found:
+        """Return all readings but the preferred stiffness, and their budgets.
 
         `found` is the result of `dynamic` for `film_spectrum`; None without such a spectrum.
         """
         unit, segments = self._unit, self._segments
         speed = segments[-1].speed
-        dynamic, dynamic_budgets, film = self._dynamic(found)
+        dynamic, film = self._dynamic(found)
         channels = slow_channels(unit, self._bearing).items()
         slow = with_budgets({name: self._averaged.slow(id_) for name, id_ in channels})
         parts: list[Found] = [
@@ -226,7 +223,7 @@ class _Bearing:
                 segments, self._rows, self._bearing, unit.bearings.index(self._bearing)
             ),
             self._order("vortex_", VORTEX),
-            (dynamic, dynamic_budgets),
+            dynamic,
         ]
         readings: dict[str, Reading] = {}
         budgets: dict[str, Budget] = {}
@@ -235,9 +232,9 @@ class _Bearing:
             budgets |= of_some
         readings = signs_checked(readings)
         known = {name: b for name, b in budgets.items() if readings[name].value is not None}
-        return readings, known, film
+        return readings | self._doubted(readings, known, film), known
 
-    def doubted(
+    def _doubted(
         self,
         readings: Mapping[str, Reading],
         budgets: Mapping[str, Budget],
@@ -327,17 +324,18 @@ class _Bearing:
 
     def _dynamic(
         self, found: DynamicStiffness | Reason | None
-    ) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
-        """Return readings, budgets and the fitted film (or None) of the `dynamic` estimator."""
-        if self.spectrum is None:
-            return dict.fromkeys(DYNAMIC_NAMES, missing(Reason.NOT_MEASURED)), {}, None
+    ) -> tuple[Found, DynamicStiffness | None]:
+        """Return readings with budgets, and the fitted film (or None), of `dynamic`."""
         quality = self._line_quality(*range(len(self._rows)))
-        if found is None or isinstance(quality, Reading):
-            reason = quality.quality if isinstance(quality, Reading) else quality
-            return dict.fromkeys(DYNAMIC_NAMES, missing(reason.reason)), {}, None
-        if isinstance(found, Reason):
-            return dict.fromkeys(DYNAMIC_NAMES, missing(found)), {}, None
-        return *dynamic_readings(self._bearing, found, quality), found
+        if self.spectrum is None:
+            reason = Reason.NOT_MEASURED
+        elif isinstance(quality, Reading):
+            reason = quality.quality.reason
+        elif isinstance(found, DynamicStiffness):
+            return dynamic_readings(self._bearing, found, quality), found
+        else:
+            reason = found or quality.reason
+        return (dict.fromkeys(DYNAMIC_NAMES, missing(reason)), {}), None
 
     @property
     def _n_integrations(self) -> tuple[int, int]:
