@@ -121,7 +121,7 @@ class PollTransform(KeptSegments):
             raise ValueError("rows must be unique: two rows have the same channel and quantity")
         # the phase reference of a rack differs from that of padwatch's slow-roll vectors
         self._runout = {
-            c.id: runout_verdict(c.slow_roll, c.probe, unit.rated_speed_rpm, has_key_phase=False)
+            c.id: runout_verdict(c, unit.rated_speed_rpm, has_key_phase=False)
             for c in unit.channels
         }
 

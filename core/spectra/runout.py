@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from enum import StrEnum
 
 from core.arrays import ComplexArray
-from core.machine.channel import MAX_SLOW_ROLL_FRACTION, SlowRollVector
+from core.machine.channel import MAX_SLOW_ROLL_FRACTION, Channel
 from core.machine.unit import Unit
 from core.quality import GOOD
 from core.spectra.speed import KeyPhase, Speed, SpeedSource
@@ -25,16 +25,12 @@ class RunoutVerdict(StrEnum):
     NO_PHASE_REFERENCE = "no_phase_reference"
 
 
-def runout_verdict(
-    vector: SlowRollVector | None, probe: str, rated_speed_rpm: float, has_key_phase: bool
-) -> RunoutVerdict:
-    """Return `APPLIED` if a slow-roll vector is valid for the installed `probe`, else the reason.
-
-    `vector` is None if it was not measured.
-    """
+def runout_verdict(channel: Channel, rated_speed_rpm: float, has_key_phase: bool) -> RunoutVerdict:
+    """Return `APPLIED` if a channel's slow-roll vector is valid for its probe, else the reason."""
+    vector = channel.slow_roll
     if vector is None:
         return RunoutVerdict.NO_VECTOR
-    if vector.probe != probe:
+    if vector.probe != channel.probe:
         return RunoutVerdict.OTHER_PROBE
     if not 0.0 < vector.speed_rpm <= MAX_SLOW_ROLL_FRACTION * rated_speed_rpm:
         return RunoutVerdict.NOT_SLOW_ROLL
@@ -72,9 +68,8 @@ def without_runout(
     angle_rad = shaft_angle_rad(speed, key_phase)
     cleaned, verdicts = order1_um_pk.copy(), {}
     for row in rows:
-        channel = unit.channels[row]
-        vector, has_key_phase = channel.slow_roll, angle_rad is not None
-        verdict = runout_verdict(vector, channel.probe, unit.rated_speed_rpm, has_key_phase)
+        channel, vector = unit.channels[row], unit.channels[row].slow_roll
+        verdict = runout_verdict(channel, unit.rated_speed_rpm, angle_rad is not None)
         if vector is not None and angle_rad is not None and verdict is RunoutVerdict.APPLIED:
             surface = vector.phasor_um_pk * cmath.exp(1j * angle_rad)
             cleaned[row] = complex(order1_um_pk[row]) - surface
