@@ -58,10 +58,11 @@ def dynamic_readings(bearing: Bearing, found: DynamicStiffness, quality: Quality
 
     `quality` is the quality of the input; the quality of a reading is never better.
     """
-    damping = _damping_half_width(found, bearing.bracket, bearing.accuracy)
+    bracket, mass_kg = bearing.bracket, found.bracket_mass_kg
+    damping = damping_half_width_n_s_per_m(bracket, mass_kg, bearing.accuracy)
     quality = worst((quality, fit_quality(found, bearing.accuracy.delay_s, damping)))
-    coefficients = dynamic_budgets(found, bearing.bracket, bearing.accuracy)
-    coefficients |= _ck_budgets(found, bearing.bracket, bearing.accuracy)
+    coefficients = dynamic_budgets(found, bracket, bearing.accuracy)
+    coefficients |= _ck_budgets(found, bracket, bearing.accuracy)
     of_film: dict[str, Budgeted] = {name: (missing(Reason.OUT_OF_RANGE), None) for name in CK_NAMES}
     of_film |= {name: (Reading(b.value, quality), b) for name, b in coefficients.items()}
     return with_budgets(of_film | _evidence(found, bearing, damping, quality))
@@ -100,7 +101,7 @@ def _bracket_half_widths(
 ) -> tuple[tuple[str, ...], tuple[float, ...]]:
     """Return names and half-widths of the bracket's errors, in the order of `found.changes`."""
     mass_kg = 0.0 if bracket.mass_kg is None else mass_half_width_kg(bracket, accuracy)
-    damping = _damping_half_width(found, bracket, accuracy)
+    damping = damping_half_width_n_s_per_m(bracket, found.bracket_mass_kg, accuracy)
     widths = (accuracy.bracket_stiffness, mass_kg, damping, accuracy.delay_s)
     return (BRACKET, MASS, DAMPING, DELAY), widths
 
@@ -131,12 +132,6 @@ def _ck_budgets(
             ),
         )
     return budgets
-
-
-def _damping_half_width(
-    found: DynamicStiffness, bracket: BracketDynamics, accuracy: BearingAccuracy
-) -> float:
-    return damping_half_width_n_s_per_m(bracket, max(found.bracket_mass_kg, 0.0), accuracy)
 
 
 def fit_quality(found: DynamicStiffness, max_delay_s: float, damping: float) -> Quality:

@@ -210,9 +210,10 @@ def damping_half_width_n_s_per_m(
 ) -> float:
     """Return the half-width of the error of the bracket's damping.
 
-    It is `accuracy.bracket_damping` times the critical damping 2 √(k m).
+    It is `accuracy.bracket_damping` times the critical damping 2 √(k m); 0 for a negative mass.
     """
-    return 2.0 * accuracy.bracket_damping * math.sqrt(bracket.stiffness_n_per_m * mass_kg)
+    critical = math.sqrt(bracket.stiffness_n_per_m * max(mass_kg, 0.0))
+    return 2.0 * accuracy.bracket_damping * critical
 
 
 def transfer_budgets(
