@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from functools import cached_property
 
 from core.condition.cells import OperatingPoint
 from core.quality import Reading, Reason
@@ -65,10 +64,6 @@ def unknown(reason: str, suppressed_by: str | None = None) -> Judgement:
     return Judgement(is_known=False, reason=reason, suppressed_by=suppressed_by)
 
 
-MAYBE_TOO_LOW = (Reason.SPEED_IMPLAUSIBLE,)
-"""Reasons why a reading may be too low: with a wrong speed, the 1× bin misses the spectral line."""
-
-
 @dataclass(frozen=True)
 class Limits:
     """Limits beyond which an alarm becomes active, in the unit of the quantity.
@@ -89,15 +84,6 @@ class Limits:
     deadband: float = 0.0
     alert_below: float | None = None
     danger_below: float | None = None
-
-    @cached_property
-    def _lowest_high(self) -> float | None:
-        return min((x for x in (self.alert, self.danger) if x is not None), default=None)
-
-    @cached_property
-    def _highest_low(self) -> float | None:
-        low = (x for x in (self.alert_below, self.danger_below) if x is not None)
-        return max(low, default=None)
 
     def passed(self, value: float, held: AlarmLevel | None) -> AlarmLevel | None:
         """Return the highest level whose limit a value exceeds, or None if it exceeds none.
@@ -127,9 +113,11 @@ class Limits:
 
         Without upper limits it is always true, without lower limits always false.
         """
-        if self._highest_low is None or self._lowest_high is None:
-            return self._highest_low is not None
-        return value < (self._highest_low + self._lowest_high) / 2.0
+        upper = [x for x in (self.alert, self.danger) if x is not None]
+        lower = [x for x in (self.alert_below, self.danger_below) if x is not None]
+        if not (upper and lower):
+            return bool(lower)
+        return value < (max(lower) + min(upper)) / 2.0
 
     def of(self, level: AlarmLevel | None, value: float = math.inf) -> float | None:
         """Return the limit of a level, the lower one if `is_low(value)`; None if it is unused.
@@ -154,16 +142,18 @@ class Limits:
 def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Judgement:
     """Return the judgement of a reading; `held` is the level of the previous judgement, or None.
 
-    A reading at an implausible speed may be too low: it can raise an alarm but not clear it. At
-    standstill the alarms are suppressed but not cleared, because the speed reading may be wrong.
+    A reading at an implausible speed may be too low, as its 1× bin misses the spectral line: it can
+    raise an alarm but not clear it. At standstill the alarms are suppressed but not cleared,
+    because the speed reading may be wrong.
     """
     value = reading.value
     if value is None:
         why = reading.quality.reason
         return unknown(why, why if why is Reason.STANDSTILL else None)
     level = limits.passed(value, held)
-    if reading.quality.reason in MAYBE_TOO_LOW and (level or 0) < (held or 0):
-        return unknown(reading.quality.reason)
+    reason = reading.quality.reason
+    if reason is Reason.SPEED_IMPLAUSIBLE and (level or 0) < (held or 0):
+        return unknown(reason)
     return Judgement(
         level, value=value, limit=limits.of(level, value), reason=limits.reason(level, value)
     )

@@ -123,7 +123,10 @@ class Ring:
         if self.epoch is None:  # earlier samples do not count as offered
             self.epoch, self.stop_index = block.epoch, block.first_index
             self.contiguous_from = block.first_index
-        n_missing = self._n_missing_before(block)
+        if block.epoch == self.epoch:
+            n_missing = max(block.first_index - self.stop_index, 0)
+        else:
+            n_missing = n_missed(self._stop_ns, block)
         self.account = self.account.with_missing(n_missing, block.rejected)
         if block.epoch != self.epoch:
             self._start_epoch(block.epoch)
@@ -142,11 +145,6 @@ class Ring:
             raise BlockMisfitError(
                 f"expected a block of {self._n_channels} channels, got {len(block.counts)}"
             )
-
-    def _n_missing_before(self, block: SampleBlock) -> int:
-        if block.epoch != self.epoch:
-            return n_missed(self._stop_ns, block)
-        return max(block.first_index - self.stop_index, 0)
 
     def holds(self, first_index: int, stop_index: int) -> bool:
         """Whether the ring holds the samples `first_index` to `stop_index - 1` without a gap."""
