@@ -10,7 +10,7 @@ import numpy as np
 
 from core.arrays import FloatArray
 from core.machine.unit import GapAccuracy
-from core.quality import Quality, Reading, Reason, uncertain, worst
+from core.quality import NOT_MEASURED, Quality, Reading, Reason, uncertain, worst
 from core.uncertainty import Budget, BudgetLine, random_line, systematic_line
 
 NAMES = ("gap x", "opposite gap x", "gap y", "opposite gap y", "thermal growth", "uneven growth")
@@ -60,18 +60,10 @@ class ProbeAxis:
         return worst((left.quality, uncertain(Reason.REDUCED_PROBES)))
 
 
-@dataclass(frozen=True)
-class Growth:
-    """Last measured thermal growth of a bearing's gaps in µm, with half its 95 % interval."""
-
-    value_um: float
-    half_width_um: float
-
-
 class ProbeAxes:
     """Shaft displacement along x and y, as weighted sums of six input quantities.
 
-    `last` is the last measured thermal growth; None if it was never measured.
+    `last` is the last measured thermal growth in µm; None if it was never measured.
 
     Attributes
     ----------
@@ -83,12 +75,11 @@ class ProbeAxes:
     """
 
     def __init__(
-        self, x: ProbeAxis, y: ProbeAxis, accuracy: GapAccuracy, last: Growth | None
+        self, x: ProbeAxis, y: ProbeAxis, accuracy: GapAccuracy, last: Reading | None
     ) -> None:
-        self._axes = (x, y)
-        self._accuracy = accuracy
-        self._last = last
-        outside_um = 0.0 if last is None else last.value_um
+        self._axes, self._accuracy = (x, y), accuracy
+        self._last = last or NOT_MEASURED
+        outside_um = self._last.value or 0.0
         self.values_um: FloatArray = np.array([*x.changes_um, *y.changes_um, outside_um, 0.0])
         self.weights: FloatArray = np.array([self._displacement(0), self._displacement(1)])
 
@@ -118,8 +109,9 @@ class ProbeAxes:
         accuracy, name = self._accuracy, NAMES[source]
         if source == GROWTH:
             half_width_um = accuracy.growth_um
-            if self._last is not None:
-                half_width_um = self._last.half_width_um + accuracy.growth_change_um
+            if self._last.interval_95 is not None:
+                low_um, high_um = self._last.interval_95
+                half_width_um = (high_um - low_um) / 2.0 + accuracy.growth_change_um
             return [systematic_line(name, half_width_um, weight)]
         if source == ASYMMETRY:
             return [systematic_line(name, accuracy.growth_asymmetry_um, weight)]

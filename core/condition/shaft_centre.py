@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from core.arrays import FloatArray
-from core.condition.probe_axes import Growth, ProbeAxes, ProbeAxis
+from core.condition.probe_axes import ProbeAxes, ProbeAxis
 from core.machine.unit import GapAccuracy
-from core.quality import NOT_MEASURED, Level, missing, worst
+from core.quality import NOT_MEASURED, Level, Reading, missing, worst
 from core.uncertainty import Budget, Found, systematic_line
 
 CLEARANCE = "clearance"
@@ -22,7 +22,7 @@ def locate_shaft(
     y: ProbeAxis,
     clearance_um: float,
     accuracy: GapAccuracy | None = None,
-    last_growth: Growth | None = None,
+    last_growth: Reading | None = None,
     matrix: FloatArray | None = None,
 ) -> Found:
     """Locate the shaft from one or two probes on each axis, with uncertainty.

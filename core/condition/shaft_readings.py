@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from core.arrays import FloatArray
-from core.condition.probe_axes import Growth, ProbeAxis
+from core.condition.probe_axes import ProbeAxis
 from core.condition.shaft_centre import locate_shaft
 from core.machine.channel import PAD_TEMPERATURE, Measurand
 from core.machine.unit import Bearing, GapAccuracy, Unit
@@ -29,7 +29,7 @@ from core.uncertainty import (
 
 
 def position_results(
-    unit: Unit, bearing: Bearing, segments: Sequence[Segment], last_growth: Growth | None
+    unit: Unit, bearing: Bearing, segments: Sequence[Segment], last_growth: Reading | None
 ) -> Found:
     """Return gaps, shaft centre, eccentricity and attitude with their budgets, by quantity.
 
@@ -61,14 +61,6 @@ def measures_growth(bearing: Bearing) -> bool:
     """Whether thermal growth can be measured: an axis has opposite probes with references."""
     has_opposite = bearing.opposite_x is not None or bearing.opposite_y is not None
     return has_opposite and bearing.opposite_reference_um is not None
-
-
-def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
-    """Return the thermal growth in `readings`, for use if a probe fails later; None if unknown."""
-    growth = readings["gap_growth_um"]
-    if growth.value is None or growth.interval_95 is None:
-        return None
-    return Growth(growth.value, (growth.interval_95[1] - growth.interval_95[0]) / 2.0)
 
 
 def slow_channels(unit: Unit, bearing: Bearing) -> dict[str, str | None]:

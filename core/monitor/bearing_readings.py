@@ -1,7 +1,7 @@
 """Readings of one bearing from the segments or polls of its unit."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, cached_property, partial
 
 import numpy as np
@@ -26,7 +26,6 @@ from core.quality import (
 from core.spectra.cross_spectrum import (
     BEARING_X,
     BEARING_Y,
-    NO_SPECTRUM,
     SHAFT_X,
     SHAFT_Y,
     CrossSpectrum,
@@ -43,21 +42,6 @@ from core.stiffness.dynamic_readings import dynamic_readings
 from core.stiffness.estimators import as_ratios, preferred_stiffness, ratio_name, signs_checked
 from core.stiffness.order_line import OrderLine, other_line_hz
 from core.uncertainty import Budget, Budgeted, Found, with_budgets
-
-
-@dataclass(frozen=True)
-class BearingReadings:
-    """Readings of one bearing, averaged over segments or polls.
-
-    Readings and budgets are by quantity. `estimators` are those from which `stiffness` was taken,
-    by axes "xx" and "yy"; None without a value.
-    """
-
-    readings: Mapping[str, Reading]
-    budgets: Mapping[str, Budget]
-    estimators: Mapping[str, Estimator | None]
-    spectrum: CrossSpectrum
-    evidence: Evidence
 
 
 class UnitEvaluation:
@@ -79,26 +63,30 @@ class UnitEvaluation:
         self.unit, self.settings, self.kept, self.n_expected = unit, settings, kept, n_expected
 
     @cached_property
-    def _bearings(self) -> "dict[str, _Bearing]":
+    def bearings(self) -> "dict[str, BearingAverage]":
+        """Averages of all bearings, by id."""
         averaged = _AveragedSegments(self.unit, self.settings, self.kept)
-        return {each.id: _Bearing(each, self, averaged) for each in self.unit.bearings}
+        return {each.id: BearingAverage(each, self, averaged) for each in self.unit.bearings}
 
     @cached_property
     def _films(self) -> dict[str, DynamicStiffness | Reason]:
         """Result of `dynamic` for each bearing with a usable spectrum."""
-        spectra = {id_: bearing.film_spectrum() for id_, bearing in self._bearings.items()}
+        spectra = {id_: bearing.film_spectrum() for id_, bearing in self.bearings.items()}
         measured = {id_: found for id_, found in spectra.items() if found is not None}
         return dict(
             zip(measured, films(list(measured.values()), self.settings.dynamic), strict=True)
         )
 
-    def of(self, bearing: Bearing, position: Found) -> BearingReadings:
-        """Return the readings of one bearing.
+    def of(
+        self, bearing: Bearing, position: Found
+    ) -> tuple[dict[str, Reading], dict[str, Budget], dict[str, Estimator | None]]:
+        """Return readings and budgets of one bearing by quantity, and the preferred estimators.
 
-        `position` is the shaft position in the bearing, from `position_results`.
+        The estimators are those from which `stiffness` was taken, by axes "xx" and "yy"; None
+        without a value. `position` is the shaft position in the bearing, from `position_results`.
         """
-        found = self._bearings[bearing.id]
-        readings, budgets = found.readings(position, self._films.get(bearing.id))
+        found = self._films.get(bearing.id)
+        readings, budgets = self.bearings[bearing.id].readings(position, found)
         chosen = {
             axes: preferred_stiffness(readings, bearing.preference, axes) for axes in ("xx", "yy")
         }
@@ -106,13 +94,7 @@ class UnitEvaluation:
         if bearing.bracket_stiffness_n_per_m is None:
             readings = as_ratios(readings)
             budgets = {ratio_name(name) or name: budget for name, budget in budgets.items()}
-        return BearingReadings(
-            readings,
-            budgets,
-            {axes: estimator for axes, (_, estimator) in chosen.items()},
-            found.spectrum or NO_SPECTRUM,
-            found.evidence,
-        )
+        return readings, budgets, {axes: estimator for axes, (_, estimator) in chosen.items()}
 
 
 class _AveragedSegments:
@@ -160,8 +142,14 @@ class _AveragedSegments:
         )
 
 
-class _Bearing:
-    """Computation of the readings of one bearing from one set of segments or polls."""
+class BearingAverage:
+    """Average of one bearing over one set of segments or polls, and readings computed from it.
+
+    Attributes
+    ----------
+    spectrum
+        Cross-spectrum at the bins; None for polls.
+    """
 
     def __init__(
         self, bearing: Bearing, whole: UnitEvaluation, averaged: _AveragedSegments

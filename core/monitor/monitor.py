@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.condition.probe_axes import Growth
 from core.machine.unit import Unit, bearings_with_new_references, require_same_machine
 from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.bearing_readings import UnitEvaluation
 from core.monitor.refresh import Refresh
+from core.quality import Reading
 from core.samples.blocks import BlockMisfitError, SampleBlock
 from core.samples.gaps import Gap, Reach, SampleAccount, outage, restart
 from core.samples.ring import Ring, Window
@@ -42,7 +42,7 @@ class MonitorState:
     start: int
     first_start: int
     n_voided: int
-    growth: Mapping[str, Growth]
+    growth: Mapping[str, Reading]
     account: SampleAccount
 
 
@@ -65,7 +65,7 @@ class UnitMonitor:
         self._transform = transform or SegmentTransform(unit, settings)
         self._ring = Ring(self._transform.n_rows, 2 * self._transform.segment_samples)
         self._gaps: list[Gap] = []
-        self._growth: dict[str, Growth] = {}
+        self._growth: dict[str, Reading] = {}
         self._reach: Reach | None = None
         self._next_start: int | None = None
         self._first_start = 0

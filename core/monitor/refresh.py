@@ -6,14 +6,14 @@ from functools import cached_property
 
 import numpy as np
 
-from core.condition.probe_axes import Growth
-from core.condition.shaft_readings import measured_growth, measures_growth, position_results
+from core.condition.shaft_readings import measures_growth, position_results
 from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import Assessment, AveragingWindow, OrbitTrace
 from core.monitor.bearing_readings import UnitEvaluation
 from core.monitor.overall_readings import recent_readings
-from core.quality import worst
+from core.quality import Reading, worst
 from core.samples.ring import Window
+from core.spectra.cross_spectrum import NO_SPECTRUM
 from core.spectra.resolution import shaft_matrix
 from core.spectra.segments import ORDER1, KeptSegments, Segment
 from core.stiffness.estimators import reported_name
@@ -54,7 +54,7 @@ class Refresh:
     bearing: Bearing
     newest: Window
     n_voided: int
-    last_growth: Growth | None
+    last_growth: Reading | None
 
     @property
     def unit(self) -> Unit:
@@ -84,34 +84,34 @@ class Refresh:
         )
 
     @property
-    def growth(self) -> Growth | None:
+    def growth(self) -> Reading | None:
         """Thermal growth of the gaps in this window; None if it is not measured."""
-        return measured_growth(self._position[0]) if measures_growth(self.bearing) else None
+        growth = self._position[0]["gap_growth_um"] if measures_growth(self.bearing) else None
+        return None if growth is None or growth.value is None else growth
 
     def assessment(self) -> Assessment:
         """Return the assessment of the bearing, computed from this input."""
         newest, rows = self._segment, self._rows
-        found = self.evaluation.of(self.bearing, self._position)
+        averaged = self.evaluation.bearings[self.bearing.id]
+        readings, budgets, estimators = self.evaluation.of(self.bearing, self._position)
         return Assessment(
             unit=self.unit.id,
             bearing=self.bearing.id,
             time_ns=newest.stop_ns,
             window=self.averaged,
             speed_source=newest.speed.source,
-            quality=worst(
-                found.readings[reported_name(found.readings, name)].quality for name in JUDGED
-            ),
-            readings=found.readings,
-            budgets=found.budgets,
-            estimators=found.estimators,
-            spectrum=found.spectrum,
+            quality=worst(readings[reported_name(readings, name)].quality for name in JUDGED),
+            readings=readings,
+            budgets=budgets,
+            estimators=estimators,
+            spectrum=averaged.spectrum or NO_SPECTRUM,
             orbit=None if self._is_polled else self._orbit(rows[:2]),
             runout={
                 "shaft_x": newest.runout[self.bearing.shaft_x],
                 "shaft_y": newest.runout[self.bearing.shaft_y],
             },
             clipped_share=self._clipped_share(),
-            evidence=found.evidence,
+            evidence=averaged.evidence,
             recent=recent_readings(
                 list(self.kept.segments)[-self.kept.result_samples :], rows, self.unit.rate_hz
             ),

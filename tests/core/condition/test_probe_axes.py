@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.condition.probe_axes import Growth, ProbeAxis
+from core.condition.probe_axes import ProbeAxis
 from core.condition.shaft_centre import locate_shaft
 from core.machine.unit import GapAccuracy
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
@@ -86,7 +86,7 @@ def test_a_lost_probe_of_four_costs_certainty_and_no_more(lost):
 def test_without_any_pair_the_last_known_growth_stands_in_and_may_have_changed():
     axes = gaps(60.0, -80.0, 35.0, ("far_x", "near_y"))
     never = located(*axes, CLEARANCE_UM)
-    lately = located(*axes, CLEARANCE_UM, last_growth=Growth(35.0, 5.0))
+    lately = located(*axes, CLEARANCE_UM, last_growth=Reading(35.0, interval_95=(30.0, 40.0)))
 
     assert number(lately.shaft_centre_x_um) == pytest.approx(60.0)
     assert number(lately.shaft_centre_y_um) == pytest.approx(-80.0)
@@ -156,7 +156,8 @@ def drawn(random: np.random.Generator, lost: tuple[str, ...]) -> tuple[Any, floa
     )
     x, y = ProbeAxis(near_x, 2000.0, far_x, 2000.0), ProbeAxis(near_y, 2000.0, far_y, 2000.0)
     # growth was last seen by four probes, and has changed since
-    last = Growth(growth_um + ACCURACY.growth_change_um * random.uniform(-1.0, 1.0), 0.0)
+    seen_um = growth_um + ACCURACY.growth_change_um * random.uniform(-1.0, 1.0)
+    last = Reading(seen_um, interval_95=(seen_um, seen_um))
     believed_um = CLEARANCE_UM * (1.0 + ACCURACY.clearance * random.uniform(-1.0, 1.0))
     found = located(x, y, believed_um, ACCURACY, last)
     return found, radius_um / CLEARANCE_UM, angle_deg
