@@ -8,17 +8,17 @@ from core.condition.cells import BearingCondition
 from core.machine.unit import Estimator
 from core.quality import Quality, Reading
 from core.spectra.cross_spectrum import CrossSpectrum
+from core.spectra.lines import SegmentSettings
 from core.spectra.overall import RecentReadings
 from core.spectra.runout import RunoutVerdict
 from core.spectra.segments import Evidence
 from core.spectra.speed import SpeedSource
 from core.stiffness.dynamic_lines import DynamicSettings
-from core.stiffness.evidence import EvidenceSettings
 from core.uncertainty import Budget
 
 
 @dataclass(frozen=True)
-class AnalysisSettings(EvidenceSettings):
+class AnalysisSettings(SegmentSettings):
     """Settings of segments, averaging, required evidence, and the `dynamic` estimator."""
 
     dynamic: DynamicSettings = field(default_factory=DynamicSettings)

@@ -26,6 +26,11 @@ class SegmentSettings:
         Number of segments in the averaging window; 24 at 600 Hz are about five minutes.
     min_segments
         Number of segments below which a result is marked uncertain.
+    min_coverage
+        Fraction of the possible segments below which a result is marked uncertain.
+    min_coherence
+        Smallest squared coherence of shaft and bearing motion for a stiffness. At 0.9, equation (5)
+        is 5 % too high if the incoherent part is noise of the bearing channel.
     max_frequency_hz
         Highest frequency of the spectra.
     vortex_order
@@ -47,6 +52,8 @@ class SegmentSettings:
     overlap: float = 0.125
     n_segments: int = 24
     min_segments: int = 4
+    min_coverage: float = 0.5
+    min_coherence: float = 0.9
     max_frequency_hz: float = 25.0
     vortex_order: float = 0.25
     vortex_band: tuple[float, float] = (0.2, 0.4)

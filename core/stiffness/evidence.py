@@ -1,10 +1,7 @@
 """Evidence required for a stiffness at a spectral line: coherence and excitation."""
 
-from dataclasses import dataclass
-
 from core.quality import Reason
 from core.spectra.cross_spectrum import CrossSpectrum
-from core.spectra.lines import SegmentSettings
 
 CHANCE = 1e-6
 """Probability that independent noise reaches the coherence of `chance_coherence`."""
@@ -20,23 +17,6 @@ def chance_coherence(n_segments: float) -> float:
     independent segments.
     """
     return float(1.0 - CHANCE ** (1.0 / (n_segments - 1.0)))
-
-
-@dataclass(frozen=True)
-class EvidenceSettings(SegmentSettings):
-    """Settings of segments and of the evidence required for a stiffness.
-
-    Parameters
-    ----------
-    min_coherence
-        Smallest squared coherence of shaft and bearing motion for a stiffness. At 0.9, equation (5)
-        is 5 % too high if the incoherent part is noise of the bearing channel.
-    min_coverage
-        Fraction of the possible segments below which a result is marked uncertain.
-    """
-
-    min_coherence: float = 0.9
-    min_coverage: float = 0.5
 
 
 def line_excitation(

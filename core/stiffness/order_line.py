@@ -23,7 +23,7 @@ from core.spectra.cross_spectrum import (
     roundness,
     shared_power,
 )
-from core.spectra.lines import peak_frequency_hz
+from core.spectra.lines import SegmentSettings, peak_frequency_hz
 from core.spectra.segments import ORDER1, VORTEX
 from core.stiffness.channel_budget import (
     amplitude_budget,
@@ -32,7 +32,7 @@ from core.stiffness.channel_budget import (
     phase_budget,
     roundness_budget,
 )
-from core.stiffness.evidence import EvidenceSettings, chance_coherence, line_excitation
+from core.stiffness.evidence import chance_coherence, line_excitation
 from core.stiffness.stiffness_budget import (
     changed_polls,
     effective_stiffness_n_per_m,
@@ -96,7 +96,7 @@ class OrderLine:
     """
 
     bearing: Bearing
-    settings: EvidenceSettings
+    settings: SegmentSettings
     orders: CrossSpectrum
     at: int
     line: int
