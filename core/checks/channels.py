@@ -4,7 +4,6 @@ A cell is shorter than a turn of the shaft, so its mean follows the vibration. A
 limits is therefore only uncertain; the checks of a whole segment decide.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,12 +40,6 @@ class ChannelLimits:
     unit_per_v: FloatArray
     ok_min_v: FloatArray
     ok_max_v: FloatArray
-
-    @classmethod
-    def of(cls, channels: Iterable[tuple[float, float, float, float]]) -> "ChannelLimits":
-        """Return limits from (full scale V, unit per V, lowest OK V, highest OK V) per channel."""
-        columns = np.array(list(channels), dtype=np.float64).reshape(-1, 4)
-        return cls(*(column[:, np.newaxis] for column in columns.T))
 
 
 def channel_verdicts(

@@ -63,7 +63,7 @@ class UnitMonitor:
         self.unit = unit
         self._settings = settings
         self._transform = transform or SegmentTransform(unit, settings)
-        self._ring = Ring(self._transform.n_rows, 2 * self._transform.segment_samples)
+        self._ring = Ring(2 * self._transform.segment_samples)
         self._gaps: list[Gap] = []
         self._growth: dict[str, Reading] = {}
         self._reach: Reach | None = None
@@ -177,7 +177,9 @@ class UnitMonitor:
             raise BlockMisfitError(
                 f"expected samples at {self.unit.rate_hz} Hz, got {block.rate_hz} Hz"
             )
-        self._ring.require(block)
+        n_rows, n_channels = self._transform.n_rows, len(block.counts)
+        if n_channels != n_rows:
+            raise BlockMisfitError(f"expected a block of {n_rows} channels, got {n_channels}")
 
     def _write(self, block: SampleBlock) -> None:
         epoch, stop_index = self._ring.epoch, self._ring.stop_index

@@ -107,9 +107,9 @@ class UnitCalibration:
     @cached_property
     def limits(self) -> ChannelLimits:
         """OK limits and full scales of all channels as arrays."""
-        return ChannelLimits.of(
-            [(c.full_scale_v, c.unit_per_v, c.ok_min_v, c.ok_max_v) for c in self.channels]
-        )
+        rows = [(c.full_scale_v, c.unit_per_v, c.ok_min_v, c.ok_max_v) for c in self.channels]
+        columns = np.array(rows, dtype=np.float64).reshape(-1, 4, 1)
+        return ChannelLimits(*columns.swapaxes(0, 1))
 
     @cached_property
     def slow_ids(self) -> tuple[str, ...]:

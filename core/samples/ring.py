@@ -9,7 +9,7 @@ import numpy as np
 from core.arrays import IntArray, SampleArray
 from core.checks.channels import worst_qualities
 from core.quality import NOT_MEASURED, Quality, Reading, mean_reading
-from core.samples.blocks import BlockMisfitError, SampleBlock
+from core.samples.blocks import SampleBlock
 from core.samples.gaps import Gap, SampleAccount, n_missed
 from core.units import ns_from_s
 
@@ -102,8 +102,8 @@ class Ring:
         Balance of the samples that the device offered.
     """
 
-    def __init__(self, n_channels: int, capacity: int) -> None:
-        self._n_channels, self._capacity = n_channels, capacity
+    def __init__(self, capacity: int) -> None:
+        self._capacity = capacity
         self._blocks: deque[SampleBlock] = deque()
         self.contiguous_from = 0
         self.epoch: int | None = None
@@ -116,10 +116,7 @@ class Ring:
 
         Repeated samples are counted in `account` and dropped. Not more rejected samples are counted
         than the index shows to be missing.
-
-        Raises BlockMisfitError if the number of channels differs.
         """
-        self.require(block)
         if self.epoch is None:  # earlier samples do not count as offered
             self.epoch, self.stop_index = block.epoch, block.first_index
             self.contiguous_from = block.first_index
@@ -127,9 +124,10 @@ class Ring:
             n_missing = max(block.first_index - self.stop_index, 0)
         else:
             n_missing = n_missed(self._stop_ns, block)
+            self._blocks.clear()
+            self.epoch, self.stop_index, self.contiguous_from = block.epoch, 0, 0
+            self.account = replace(self.account, n_restarts=self.account.n_restarts + 1)
         self.account = self.account.with_missing(n_missing, block.rejected)
-        if block.epoch != self.epoch:
-            self._start_epoch(block.epoch)
         if block.first_index > self.stop_index:
             self.contiguous_from = self.stop_index = block.first_index
         self._take(block)
@@ -138,13 +136,6 @@ class Ring:
         first_index = block.first_index - n_missing
         is_estimated = any(rejection.is_estimated for rejection in block.rejected)
         return Gap(block.epoch, first_index, n_missing, block.start_ns, is_estimated=is_estimated)
-
-    def require(self, block: SampleBlock) -> None:
-        """Check the number of channels of a block; raise `BlockMisfitError` if it differs."""
-        if len(block.counts) != self._n_channels:
-            raise BlockMisfitError(
-                f"expected a block of {self._n_channels} channels, got {len(block.counts)}"
-            )
 
     def holds(self, first_index: int, stop_index: int) -> bool:
         """Whether the ring holds the samples `first_index` to `stop_index - 1` without a gap."""
@@ -176,11 +167,6 @@ class Ring:
             channel_quality=worst_qualities(verdicts),
             slow=_slow_means(parts),
         )
-
-    def _start_epoch(self, epoch: int) -> None:
-        self._blocks.clear()
-        self.epoch, self.stop_index, self.contiguous_from = epoch, 0, 0
-        self.account = replace(self.account, n_restarts=self.account.n_restarts + 1)
 
     def _take(self, block: SampleBlock) -> None:
         n_repeated = min(self.stop_index - block.first_index, block.n_samples)

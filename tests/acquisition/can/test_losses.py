@@ -203,7 +203,7 @@ def test_random_frames_of_a_mad_device_never_break_the_account(
     random = np.random.default_rng(20261121)
     shape, calibration = shape_of(n_channels=12, fd=fd), counts_calibration(n_channels=12)
     encoder, assembler = FrameEncoder(shape), assembler_of(shape)
-    feed, ring = counting_feed(n_channels=12), Ring(12, 6000)
+    feed, ring = counting_feed(n_channels=12), Ring(6000)
     arrived_ns = START_NS
     for _ in range(150):
         frames = []

@@ -24,7 +24,7 @@ def block(first_index: int, n_samples: int, epoch: int = 1, **changes: object) -
 
 @given(st.lists(st.integers(1, 60), min_size=1, max_size=20), st.integers(0, 10**9))
 def test_the_ring_equals_the_tail_of_all_that_was_written(sizes, start):
-    ring, index = Ring(2, CAPACITY), start
+    ring, index = Ring(CAPACITY), start
     for size in sizes:
         assert ring.write(block(index, size)) is None
         index += size
@@ -41,7 +41,7 @@ STEPS = st.tuples(st.integers(1, 30), st.integers(0, 50), st.integers(0, 5), st.
 
 @given(st.lists(STEPS, min_size=1, max_size=30))
 def test_every_offered_sample_is_stored_flagged_missing_or_rejected(steps):
-    ring, index, gaps, good_samples = Ring(2, CAPACITY), 0, 0, 0
+    ring, index, gaps, good_samples = Ring(CAPACITY), 0, 0, 0
     ring.write(block(0, 1))
     index, rejected = 1, 0
     for size, lost, refused, good in steps:
@@ -59,14 +59,14 @@ def test_every_offered_sample_is_stored_flagged_missing_or_rejected(steps):
 
 
 def test_a_gap_is_exact_and_repeated_samples_are_dropped_and_counted():
-    ring = Ring(2, CAPACITY)
+    ring = Ring(CAPACITY)
     ring.write(block(100, 10))
     assert ring.write(block(117, 5)) == Gap(1, 110, 7, 117 * 10**7)
     assert ring.holds(117, 122)
     assert not ring.holds(109, 122)
     with pytest.raises(LookupError, match="109 to 121"):
         ring.read(109, 122)
-    ring = Ring(2, CAPACITY)
+    ring = Ring(CAPACITY)
     ring.write(block(0, 10))
     ring.write(block(0, 10))
     ring.write(block(5, 10))
@@ -76,7 +76,7 @@ def test_a_gap_is_exact_and_repeated_samples_are_dropped_and_counted():
 
 
 def test_a_restarted_device_begins_a_new_count_without_a_giant_gap():
-    ring = Ring(2, CAPACITY)
+    ring = Ring(CAPACITY)
     ring.write(block(4_000_000_000, 10))
     later_ns = 4_000_000_100 * 10**7
     assert ring.write(block(3, 10, epoch=2, start_ns=later_ns)) == Gap(2, 0, 3, later_ns)
@@ -89,7 +89,7 @@ def test_a_restarted_device_begins_a_new_count_without_a_giant_gap():
 
 
 def test_a_window_has_the_worst_quality_and_the_mean_of_slow_readings_that_half_of_it_has():
-    ring = Ring(2, CAPACITY)
+    ring = Ring(CAPACITY)
     clipped = (bad(Reason.CLIPPED), GOOD)
     ring.write(block(0, 10, channel_quality=clipped, slow={"oil": Reading(99.0)}))
     ring.write(block(10, 10, slow={"oil": Reading(40.0)}))
@@ -99,7 +99,7 @@ def test_a_window_has_the_worst_quality_and_the_mean_of_slow_readings_that_half_
     assert window.slow["oil"].value == 45.0
     assert ring.read(15, 30).slow["oil"].value == pytest.approx((5 * 40.0 + 10 * 50.0) / 15)
     assert ring.read(9, 30).channel_quality == (bad(Reason.CLIPPED), GOOD)
-    ring = Ring(2, CAPACITY)
+    ring = Ring(CAPACITY)
     ring.write(block(0, 10, slow={"oil": Reading(40.0), "power": Reading(1.0)}))
     ring.write(block(10, 8, slow={"oil": Reading(49.75)}))
     ring.write(block(18, 3, slow={"oil": Reading(49.0)}))
@@ -110,7 +110,7 @@ def test_a_window_has_the_worst_quality_and_the_mean_of_slow_readings_that_half_
 
 def test_a_count_that_was_found_and_not_begun_says_nothing_of_what_is_missing():
     """As of a counter that went on while whoever reads it began again."""
-    ring = Ring(2, CAPACITY)
+    ring = Ring(CAPACITY)
     ring.write(block(0, 10))
     late = block(40_000, 10, epoch=2, start_ns=20 * 10**9, rejected=(Rejection("torn", 3),))
     assert ring.write(late) is None
@@ -119,7 +119,7 @@ def test_a_count_that_was_found_and_not_begun_says_nothing_of_what_is_missing():
 
 
 def test_what_was_rejected_before_a_block_counts_once_and_before_the_first_never():
-    ring = Ring(2, CAPACITY)
+    ring = Ring(CAPACITY)
     ring.write(block(0, 10))
     torn = block(15, 10, rejected=(Rejection("torn", 5),))
     for _ in range(3):
@@ -127,22 +127,17 @@ def test_what_was_rejected_before_a_block_counts_once_and_before_the_first_never
     account = ring.account
     assert (account.rejected, account.n_gap, account.n_repeated) == ({"torn": 5}, 0, 20)
     assert account.n_offered == account.n_stored + 5 == 25
-    ring = Ring(2, CAPACITY)
+    ring = Ring(CAPACITY)
     assert ring.write(block(5000, 10, rejected=(Rejection("torn", 50),))) is None
     assert ring.account.n_offered == 10
 
 
 @pytest.mark.parametrize("refused", [(5,), (1, 4), (2, 7), (9, -1)])
 def test_no_more_is_rejected_than_the_index_leaves_room_for(refused):
-    ring = Ring(2, CAPACITY)
+    ring = Ring(CAPACITY)
     ring.write(block(0, 10))
     named = tuple(Rejection(f"reason {n}", count) for n, count in enumerate(refused))
     assert ring.write(block(12, 10, rejected=named)) == Gap(1, 10, 2, 12 * 10**7)
     account = ring.account
     assert (account.n_gap, sum(account.rejected.values()), account.n_offered) == (0, 2, 22)
     assert min(account.rejected.values()) > 0
-
-
-def test_a_block_with_other_channels_is_refused_naming_both():
-    with pytest.raises(ValueError, match="3 channels, got 2"):
-        Ring(3, CAPACITY).write(block(0, 10))
