@@ -54,8 +54,8 @@ Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 def describe_fields(schema: dict[str, Any], model: type[Any]) -> None:
     """Add the docstrings of the fields of a model to its JSON schema, as their descriptions.
 
-    pydantic's ``use_attribute_docstrings`` does the same when a class is made: a quarter of the
-    start of a process, most of which never make a schema.
+    pydantic's ``use_attribute_docstrings`` reads them when a class is made, which takes a quarter
+    of the start of a process, although few processes make a schema.
     """
     properties = schema.get("properties", {})
     for kind in model.__mro__:
