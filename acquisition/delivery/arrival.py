@@ -114,8 +114,12 @@ class ArrivalModel:
 
         `stop_ns` is the time of `stop_index` by the device stamps; None without device stamps.
         """
-        if epoch != self._epoch or self._was_set(arrived):
-            self._begin(epoch, stop_index, arrived.steady_s)
+        before = self._newest
+        was_set = before is not None and abs(arrived.step_s_since(before)) > _HOST_STEP_S
+        if epoch != self._epoch or was_set:
+            self._epoch, self._origin, self._bin = epoch, (stop_index, arrived.steady_s), -1
+            self._bins.clear()
+            self._drift_ppm = None
         self._newest = arrived
         host_s = arrived.steady_s - self._origin[1]
         delay_s = host_s - (stop_index - self._origin[0]) / self._rate_hz
@@ -126,9 +130,9 @@ class ArrivalModel:
             self._bin = number
             self._bins.append((host_s, delay_s, offset_ns))
         else:
-            before = self._bins[-1]
-            offsets_ns = [ns for ns in (before[2], offset_ns) if ns is not None]
-            host_s, delay_s, _ = min(before, (host_s, delay_s, None), key=lambda each: each[1])
+            bin_ = self._bins[-1]
+            offsets_ns = [ns for ns in (bin_[2], offset_ns) if ns is not None]
+            host_s, delay_s, _ = min(bin_, (host_s, delay_s, None), key=lambda each: each[1])
             self._bins[-1] = (host_s, delay_s, max(offsets_ns, default=None))
 
     def device_clock(self, n_faults: int = 0) -> DeviceClock:
@@ -141,14 +145,6 @@ class ArrivalModel:
         offset_s = None if offset_ns is None else offset_ns / NS_PER_S
         drift_ppm, u_drift_ppm = self._drift_ppm or (None, None)
         return DeviceClock(offset_s, drift_ppm, u_drift_ppm, n_faults)
-
-    def _was_set(self, arrived: Arrival) -> bool:
-        return self._newest is not None and abs(arrived.step_s_since(self._newest)) > _HOST_STEP_S
-
-    def _begin(self, epoch: int, stop_index: int, arrived_s: float) -> None:
-        self._epoch, self._origin, self._bin = epoch, (stop_index, arrived_s), -1
-        self._bins.clear()
-        self._drift_ppm = None
 
 
 def _drift_ppm(bins: deque[_Bin]) -> tuple[float, float] | None:

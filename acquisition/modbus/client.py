@@ -13,8 +13,8 @@ from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.connection import (
     CLOSED,
     ReplyProtocol,
+    SerialLine,
     SilenceError,
-    open_line,
     reason_of,
 )
 from acquisition.modbus.framing import PendingRequest
@@ -258,7 +258,7 @@ class ModbusClient:
         transport = self._settings.transport
         if isinstance(transport, SerialTransport):
             self._protocol = ReplyProtocol(transport)
-            open_line(transport, self._protocol)
+            SerialLine(transport, self._protocol)
             await self._await_silence()
         else:
             await self._connect_to(transport)

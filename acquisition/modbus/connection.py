@@ -52,7 +52,8 @@ class ReplyProtocol(asyncio.Protocol):
         self._received = b""
         self._replies: list[bytes] = []
         self._done: asyncio.Future[list[bytes]] | None = None
-        self._watch: asyncio.TimerHandle
+        self._timeout_s = 0.0
+        self._deadline: asyncio.Timeout
         self.n_in_flight = 0
         self.unsolicited = ""
 
@@ -89,13 +90,17 @@ class ReplyProtocol(asyncio.Protocol):
             raise FrameError(f"{self._where}: {self.unsolicited}")
         loop = asyncio.get_running_loop()
         self._done, self._replies, self._received = loop.create_future(), [], b""
-        self._unsent, self._max_in_flight = requests, max_in_flight
-        self._watch_for(timeout_s)
-        self._send_burst()
+        self._unsent, self._max_in_flight, self._timeout_s = requests, max_in_flight, timeout_s
         try:
-            return await self._done
+            async with asyncio.timeout(timeout_s) as self._deadline:
+                self._send_burst()
+                return await self._done
+        except TimeoutError:
+            words = f"no reply within {timeout_s} s"
+            if self._received:
+                words = f"incomplete reply of {len(self._received)} bytes within {timeout_s} s"
+            raise SilenceError(f"{self._where}: {words}") from None
         finally:
-            self._watch.cancel()
             self._in_flight.clear()
             self._unsent = ()
             self._done = None
@@ -124,7 +129,11 @@ class ReplyProtocol(asyncio.Protocol):
             return
         received = self._received + data if self._received else data
         try:
-            self._received = received[self._take(received) :]
+            n_taken = self._take(received)
+            self._received = received[n_taken:]
+            if n_taken and self._in_flight and not self._deadline.expired():
+                now_s = asyncio.get_running_loop().time()
+                self._deadline.reschedule(now_s + self._timeout_s)
         except FrameError as fault:
             shown = received[:_SHOWN_BYTES].hex()
             self._fail(FrameError(f"{self._where}: {fault}: {shown}"))
@@ -148,20 +157,6 @@ class ReplyProtocol(asyncio.Protocol):
             self._done.set_result(self._replies)
         return at
 
-    def _watch_for(self, timeout_s: float) -> None:
-        loop = asyncio.get_running_loop()
-        self._watch = loop.call_later(timeout_s, self._look_at_time, timeout_s, len(self._replies))
-
-    def _look_at_time(self, timeout_s: float, n_seen: int) -> None:
-        """Fail the exchange if no reply has arrived since the timer was started."""
-        if len(self._replies) > n_seen:
-            self._watch_for(timeout_s)
-            return
-        words = f"no reply within {timeout_s} s"
-        if self._received:
-            words = f"incomplete reply of {len(self._received)} bytes within {timeout_s} s"
-        self._fail(SilenceError(f"{self._where}: {words}"))
-
     def _fail(self, error: LinkError | FrameError) -> None:
         self._in_flight.clear()
         self._unsent = ()
@@ -170,13 +165,21 @@ class ReplyProtocol(asyncio.Protocol):
 
 
 class SerialLine(asyncio.Transport):
-    """asyncio transport of a serial port; received bytes are passed to a protocol."""
+    """asyncio transport of a serial port, opened for exclusive use; passes bytes to a protocol.
 
-    def __init__(self, port: serial.Serial, protocol: asyncio.Protocol) -> None:
+    Raises
+    ------
+    LinkError
+        If the port does not exist, or another program has opened it.
+    ConfigError
+        If the port rejects the settings.
+    """
+
+    def __init__(self, settings: SerialTransport, protocol: asyncio.Protocol) -> None:
         super().__init__()
-        self._port, self._protocol = port, protocol
+        self._port, self._protocol = _opened(settings), protocol
         self._loop = asyncio.get_running_loop()
-        self._loop.add_reader(port.fileno(), self._receive)
+        self._loop.add_reader(self._port.fileno(), self._receive)
         protocol.connection_made(self)
 
     def is_closing(self) -> bool:
@@ -210,16 +213,7 @@ class SerialLine(asyncio.Transport):
             self._protocol.connection_lost(error)
 
 
-def open_line(settings: SerialTransport, protocol: asyncio.Protocol) -> SerialLine:
-    """Open a serial port for exclusive use; return its asyncio transport.
-
-    Raises
-    ------
-    LinkError
-        If the port does not exist, or another program has opened it.
-    ConfigError
-        If the port rejects the settings.
-    """
+def _opened(settings: SerialTransport) -> serial.Serial:
     port = serial.Serial()
     port.port, port.baudrate, port.stopbits = settings.device, settings.baudrate, settings.stop_bits
     port.parity, port.exclusive, port.write_timeout = settings.parity[0].upper(), True, 0
@@ -233,4 +227,4 @@ def open_line(settings: SerialTransport, protocol: asyncio.Protocol) -> SerialLi
     except (OSError, EOFError) as error:
         port.close()
         raise LinkError(f"{settings}: {reason_of(error)}") from None
-    return SerialLine(port, protocol)
+    return port

@@ -29,12 +29,12 @@ class FifoPiece:
     Parameters
     ----------
     counters
-        (n_samples,) counter of each sample, modulo 65536; None if the device has no counter.
+        (n_samples,) counter of each sample, modulo 65536; unused if the device has no counter.
     counts
         (n_channels, n_samples) int16 counts; n_channels is 1 for the queue of one channel.
     """
 
-    counters: npt.NDArray[np.int64] | None
+    counters: npt.NDArray[np.uint16]
     counts: CountArray
 
     @property
@@ -86,21 +86,16 @@ class FifoLayout:
         """
         words = np.frombuffer(data, ">u2").astype(np.uint16)
         if self.kind is FifoKind.PER_CHANNEL:
-            return self._decode_channel(words)
+            numbers = np.arange(words[1:].size, dtype=np.uint16)
+            return FifoPiece(words[:1] + numbers, words[1:].view(np.int16)[np.newaxis])
         if words.size % self.record_registers:
             raise LinkError(
                 f"FIFO: {words.size} registers are not whole records of {self.record_registers}"
                 " registers; check channels and counter"
             )
         records = words.reshape(-1, self.record_registers)
-        counters = records[:, 0].astype(np.int64) if self.has_counter else None
         samples = records[:, int(self.has_counter) :].view(np.int16)
-        return FifoPiece(counters, np.ascontiguousarray(samples.T))
-
-    def _decode_channel(self, words: npt.NDArray[np.uint16]) -> FifoPiece:
-        samples = words[1:].view(np.int16)[np.newaxis]
-        first = int(words[0]) if words.size else 0
-        return FifoPiece((first + np.arange(samples.shape[1])) % 65536, samples)
+        return FifoPiece(records[:, 0], np.ascontiguousarray(samples.T))
 
 
 WRAP = 1 << 16
@@ -127,6 +122,23 @@ class SamplePlace:
 
     epoch: int
     index: int
+
+
+@dataclass(frozen=True)
+class PlacedSamples:
+    """Consecutive samples of all channels, with epoch and index of the first sample.
+
+    `counts` are (n_channels, n_samples) int16 counts.
+    """
+
+    epoch: int
+    first_index: int
+    counts: CountArray
+
+    @property
+    def stop_index(self) -> int:
+        """Index after the last sample."""
+        return self.first_index + int(self.counts.shape[1])
 
 
 class CountedSamples:
@@ -176,6 +188,21 @@ class CountedSamples:
             return self._put(counter, now_ns)
         return self._put(axis.index + jump, now_ns)
 
+    def runs(self, piece: FifoPiece, now_s: float) -> list[PlacedSamples]:
+        """Return the samples of one reading of a queue as runs of consecutive sample indices.
+
+        Samples that were read before are left out. `now_s` is the monotonic time of the reading.
+
+        Raises LinkError if the counter restarts more than once in a reading, so that it cannot
+        count samples.
+        """
+        places = [self.place(counter, now_s) for counter in piece.counters.tolist()]
+        if len({place.epoch for place in places if place is not None}) > _MAX_EPOCHS:
+            raise LinkError(
+                "FIFO: the sample counter restarts repeatedly in one read; check the queue address"
+            )
+        return list(_joined(places, piece.counts))
+
     def _put(self, index: int, now_ns: int) -> SamplePlace:
         self._axis.stand_at(index + 1, now_ns)
         return SamplePlace(self._axis.epoch, index)
@@ -202,54 +229,15 @@ class UncountedSamples:
         self._next = 0
         self._delay = LeastDelay(_MAX_DRIFT)
 
-    def place(self, n_samples: int) -> SamplePlace:
-        """Count the next `n_samples` samples; return epoch and index of the first of them."""
-        first, self._next = self._next, self._next + n_samples
-        return SamplePlace(self._epochs.number, first)
+    def runs(self, piece: FifoPiece, _now_s: float) -> list[PlacedSamples]:
+        """Count the samples of the next reading; return them as one run, or none if it is empty."""
+        first, self._next = self._next, self._next + piece.n_samples
+        placed = PlacedSamples(self._epochs.number, first, piece.counts)
+        return [placed] if piece.n_samples else []
 
     def has_lost(self, now_s: float) -> bool:
         """Return whether samples were lost; `now_s` is the monotonic time of an empty queue."""
         return self._delay.late_s(now_s - self._next / self._rate_hz, now_s) > self._tolerance_s
-
-
-@dataclass(frozen=True)
-class PlacedSamples:
-    """Consecutive samples of all channels, with epoch and index of the first sample.
-
-    `counts` are (n_channels, n_samples) int16 counts.
-    """
-
-    epoch: int
-    first_index: int
-    counts: CountArray
-
-    @property
-    def stop_index(self) -> int:
-        """Index after the last sample."""
-        return self.first_index + int(self.counts.shape[1])
-
-
-def place_records(
-    piece: FifoPiece, samples: CountedSamples | UncountedSamples, now_s: float
-) -> list[PlacedSamples]:
-    """Return the samples of one reading of a queue as runs of consecutive sample indices.
-
-    Samples that were read before are left out. `now_s` is the monotonic time of the reading.
-
-    Raises LinkError if the counter restarts more than once in a reading, so that it cannot count
-    samples.
-    """
-    if isinstance(samples, UncountedSamples):
-        place = samples.place(piece.n_samples)
-        found = [PlacedSamples(place.epoch, place.index, piece.counts)]
-        return found if piece.n_samples else []
-    counters = () if piece.counters is None else piece.counters
-    places = [samples.place(int(counter), now_s) for counter in counters]
-    if len({place.epoch for place in places if place is not None}) > _MAX_EPOCHS:
-        raise LinkError(
-            "FIFO: the sample counter restarts repeatedly in one read; check the queue address"
-        )
-    return list(_joined(places, piece.counts))
 
 
 def _joined(places: Iterable[SamplePlace | None], counts: CountArray) -> Iterator[PlacedSamples]:
@@ -286,7 +274,7 @@ class ChannelAssembly:
         channels differ too much, as after a restart between the reads.
         """
         first, *others = pieces
-        for sample in place_records(first, self._samples, now_s):
+        for sample in self._samples.runs(first, now_s):
             if sample.epoch != self._epoch:
                 self.forget()
                 self._epoch, self._next = sample.epoch, sample.first_index
@@ -297,7 +285,7 @@ class ChannelAssembly:
         return self._common()
 
     def _add_other(self, channel: int, piece: FifoPiece) -> None:
-        if piece.counters is None or not piece.n_samples or self._epoch < 0:
+        if not piece.n_samples or self._epoch < 0:
             return
         apart = signed_distance(int(piece.counters[0]), self._newest, WRAP)
         if abs(apart) > _MAX_APART:

@@ -19,7 +19,6 @@ from acquisition.modbus.fifo_assembly import (
     FifoPiece,
     PlacedSamples,
     UncountedSamples,
-    place_records,
 )
 from acquisition.modbus.transport import LinkSettings
 from core.samples.axis import Epochs
@@ -159,7 +158,7 @@ class FifoSource:
         if self._layout.kind is FifoKind.PER_CHANNEL:
             return self._channels.place(pieces, now_s)
         samples = self._counted if self._layout.has_counter else self._uncounted
-        return place_records(pieces[0], samples, now_s)
+        return samples.runs(pieces[0], now_s)
 
     def _is_drained(self, pieces: list[FifoPiece]) -> bool:
         """Return whether a reading emptied the queues; True if reading does not remove samples."""

@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 
 from acquisition.errors import ConfigError
+from acquisition.recordings import tables
 from acquisition.recordings.manifest import (
     BLOCKS,
     BLOCKS_PER_GROUP,
@@ -27,13 +28,6 @@ from acquisition.recordings.manifest import (
     manifest_text,
 )
 from acquisition.recordings.messages import Heads, Progress, heads_of
-from acquisition.recordings.tables import (
-    blocks_table,
-    blocks_writer,
-    foreign_errors_of,
-    samples_schema,
-    samples_writer,
-)
 from core.arrays import FloatArray, RawArray
 from core.samples.blocks import Rejection, SampleBlock
 from core.samples.calibration import UnitCalibration
@@ -81,9 +75,9 @@ class RecordingWriter:
                 f"{self._aside}: the folder exists already; delete it unless another program is"
                 " writing to it"
             )
-        with foreign_errors_of(self._aside):
+        with tables.foreign_errors_of(self._aside):
             self._aside.mkdir(parents=True)
-            self._blocks_file = blocks_writer(self._aside / BLOCKS, unit)
+            self._blocks_file = tables.blocks_writer(self._aside / BLOCKS, unit)
 
     def __enter__(self) -> Self:
         return self
@@ -132,7 +126,7 @@ class RecordingWriter:
         self._n_waiting += block.n_samples
         self._heads.append(heads)
         self._rejected += [block.rejected, *[()] * (len(heads) - 1)]
-        with foreign_errors_of(self._aside):
+        with tables.foreign_errors_of(self._aside):
             while self._n_waiting >= ROWS_PER_GROUP:
                 self._write_counts(ROWS_PER_GROUP)
             while len(self._rejected) >= BLOCKS_PER_GROUP:
@@ -146,7 +140,7 @@ class RecordingWriter:
         if not self._progress.n_blocks:
             self.abandon()
             raise ConfigError(f"{self._folder}: nothing was recorded, because no samples arrived")
-        with foreign_errors_of(self._aside):
+        with tables.foreign_errors_of(self._aside):
             self._write_counts(self._n_waiting)
             self._write_heads(len(self._rejected))
             self._close()
@@ -164,9 +158,9 @@ class RecordingWriter:
 
         Raises ConfigError if its files cannot be removed.
         """
-        with suppress(ConfigError), foreign_errors_of(self._aside):
+        with suppress(ConfigError), tables.foreign_errors_of(self._aside):
             self._close()  # writes the footer, which fails on a full disk
-        with foreign_errors_of(self._aside):
+        with tables.foreign_errors_of(self._aside):
             for name in (SAMPLES, BLOCKS, MANIFEST):
                 (self._aside / name).unlink(missing_ok=True)
             self._aside.rmdir()
@@ -192,9 +186,9 @@ class RecordingWriter:
         if n_samples == 0:
             return
         if self._samples_file is None:
-            self._samples_file = samples_writer(self._aside / SAMPLES, self.unit)
+            self._samples_file = tables.samples_writer(self._aside / SAMPLES, self.unit)
         counts: Any = np.concatenate(self._counts, axis=1)
-        schema = samples_schema(self.unit)
+        schema = tables.samples_schema(self.unit)
         self._samples_file.write_table(pa.table(list(counts[:, :n_samples]), schema=schema))
         rest = counts[:, n_samples:].copy()
         self._counts, self._n_waiting = [rest], rest.shape[1]
@@ -203,7 +197,7 @@ class RecordingWriter:
         if n_blocks == 0:
             return
         heads, rejected = np.concatenate(self._heads), self._rejected[:n_blocks]
-        self._blocks_file.write_table(blocks_table(heads[:n_blocks], rejected, self.unit))
+        self._blocks_file.write_table(tables.blocks_table(heads[:n_blocks], rejected, self.unit))
         self._heads, self._rejected = [heads[n_blocks:]], self._rejected[n_blocks:]
 
     def _close(self) -> None:

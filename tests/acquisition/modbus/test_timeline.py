@@ -15,7 +15,6 @@ from acquisition.modbus.fifo_assembly import (
     FifoPiece,
     SamplePlace,
     UncountedSamples,
-    place_records,
 )
 from acquisition.modbus.ring_profile import U32, RingLayout, Slot
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
@@ -188,25 +187,31 @@ def test_samples_that_a_queue_shows_again_are_not_taken_twice():
     assert shown_again == [None] * 10 + [SamplePlace(7, n) for n in (120, 121, 122)]
 
 
+def reading(n_samples: int, first: int = 0) -> FifoPiece:
+    return FifoPiece(first + np.arange(n_samples), np.zeros((1, n_samples), dtype=np.int16))
+
+
 def uncounted() -> UncountedSamples:
     return UncountedSamples(RATE_HZ, epochs(7), tolerance_s=0.1)
 
 
 def test_without_a_counter_samples_are_counted_here():
     samples = uncounted()
-    assert [samples.place(n) for n in (3, 2)] == [SamplePlace(7, 0), SamplePlace(7, 3)]
+    placed = [run for n in (3, 0, 2) for run in samples.runs(reading(n), 0.0)]
+    assert [(run.epoch, run.first_index) for run in placed] == [(7, 0), (7, 3)]
 
 
 def test_a_loss_shows_by_the_clock_and_nothing_is_joined_across_it():
     samples = uncounted()
     for second in range(1, 30):
-        samples.place(600)
+        samples.runs(reading(600), second)
         assert not samples.has_lost(second + 0.02 * (second % 3))
-    samples.place(600 - 72)
+    samples.runs(reading(600 - 72), 30.0)
 
     assert samples.has_lost(30.0)
     samples.begin()
-    assert samples.place(1) == SamplePlace(8, 0)
+    [run] = samples.runs(reading(1), 30.0)
+    assert (run.epoch, run.first_index) == (8, 0)
     assert not samples.has_lost(31.0)
 
 
@@ -214,7 +219,7 @@ def test_a_loss_shows_by_the_clock_and_nothing_is_joined_across_it():
 def test_a_poor_crystal_is_no_loss(drift):
     samples = uncounted()
     for second in range(1, 3600):
-        samples.place(600)
+        samples.runs(reading(600), second)
         assert not samples.has_lost(second * (1.0 + drift))
 
 
@@ -222,22 +227,17 @@ def test_a_counter_that_counts_nothing_is_refused():
     samples = CountedSamples(600.0, epochs(1), removes=True)
     counters = np.array([5000, 40_000, 12, 33_333])
     with pytest.raises(LinkError, match="the sample counter restarts"):
-        place_records(FifoPiece(counters, np.zeros((2, 4), dtype=np.int16)), samples, 0.0)
+        samples.runs(FifoPiece(counters, np.zeros((2, 4), dtype=np.int16)), 0.0)
 
 
 def test_channels_that_count_differently_are_not_put_side_by_side():
     assembly = ChannelAssembly(2, CountedSamples(600.0, epochs(1), removes=True))
-    pieces = [
-        FifoPiece(first + np.arange(4), np.zeros((1, 4), dtype=np.int16)) for first in (5000, 0)
-    ]
     with pytest.raises(LinkError, match="channels 0 and 1 are 5004 samples apart"):
-        assembly.place(pieces, 0.0)
+        assembly.place([reading(4, 5000), reading(4)], 0.0)
 
 
 def test_a_channel_that_gives_nothing_holds_the_others_back_in_bounded_memory():
     assembly = ChannelAssembly(2, CountedSamples(600.0, epochs(1), removes=True))
-    nothing = FifoPiece(np.arange(0), np.zeros((1, 0), dtype=np.int16))
     for n in range(1000):
-        piece = FifoPiece(30 * n + np.arange(30), np.zeros((1, 30), dtype=np.int16))
-        assert assembly.place([piece, nothing], n * 0.05) == []
+        assert assembly.place([reading(30, 30 * n), reading(0)], n * 0.05) == []
     assert max(map(len, assembly._waiting)) <= 1100
