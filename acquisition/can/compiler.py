@@ -49,15 +49,13 @@ class _Compiler:
         for path in settings.counters:
             self._add_counter(path, n_per_frame if settings.counter_counts == "frames" else 1)
         self._add_frame_samples()
-        for key, readers in (
-            ("counters", [part.counter for part in self._waves]),
-            ("frame_samples", [part.n_samples for part in self._waves]),
-        ):
-            if getattr(settings, key) and None in readers:
-                raise ConfigError(
-                    f"{key}: message {self._waves[readers.index(None)].message} has no signal in"
-                    f" the list; list one signal of each message with waveforms, or leave out {key}"
-                )
+        for part in self._waves:
+            for key, read in (("counters", part.counter), ("frame_samples", part.n_samples)):
+                if getattr(settings, key) and read is None:
+                    raise ConfigError(
+                        f"{key}: message {part.message} has no signal in the list; list one signal"
+                        f" of each message with waveforms, or leave out {key}"
+                    )
         if not settings.counters and rate_hz / n_per_frame > MAX_INSTANTS_PER_S:
             raise ConfigError(
                 f"counters: list the counter signals; they are required above"

@@ -17,15 +17,7 @@ from can.exceptions import error_check
 from can.interfaces.slcan import slcanBus
 from can.util import CAN_FD_DLC
 
-from acquisition.can.gate import (
-    BUS_ERROR,
-    BUS_OFF,
-    CONTROLLER,
-    PROTOCOL,
-    RX_OVERFLOW,
-    RX_PASSIVE,
-    TX_PASSIVE,
-)
+from acquisition.can import gate
 from acquisition.errors import ConfigError, FrameError
 
 _MAX_LINE = 1 + 8 + 1 + 2 * 64
@@ -37,7 +29,14 @@ _FRAMES = b"tTrRdDbB"
 _ANSWERS = b"zZVvNF"
 """First letters of an adapter's replies to commands."""
 
-_STATES = {b"a": None, b"w": None, b"p": RX_PASSIVE | TX_PASSIVE, b"b": 0}
+_STATES = {
+    b"a": (0, 0),
+    b"w": (0, 0),
+    b"p": (gate.CONTROLLER, gate.RX_PASSIVE | gate.TX_PASSIVE),
+    b"b": (gate.BUS_OFF, 0),
+}
+"""Bits of the error frame of each status (active, warning, passive, bus-off), and the state of the
+controller in it; no frame without bits."""
 
 
 class SlcanBus(slcanBus):
@@ -164,17 +163,16 @@ def _state(line: bytes) -> Message | None:
     if not line or kind in _ANSWERS:
         return None
     if kind == b"s" and what in _STATES and len(line) == _STATE_LINE and line[2:].isdigit():
-        if what == b"b":
-            return _error(BUS_OFF, b"")
-        passive = _STATES[what]
-        return _error(CONTROLLER, bytes([0, passive])) if passive else None
+        bits, state = _STATES[what]
+        return _error(bits, state) if bits else None
     if kind == b"e" and what.isdigit() and len(line) == 2 + int(what):
-        overflow = RX_OVERFLOW if b"o" in line[2:] else 0
-        return _error(PROTOCOL | BUS_ERROR | (CONTROLLER if overflow else 0), bytes([0, overflow]))
+        bits = gate.PROTOCOL | gate.BUS_ERROR
+        if b"o" in line[2:]:
+            return _error(bits | gate.CONTROLLER, gate.RX_OVERFLOW)
+        return _error(bits, 0)
     raise FrameError("malformed slcan line")
 
 
-def _error(bits: int, data: bytes) -> Message:
-    return Message(
-        arbitration_id=bits, is_extended_id=False, is_error_frame=True, data=data.ljust(8, b"\0")
-    )
+def _error(bits: int, state: int) -> Message:
+    data = bytes([0, state]).ljust(8, b"\0")
+    return Message(arbitration_id=bits, is_extended_id=False, is_error_frame=True, data=data)

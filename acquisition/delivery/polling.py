@@ -79,11 +79,11 @@ class Freshness:
     what
         Name of the value for messages; example: "the heartbeat".
     stale_after_s
-        Longest accepted time without a change of the value.
+        Longest accepted time without a change of the value; the attribute of this name may be set.
     """
 
     def __init__(self, what: str, stale_after_s: float) -> None:
-        self._what, self._stale_after_s = what, stale_after_s
+        self._what, self.stale_after_s = what, stale_after_s
         self._seen: bytes | None = None
         self._since_s = 0.0
         self._stood_still = False
@@ -102,9 +102,9 @@ class Freshness:
             self._seen, self._since_s, self._stood_still = alive, now_s, False
             return
         standing_s = now_s - self._since_s
-        if standing_s > self._stale_after_s:
+        if standing_s > self.stale_after_s:
             self._stood_still = True
             raise LinkError(
                 f"the device replies, but {self._what} has not changed for {standing_s:.1f} s;"
-                f" at most {self._stale_after_s:g} s are accepted"
+                f" at most {self.stale_after_s:g} s are accepted"
             )

@@ -83,8 +83,8 @@ class ReplyProtocol(asyncio.Protocol):
         FrameError
             If the received bytes are not the next reply, or arrived before any request.
         """
-        transport, self.n_in_flight = self._transport, 0
-        if transport is None or transport.is_closing():
+        self.n_in_flight = 0
+        if not self.is_open:
             raise LinkError(f"{self._where}: {CLOSED}")
         if self.unsolicited:
             raise FrameError(f"{self._where}: {self.unsolicited}")

@@ -46,9 +46,9 @@ _CONFIG_EXCEPTIONS = (1, 2, 3)
 
 _MAX_BITS_PER_READ = 2000
 _EXCEPTION_BYTES = 2
-_MEI = 0x0E
-_READ_BASIC = 1
-_READ_CODES = (_READ_BASIC, 2, 3, 4)
+_READ_BASIC = bytes((0x0E, 1))
+"""MEI type and read code of a request for the basic identification."""
+
 _IDENTIFICATION_HEAD = struct.Struct(">7B")
 FIFO_HEAD = struct.Struct(">BHH")
 """Function code, byte count and number of registers of a FIFO reply, before the registers."""
@@ -111,9 +111,7 @@ class ReadRequest:
     def __post_init__(self) -> None:
         function = self.pdu[0]
         # function 43 also has other services
-        is_other_service = function == READ_IDENTIFICATION and (
-            len(self.pdu) < 3 or self.pdu[1] != _MEI or self.pdu[2] not in _READ_CODES
-        )
+        is_other_service = function == READ_IDENTIFICATION and self.pdu[1:3] != _READ_BASIC
         if function not in READ_FUNCTIONS or is_other_service:
             raise ConfigError(
                 f"Modbus function must be one of {READ_FUNCTIONS}, which only read, got {function}"
@@ -213,7 +211,7 @@ def fifo_request(address: int) -> ReadRequest:
 
 def identification_request(first_object: int = 0) -> ReadRequest:
     """Return the request for the basic identification (43/14) from object `first_object` on."""
-    return ReadRequest(bytes((READ_IDENTIFICATION, _MEI, _READ_BASIC, first_object)))
+    return ReadRequest(bytes((READ_IDENTIFICATION, *_READ_BASIC, first_object)))
 
 
 def identification_objects(reply: bytes) -> tuple[dict[int, bytes], int | None]:

@@ -115,11 +115,6 @@ class RingFollower:
     def __init__(self, reader: RingReader, calibration: UnitCalibration, begun_ns: int) -> None:
         self._reader, self._client = reader, reader.client
         self._calibration = calibration
-        self._expected = {
-            "n_channels": len(calibration.channels),
-            "rate in mHz": round(calibration.rate_hz * 1000.0),
-            "n_slow": len(calibration.slow),
-        }
         self._header: RingHeader | None = None
         self._asked_s, self._max_read_s = 0.0, _MAX_READ_S
         self._timeline: Timeline
@@ -133,9 +128,12 @@ class RingFollower:
 
     def _required(self, header: RingHeader) -> RingHeader:
         """Return a header; raise ConfigError if its channels or rate are not those calibrated."""
-        ring = header.layout
-        found = (ring.n_channels, ring.rate_mhz, ring.n_slow)
-        for (name, expected), value in zip(self._expected.items(), found, strict=True):
+        ring, own = header.layout, self._calibration
+        for name, value, expected in (
+            ("n_channels", ring.n_channels, len(own.channels)),
+            ("rate in mHz", ring.rate_mhz, round(own.rate_hz * 1000.0)),
+            ("n_slow", ring.n_slow, len(own.slow)),
+        ):
             if value != expected:
                 raise ConfigError(
                     f"{self._client.where}: block ring: {name} of the device is {value},"

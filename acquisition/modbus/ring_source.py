@@ -55,7 +55,7 @@ class RingSource:
         self._clock = clock
         reader = RingReader(self._client, settings.base_address, settings.function)
         self._follower = RingFollower(reader, calibration, begun_ns=clock.now_ns())
-        self._freshness: Freshness | None = None
+        self._freshness = Freshness("the newest usable slot", settings.stale_after_s)
         self._n_blocks = 0
 
     @asynccontextmanager
@@ -64,18 +64,15 @@ class RingSource:
         async with self._client.connected():
             layout = (await self._follower.header()).layout
             slot_s, ring_s = layout.slot_duration_s, layout.n_slots * layout.slot_duration_s
-            if self._freshness is None:
-                stale_after_s = max(self._settings.stale_after_s, _MIN_STALE_SLOTS * slot_s)
-                self._freshness = Freshness("the newest usable slot", stale_after_s)
+            stale_after_s = max(self._settings.stale_after_s, _MIN_STALE_SLOTS * slot_s)
+            self._freshness.stale_after_s = stale_after_s
             self._freshness.opened(self._clock.monotonic_s())
             longest_s = min(self._settings.poll_period_s, ring_s / _MIN_POLLS_PER_RING)
             period_s = incommensurate_period_s(longest_s, slot_s)
-            async with aclosing(self._blocks(period_s, slot_s, self._freshness)) as blocks:
+            async with aclosing(self._blocks(period_s, slot_s)) as blocks:
                 yield blocks
 
-    async def _blocks(
-        self, period_s: float, slot_s: float, freshness: Freshness
-    ) -> AsyncGenerator[SampleBlock, None]:
+    async def _blocks(self, period_s: float, slot_s: float) -> AsyncGenerator[SampleBlock, None]:
         due_s = self._clock.monotonic_s()
         while True:
             begun_s = self._clock.monotonic_s()
@@ -87,7 +84,7 @@ class RingSource:
                 yield block
             self._n_blocks += len(found)
             now_s = self._clock.monotonic_s()
-            freshness.note(str(self._n_blocks).encode(), now_s)
+            self._freshness.note(str(self._n_blocks).encode(), now_s)
             if not n_waiting or not found:
                 due_s = max(due_s + period_s, now_s)  # missed polls are skipped
                 await self._clock.sleep(due_s - now_s)
