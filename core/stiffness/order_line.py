@@ -34,13 +34,14 @@ from core.stiffness.channel_budget import (
 )
 from core.stiffness.evidence import chance_coherence, line_excitation
 from core.stiffness.stiffness_budget import (
+    COHERENCE,
+    SPREAD,
     changed_polls,
-    effective_stiffness_n_per_m,
-    polls_ratio_budget,
     ratio_budget,
+    ratio_lines,
     transfer_budgets,
 )
-from core.uncertainty import Budgeted, effective_number
+from core.uncertainty import Budget, Budgeted, effective_number, random_line
 
 FLOOR_REACH = 12
 """Number of bins to each side of a line from which its noise floor is computed."""
@@ -264,28 +265,42 @@ class OrderLine:
 
     def _ratio(self, shaft: int, bearing: int, quality: Quality, n_segments: float) -> Budgeted:
         bracket, accuracy = self.bearing.bracket, self.bearing.accuracy
-        runout_um_pk = self._runout_um_pk(shaft)
-        if self.bins is not None:
+        if self.bins is None:
+            budget = self._polled_ratio(shaft, bearing, n_segments)
+        else:
+            runout_um_pk = self._runout_um_pk(shaft)
             budget = ratio_budget(
                 self.orders, self.at, shaft, bearing, bracket, accuracy, n_segments, runout_um_pk
-            )
-        else:
-            known = self._phased.coherence_at(self.at, shaft, bearing)
-            budget = polls_ratio_budget(
-                *self._common(shaft, bearing),
-                self.frequency_hz,
-                bracket,
-                accuracy,
-                max(self.settings.min_coherence, known),
-                n_segments,
-                runout_um_pk,
-                self._across(shaft),
             )
         if budget is not None:
             return Reading(budget.value, quality), budget
         ratio = float(self.orders.amplitude_ratio(bearing, shaft)[self.at])
-        k_eff = effective_stiffness_n_per_m(ratio, 1.0, self.bearing.bracket.stiffness_n_per_m)
-        return Reading(k_eff, quality), None
+        return Reading(ratio * bracket.stiffness_n_per_m, quality), None
+
+    def _polled_ratio(self, shaft: int, bearing: int, n_effective: float) -> Budget | None:
+        """Return the stiffness by equation (5) over polls; None with fewer than two independent.
+
+        A rack may be polled faster than it measures, or average over several poll periods. The
+        scatter of the polls is therefore divided by the root of their effective number.
+        """
+        if n_effective < 2.0:
+            return None
+        bracket, (u, v) = self.bearing.bracket, self._common(shaft, bearing)
+        shaft_um_pk = float(np.sqrt(np.mean(u**2)))
+        value = float(np.sqrt(np.mean(v**2))) / shaft_um_pk * bracket.stiffness_n_per_m
+        random = float(np.std(v / u * bracket.stiffness_n_per_m, ddof=1)) / math.sqrt(n_effective)
+        # without phases, the coherence is at least the smallest accepted one
+        known = self._phased.coherence_at(self.at, shaft, bearing)
+        lines = ratio_lines(
+            value,
+            self.frequency_hz,
+            bracket,
+            self.bearing.accuracy,
+            (self._runout_um_pk(shaft), shaft_um_pk),
+            self._across(shaft),
+            (COHERENCE, max(self.settings.min_coherence, known)),
+        )
+        return Budget(value, (random_line(SPREAD, random, n_effective - 1.0), *lines))
 
     def _transfer(
         self, shaft: int, bearing: int, quality: Quality, n_segments: float, few: bool

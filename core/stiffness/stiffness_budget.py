@@ -103,7 +103,7 @@ def ratio_budget(
     value = float(spectrum.amplitude_ratio(bearing, shaft)[line]) * bracket.stiffness_n_per_m
     # two powers of n segments, correlated by γ²: Bendat and Piersol, 9.1
     random = value * math.sqrt((1.0 - coherence) / (2.0 * (counted - 1.0)))
-    lines = _ratio_lines(
+    lines = ratio_lines(
         value,
         float(spectrum.frequency_hz[line]),
         bracket,
@@ -115,55 +115,7 @@ def ratio_budget(
     return Budget(value, (random_line(STATISTICS, random, 2.0 * (counted - 1.0)), *lines))
 
 
-def polls_ratio_budget(
-    shaft_um_pk: FloatArray,
-    bearing_um_pk: FloatArray,
-    frequency_hz: float,
-    bracket: BracketDynamics,
-    accuracy: BearingAccuracy,
-    coherence: float,
-    n_effective: float,
-    runout_um_pk: float = 0.0,
-    across: float = 1.0,
-) -> Budget | None:
-    """Return the stiffness by equation (5) over the polls of a rack, with its uncertainty budget.
-
-    A rack may be polled faster than it measures, or average over several poll periods. The scatter
-    of the polls is therefore divided by the root of their effective number.
-
-    Parameters
-    ----------
-    shaft_um_pk, bearing_um_pk : (n_polls,)
-        Amplitudes of the same polls; shaft amplitudes are positive.
-    frequency_hz, bracket, accuracy
-        Frequency of the line, bracket, and accuracy of its properties and of the transducers.
-    coherence
-        Squared coherence of shaft and bearing; if it is unknown, the smallest accepted one.
-    n_effective
-        Effective number of independent polls.
-    runout_um_pk
-        Largest shaft runout contained in this line; zero off the harmonics of the running speed.
-    across
-        Ratio of the transverse shaft amplitude to the amplitude in this direction.
-
-    Returns
-    -------
-    The budget; None with fewer than two independent polls.
-    """
-    if n_effective < 2.0:
-        return None
-    shaft = float(np.sqrt(np.mean(shaft_um_pk**2)))
-    value = float(np.sqrt(np.mean(bearing_um_pk**2))) / shaft * bracket.stiffness_n_per_m
-    each = bearing_um_pk / shaft_um_pk * bracket.stiffness_n_per_m
-    random = float(np.std(each, ddof=1)) / math.sqrt(n_effective)
-    known = (COHERENCE, coherence)
-    lines = _ratio_lines(
-        value, frequency_hz, bracket, accuracy, (runout_um_pk, shaft), across, known
-    )
-    return Budget(value, (random_line(SPREAD, random, n_effective - 1.0), *lines))
-
-
-def _ratio_lines(
+def ratio_lines(
     value: float,
     frequency_hz: float,
     bracket: BracketDynamics,
@@ -172,10 +124,18 @@ def _ratio_lines(
     across: float,
     coherence: tuple[str, float],
 ) -> tuple[BudgetLine, ...]:
-    """Return the systematic contributions to equation (5).
+    """Return the systematic contributions to a stiffness `value` by equation (5).
 
-    `runout_of_um_pk` holds the runout and the shaft's amplitude; `coherence` holds the name of the
-    budget line for incoherence and the squared coherence.
+    Parameters
+    ----------
+    frequency_hz, bracket, accuracy
+        Frequency of the line, bracket, and accuracy of its properties and of the transducers.
+    runout_of_um_pk
+        Runout and amplitude of the shaft.
+    across
+        Ratio of the transverse shaft amplitude to the amplitude in this direction.
+    coherence
+        Name of the budget line for incoherence, and the squared coherence.
     """
     runout_um_pk, shaft_um_pk = runout_of_um_pk
     inertia = bracket.max_mass_kg * (2.0 * math.pi * frequency_hz) ** 2 / bracket.stiffness_n_per_m
