@@ -63,8 +63,6 @@ class Deviations:
 
     Parameters
     ----------
-    is_known : (n,)
-        Whether all conditions that the baseline depends on are known.
     place : (n,)
         Index of the reading's cell in the cell table; -1 if the reading cannot be compared.
     deviation : (n,)
@@ -73,24 +71,19 @@ class Deviations:
         Typical variance of readings divided by the variance of this reading, at most 1.
     scatter : (n,)
         Part of the scatter of readings in the cell that averaging reduces.
-    lasting : (n,)
-        Part of the scatter of readings in the cell that averaging does not reduce.
     surface_std : (n,)
         Standard uncertainty of the surface at the reading.
+    offset_std : (n,)
+        Part of the deviation's standard uncertainty that averaging does not reduce, with that of
+        the surface.
     """
 
-    is_known: BoolArray
     place: IntArray
     deviation: FloatArray
     weight: FloatArray
     scatter: FloatArray
-    lasting: FloatArray
     surface_std: FloatArray
-
-    @property
-    def offset_std(self) -> FloatArray:
-        """Part of the deviations' standard uncertainty that averaging does not reduce (n,)."""
-        return np.asarray(np.sqrt(self.surface_std**2 + self.lasting**2))
+    offset_std: FloatArray
 
 
 @dataclass(frozen=True)
@@ -162,11 +155,10 @@ class QuantityBaseline:
 
         `value` is ln of the stiffness; `u_random` is its random standard uncertainty.
         """
-        is_known = self.is_known(conditions)
         place = self.table.find(self.grid.cells(conditions))
-        place = np.where(is_known & np.isfinite(value), place, -1)
+        place = np.where(self.is_known(conditions) & np.isfinite(value), place, -1)
         n = place.size
-        found = Deviations(is_known, place, np.full(n, np.nan), *np.zeros((4, n)))
+        found = Deviations(place, np.full(n, np.nan), *np.zeros((4, n)))
         rows = np.flatnonzero(place >= 0)
         if rows.size:
             cell = place[rows]
@@ -175,9 +167,10 @@ class QuantityBaseline:
             found.deviation[rows] = value[rows] - self.surface.at(conditions.rows(rows))
             found.weight[rows] = np.minimum(1.0, self.scatter**2 / variance)
             found.scatter[rows] = self.table.passing[cell]
-            found.lasting[rows] = self.table.lasting[cell]
-            found.surface_std[rows] = self._surface_std(conditions.rows(rows), cell)
-            place[rows[found.surface_std[rows] > self.max_surface_std]] = -1
+            std = self._surface_std(conditions.rows(rows), cell)
+            found.surface_std[rows] = std
+            found.offset_std[rows] = np.sqrt(std**2 + self.table.lasting[cell] ** 2)
+            place[rows[std > self.max_surface_std]] = -1
         return found
 
     def compare_history(self, history: StiffnessHistory) -> Deviations:

@@ -66,7 +66,7 @@ def outcomes(
     else:
         found = baseline.compare(conditions, value, u_random)
         unusable[found.place < 0] = Verdict.NO_BASELINE
-        unusable[~found.is_known] = Verdict.BAD_QUALITY
+        unusable[~baseline.is_known(conditions)] = Verdict.BAD_QUALITY
         columns = (found.deviation, found.weight, found.scatter, found.offset_std)
     unusable[np.isnan(value)] = Verdict.BAD_QUALITY
     for code, verdict in WITHOUT_NUMBER.items():

@@ -142,7 +142,7 @@ NO_LINE = np.ones(FREQUENCY_HZ.size)
 
 
 def speed(unit: Unit, slow: Reading, pulses_rpm: float | None) -> Speed:
-    key_phase = None if pulses_rpm is None else KeyPhase(1.0, pulses_rpm)
+    key_phase = None if pulses_rpm is None else KeyPhase(1.0, pulses_rpm, 1e-5, 20)
     with_pulses = replace(unit, key_phase="kp")
     settings = AnalysisSettings()
     return running_speed(with_pulses, {"speed": slow}, FREQUENCY_HZ, NO_LINE, settings, key_phase)

@@ -145,7 +145,7 @@ def of_one_channel(
     """The phasor of the x probe without runout, and the verdict on its vector."""
     channel = replace(unit.channels[0], probe=probe, slow_roll=vector)
     there = replace(unit, rated_speed_rpm=92.3, channels=(channel, *unit.channels[1:]))
-    key_phase = None if angle_rad is None else KeyPhase(angle_rad, 92.3)
+    key_phase = None if angle_rad is None else KeyPhase(angle_rad, 92.3, 1e-5, 20)
     found, verdicts = without_runout(np.array([read]), there, [0], UNDOUBTED, key_phase)
     return complex(found[0]), verdicts[channel.id]
 
@@ -179,7 +179,7 @@ def test_a_useless_vector_is_left_out_and_named(unit, vector, probe, angle_rad, 
 
 PHASORS = np.array([30.0 + 10.0j, 20.0j, 5.0 + 0.0j, 5.0j])
 SURFACE = 8.0 * np.exp(0.5j)
-KEY_PHASE = KeyPhase(shaft_angle_rad=1.2, speed_rpm=92.3)
+KEY_PHASE = KeyPhase(1.2, 92.3, 1e-5, 20)
 
 
 @pytest.fixture
