@@ -70,8 +70,7 @@ def quietest_rms(samples: FloatArray) -> FloatArray:
     length = n_samples // N_PIECES
     # aligned to the end, so that the newest sample is always included
     pieces = samples[:, n_samples - N_PIECES * length :].reshape(n_channels, N_PIECES, length)
-    quietest: FloatArray = pieces.std(axis=2, dtype=np.float64).min(axis=1)
-    return quietest
+    return np.asarray(pieces.std(axis=2, dtype=np.float64).min(axis=1))
 
 
 def signal_quality(

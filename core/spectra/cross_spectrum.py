@@ -38,8 +38,7 @@ class CrossSpectrum:
 
     def amplitude_um_pk(self, channel: int) -> FloatArray:
         """Return the rms over the segments of a channel's amplitudes in µm 0-pk, (n_lines,)."""
-        amplitude: FloatArray = np.sqrt(self.power[:, channel, channel])
-        return amplitude
+        return np.asarray(np.sqrt(self.power[:, channel, channel]))
 
     def rotating_um_pk(self, x: int, y: int) -> FloatArray:
         """Return the amplitudes of motion from x to y and from y to x in µm 0-pk, (2, n_lines).
@@ -60,8 +59,7 @@ class CrossSpectrum:
         ratio = np.divide(
             self.power[:, numerator, denominator], below, out=np.zeros_like(below), where=below > 0
         )
-        root: FloatArray = np.sqrt(ratio)
-        return root
+        return np.asarray(np.sqrt(ratio))
 
     def coherence(self, first: int, second: int) -> FloatArray:
         """Return the squared coherence of two channels, given by index, (n_lines,).

@@ -97,8 +97,7 @@ def bin_phasors(tapered_samples: FloatArray, n_lines: int) -> ComplexArray:
     """
     from scipy import fft  # slow import, not needed by a process without spectra
 
-    phasors: ComplexArray = fft.rfft(tapered_samples, axis=1)[:, 1 : n_lines + 1]
-    return phasors
+    return np.asarray(fft.rfft(tapered_samples, axis=1)[:, 1 : n_lines + 1])
 
 
 def turning_factors(n_samples: int, rate_hz: float, frequency_hz: FloatArray) -> ComplexArray:
@@ -134,8 +133,7 @@ def part_phasors(samples: FloatArray, factors: ComplexArray) -> ComplexArray:
     """
     weighted = factors * taper_weights(samples.shape[1])[:, np.newaxis]
     of_mean = samples.mean(axis=1, keepdims=True) * weighted.sum(axis=0)
-    phasors: ComplexArray = line_phasors(samples, weighted) - of_mean
-    return phasors
+    return np.asarray(line_phasors(samples, weighted) - of_mean)
 
 
 def peak_frequency_hz(

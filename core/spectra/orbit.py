@@ -73,8 +73,7 @@ def order_phasors(trace_um: FloatArray, rate_hz: float, frequency_hz: float) -> 
 def trace_of(phasors: ComplexArray, rate_hz: float, frequency_hz: float) -> FloatArray:
     """Return the filtered displacement (n_samples,), µm, from the phasors of `order_phasors`."""
     angle = 2.0 * math.pi * frequency_hz / rate_hz * np.arange(phasors.size)
-    trace: FloatArray = (phasors * np.exp(1.0j * angle)).real
-    return trace
+    return np.asarray((phasors * np.exp(1.0j * angle)).real)
 
 
 def ellipse_of(x: complex, y: complex) -> Ellipse:

@@ -68,8 +68,8 @@ class KeyPhase:
 
     shaft_angle_rad: float
     speed_rpm: float
-    u_relative: float = 0.0
-    n_pulses: int = 0
+    u_relative: float
+    n_pulses: int
 
 
 @dataclass(frozen=True)
@@ -176,13 +176,11 @@ def _budget(
     """Return the uncertainty budget of a speed measured by key-phase or speed channel.
 
     The uncertainty of a speed channel follows from its agreement with the 1× line, if available.
-    None if the speed is not good, or if the key-phase has no stated uncertainty.
+    None if the speed is not good.
     """
     if speed.value is None or speed.quality != GOOD:
         return None
     if pulses is not None:
-        if not pulses.u_relative > 0.0:
-            return None
         std_rpm = speed.value * pulses.u_relative
         return Budget(speed.value, (random_line("key-phase", std_rpm, pulses.n_pulses - 2.0),))
     tolerance = KEY_PHASE_TOLERANCE
@@ -258,8 +256,7 @@ def rising_edges(signal: FloatArray) -> FloatArray:
     begins = clear[1:][is_high[1:] & ~is_high[:-1]]
     under: npt.NDArray[np.intp] = np.flatnonzero(signal <= middle)
     last = under[np.searchsorted(under, begins) - 1]
-    edges: FloatArray = last + (middle - signal[last]) / (signal[last + 1] - signal[last])
-    return edges
+    return np.asarray(last + (middle - signal[last]) / (signal[last + 1] - signal[last]))
 
 
 def _has_odd_turn(edges: FloatArray, n_samples: int) -> bool:

@@ -110,8 +110,7 @@ def between_harmonics(
     # harmonic n guards a line f if n · lowest - guard <= f <= n · highest + guard
     last = np.floor((frequency_hz + guard_hz) / lowest)
     first = np.maximum(np.ceil((frequency_hz - guard_hz) / highest), 1.0)
-    clear: BoolArray = first > last
-    return clear
+    return np.asarray(first > last)
 
 
 def little_leakage(shaft_power: FloatArray, lines: slice = slice(None)) -> BoolArray:
@@ -128,8 +127,7 @@ def little_leakage(shaft_power: FloatArray, lines: slice = slice(None)) -> BoolA
     (n, n_channels)
     """
     leaked = leakage_kernel(shaft_power.shape[0])[lines] @ shaft_power
-    little: BoolArray = leaked <= MAX_LEAKAGE * shaft_power[lines]
-    return little
+    return np.asarray(leaked <= MAX_LEAKAGE * shaft_power[lines])
 
 
 def conditional_power(matrix: ComplexArray, given: ComplexArray, cross: ComplexArray) -> FloatArray:
@@ -164,8 +162,7 @@ def conditional_power(matrix: ComplexArray, given: ComplexArray, cross: ComplexA
 
 def own_power(matrix: ComplexArray) -> FloatArray:
     """Return the power of each channel (..., n, n_lines) of cross-spectra (..., n, n, n_lines)."""
-    power: FloatArray = np.einsum("...iil->...il", matrix).real
-    return power
+    return np.asarray(np.einsum("...iil->...il", matrix).real)
 
 
 def probe_noise_power(

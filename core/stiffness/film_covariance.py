@@ -89,8 +89,7 @@ class FilmFits(FittedFilms):
         shared = 2.0 * moves * whole * self.residual / self.inputs.force_power
         squares = (moves**2 + whole**2 - shared).sum(axis=-1)
         variance = CORRELATED_LINES * squares / (self.inputs.n_segments - 2.0)  # two fitted inputs
-        found: FloatArray = 1.0 + 2.0 * self.coherence / variance
-        return found
+        return np.asarray(1.0 + 2.0 * self.coherence / variance)
 
     @property
     def lack_of_fit(self) -> FloatArray:
@@ -105,8 +104,7 @@ class FilmFits(FittedFilms):
         own = np.abs(x) ** 2 * yy + np.abs(y) ** 2 * xx - 2.0 * (x.conj() * yx * y).real
         power = own / (xx * yy - np.abs(yx) ** 2)
         whole = _summed(self.weight, self.residual)
-        found: FloatArray = self.inputs.n_segments * _summed(self.weight, power) / (2.0 * whole)
-        return found
+        return np.asarray(self.inputs.n_segments * _summed(self.weight, power) / (2.0 * whole))
 
     @cached_property
     def per_change(self) -> FloatArray:
@@ -349,8 +347,7 @@ class FilmFits(FittedFilms):
 
 def _summed(weight: FloatArray, values: FloatArray) -> FloatArray:
     """Return the sum over the lines of weighted values, (n, 2)."""
-    total: FloatArray = np.einsum("nrl,nrl->nr", weight, values)
-    return total
+    return np.asarray(np.einsum("nrl,nrl->nr", weight, values))
 
 
 def _inverse(information: FloatArray) -> tuple[FloatArray, BoolArray]:

@@ -156,8 +156,7 @@ class FilmLines:
 
     def smoothed(self, power: FloatArray) -> FloatArray:
         """Return power spectra (n, n_spectra, n_used), smoothed by regression of the logarithm."""
-        smooth: FloatArray = np.exp(np.log(power) @ self.smoothing)
-        return smooth
+        return np.asarray(np.exp(np.log(power) @ self.smoothing))
 
 
 class FilmTerms:

@@ -109,15 +109,13 @@ class FilmInputs:
     @cached_property
     def force(self) -> ComplexArray:
         """Cross-spectra of the brackets' forces with the shaft's motion, (n, 2, 2, n_used)."""
-        force: ComplexArray = self.bracket_n_per_m[:, np.newaxis, np.newaxis] * self.lines.cross
-        return force
+        return np.asarray(self.bracket_n_per_m[:, np.newaxis, np.newaxis] * self.lines.cross)
 
     @cached_property
     def force_power(self) -> FloatArray:
         """Power of the brackets' forces in (N/m)² µm², for each row, (n, 2, n_used)."""
         squared = self.bracket_n_per_m.real**2 + self.bracket_n_per_m.imag**2
-        power: FloatArray = squared[:, np.newaxis] * self.lines.bearing_power
-        return power
+        return np.asarray(squared[:, np.newaxis] * self.lines.bearing_power)
 
     @cached_property
     def smooth_force_power(self) -> FloatArray:
@@ -189,8 +187,7 @@ class FittedFilms:
     @cached_property
     def gram(self) -> FloatArray:
         """Weighted products of the terms of each row, (n, 2, 7, 7)."""
-        product: FloatArray = self._of_terms.swapaxes(2, 3) @ self.weighted.normal @ self._of_terms
-        return product
+        return np.asarray(self._of_terms.swapaxes(2, 3) @ self.weighted.normal @ self._of_terms)
 
     @cached_property
     def solved(self) -> FloatArray:
