@@ -266,7 +266,7 @@ def _transform(
     unit: Unit, settings: AnalysisSettings, blocks: Iterator[SampleBlock]
 ) -> SegmentTransform:
     transform = SegmentTransform(unit, settings)
-    ring = Ring(len(unit.channels), 2 * settings.segment_samples)
+    ring = Ring(2 * settings.segment_samples)
     start = 0
     for block in blocks:
         ring.write(block)
