@@ -33,7 +33,7 @@ from service.measuring.live_view import LiveView
 from service.measuring.metrics import add_disks, add_integrity, add_samples, add_store
 from service.measuring.recorder import Recorder
 from service.measuring.service_alarms import ServiceHealth
-from service.measuring.snapshots import SnapshotBuilder
+from service.measuring.snapshots import Reports, SnapshotBuilder
 from service.notifications.message import LiveContext
 from service.notifications.metrics import add_deliveries
 from service.notifications.sender import Deliveries
@@ -204,7 +204,7 @@ class Analysis:
         """
         name = f"{socket.gethostname()}:{os.getpid()}:{uuid4().hex[:12]}"
         store, clock = self.process.store, self.process.clock
-        reporter = Reporter(name, held, self.snapshots, store.unit_states, clock)
+        reporter = Reporter(Reports(name, held, self.snapshots), store.unit_states, clock)
         commands = CommandWorker(name, held, self.executor, store, clock)
         return {"report": reporter.run, "commands": commands.run}
 

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Mapping
 from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field
 from functools import partial
 
 from core.alarms.alarm import PLANT
@@ -22,7 +23,6 @@ from service.measuring.acquirer import Acquirer
 from service.measuring.live_view import LiveView
 from service.measuring.sources import WatchedUnit
 from service.runtime.heartbeats import Heartbeats, Loop
-from service.runtime.listening import url_of
 from service.runtime.metrics import MEASURED, Families
 from service.runtime.periodic import periodic
 from service.settings.core_values import stale_after_s
@@ -54,9 +54,8 @@ async def run_acquire(
             await asyncio.wait_for(publisher.waiting.drained(), DRAIN_S)
 
     parts = (lambda: {"stream": publisher.trouble}, partial(add_publisher, publisher=publisher))
-    health = HealthServer(host.listener, beats, live.status, units, *parts)
     supervision = Supervision(host, beats, live.status, units)
-    supervision.announce(url_of(host.listener))
+    health = HealthServer(supervision, *parts)
     loops = {"publish": publisher.run, "health": health.run}
     await supervision.run_until_stopped(loops, acquirer.run, drain)
 
@@ -98,31 +97,27 @@ async def run_analyse(
         process = stack.enter_context(process_context(part, Origin.LIVE, host.clock))
         analysing = Analysing(plant, partition, settings, monitors, process)
         parts = (analysing.checks, analysing.add_metrics, analysing.shown)
-        status = process.live.status
-        health = HealthServer(host.listener, process.beats, status, monitors, *parts)
-        supervision = Supervision(host, process.beats, status, monitors)
-        supervision.announce(url_of(host.listener))
+        supervision = Supervision(host, process.beats, process.live.status, monitors)
+        health = HealthServer(supervision, *parts)
         try:
             await supervision.run_until_stopped({"health": health.run}, analysing.run)
         finally:
             await analysing.close()
 
 
+@dataclass
 class Analysing:
     """Analysis of the units of a partition, from standby to stop."""
 
-    def __init__(
-        self,
-        plant: PlantFile,
-        partition: Partition,
-        settings: StreamSettings,
-        monitors: Mapping[str, UnitMonitor],
-        process: ProcessContext,
-    ) -> None:
-        self._share, self._settings = partition.share_of(plant), settings
-        self._monitors, self._process, self._plant = monitors, process, plant
-        self._holds = Holds(process.store, monitors, process.clock)
-        self._analysis: Analysis | None = None
+    plant: PlantFile
+    partition: Partition
+    settings: StreamSettings
+    monitors: Mapping[str, UnitMonitor]
+    process: ProcessContext
+    _analysis: Analysis | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        self._holds = Holds(self.process.store, self.monitors, self.process.clock)
 
     async def close(self) -> None:
         """Write all pending data, then release the units to other processes."""
@@ -132,12 +127,12 @@ class Analysing:
 
     async def run(self) -> None:
         """Wait for the locks of the units of this process, then analyse until cancelled."""
-        process, monitors = self._process, self._monitors
+        process, monitors, share = self.process, self.monitors, self.partition.share_of(self.plant)
         store, clock = process.store, process.clock
         await self._holds.take()
         stored = {unit: await asyncio.to_thread(store.position, unit) for unit in monitors}
         memories = memories_of(found for found in stored.values() if found is not None)
-        analysis = Analysis(process, monitors, self._share)
+        analysis = Analysis(process, monitors, share)
         await analysis.start(memories)
         self._analysis = analysis
 
@@ -148,16 +143,16 @@ class Analysing:
             for unit in process.plant.unit:
                 reach = await asyncio.to_thread(store.reach, unit.id)
                 position = usable(stored[unit.id], stream, newest)
-                identity, memory = identity_of(self._plant, unit), memories.get(unit.id)
+                identity, memory = identity_of(self.plant, unit), memories.get(unit.id)
                 done = reach if position is None else None
                 progress[unit.id] = UnitProgress(identity, stream, position, memory, *parts, done)
             return progress
 
-        consumer = Consumer(self._plant, self._settings, begin, analysis.recorder, clock)
+        consumer = Consumer(self.plant, self.settings, begin, analysis.recorder, clock)
         analysis.stream = consumer
-        everywhere = [unit.id for unit in self._plant.unit]
+        everywhere = [unit.id for unit in self.plant.unit]
         silent = SilentUnits(everywhere, analysis.alarms, store, clock)
-        after_s = silences_s(process.plant.unit, self._settings.silent_after_s)
+        after_s = silences_s(process.plant.unit, self.settings.silent_after_s)
         silence = SilenceWatch(after_s, analysis.analyser, process.live, clock)
 
         async def watch() -> None:
@@ -167,7 +162,7 @@ class Analysing:
 
         def held() -> list[str]:
             """Return the units and shared parts whose state this process publishes now."""
-            service = [PLANT] if self._share.leads else []
+            service = [PLANT] if share.leads else []
             return [*monitors, *service, *([SHARED] if silent.is_watching else [])]
 
         shared = {**analysis.shared_loops, "silent units": silent.run}
@@ -189,13 +184,13 @@ class Analysing:
         stream = self._analysis and self._analysis.stream
         return {
             "units": None if waits_for is None else f"standing by: {waits_for}",
-            "store": self._process.live.store_error,
+            "store": self.process.live.store_error,
             "stream": stream.trouble if stream else "not begun",
         }
 
     def shown(self) -> dict[str, str]:
         """Return conditions of this host; only the leading process raises alarms about them."""
-        shown = {"database": self._process.store.kind}
+        shown = {"database": self.process.store.kind}
         if (parts := self._analysis) is not None:
             shown |= {
                 "disk": str(parts.space),
@@ -207,7 +202,7 @@ class Analysing:
 
     def add_metrics(self, families: Families) -> None:
         """Add the metrics of this process to `families`."""
-        families.add_program(self._process.store.kind)
+        families.add_program(self.process.store.kind)
         if self._analysis is not None and self._analysis.stream is not None:
             add_consumer(families, self._analysis.stream)
         families.include(MEASURED)

@@ -2,16 +2,16 @@
 
 import asyncio
 import json
-import socket
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 from prometheus_client.process_collector import ProcessCollector
 
-from service.live.status import UnitStatus
-from service.runtime.heartbeats import Heartbeats, Pulse
+from service.app.process import Supervision
+from service.runtime.heartbeats import Pulse
+from service.runtime.listening import url_of
 from service.runtime.metrics import TEXT, Families
 
 HOST = "127.0.0.1"
@@ -27,8 +27,8 @@ class HealthServer:
 
     Parameters
     ----------
-    beats, status, units
-        Heartbeats of the process, function that returns the link status of a unit, and unit ids.
+    supervision
+        Supervisor of the process, with the listening socket of the page.
     checks
         Function that returns, by name of each required part, its fault; None if the part works.
     fill
@@ -37,27 +37,24 @@ class HealthServer:
         Function that returns further status texts by name, which do not affect readiness.
     """
 
-    listener: socket.socket
-    beats: Heartbeats
-    status: Callable[[str], UnitStatus]
-    units: Collection[str]
+    supervision: Supervision
     checks: Callable[[], Mapping[str, str | None]]
     fill: Callable[[Families], None]
     shown: Callable[[], Mapping[str, str]] = dict
 
     async def page(self, path: str) -> tuple[int, str, bytes]:
         """Return the HTTP status, content type and content of the page at a URL path."""
-        status, shown = 200, {"event_loop": "turning"}
+        status, shown, process = 200, {"event_loop": "turning"}, self.supervision
         if path == "/metrics":
             families = Families()
             self.fill(families)
             families.include(ProcessCollector(registry=None))
             return 200, TEXT, families.text
         if path == "/readyz":
-            loops = {f"loop {name}": trouble for name, trouble in self.beats.look().items()}
+            loops = {f"loop {name}": trouble for name, trouble in process.beats.look().items()}
             checks = {**self.checks(), **loops}
             status = 503 if any(checks.values()) else 200
-            shown = {f"unit {unit}": self.status(unit).state.value for unit in self.units}
+            shown = {f"unit {unit}": process.status(unit).state.value for unit in process.units}
             shown |= self.shown()
             shown |= {name: trouble or "ok" for name, trouble in checks.items()}
         elif path != "/livez":
@@ -66,7 +63,7 @@ class HealthServer:
         return status, "application/json", json.dumps(body).encode()
 
     async def run(self, pulse: Pulse) -> None:
-        """Serve the page until cancelled; `pulse` gets heartbeats.
+        """Serve and announce the page until cancelled; `pulse` gets heartbeats.
 
         Takes over the listening socket and closes it at the end; call it once.
         """
@@ -96,8 +93,9 @@ class HealthServer:
 
         with ThreadingHTTPServer((HOST, 0), Handler, bind_and_activate=False) as server:
             server.socket.close()
-            server.socket = self.listener
+            server.socket = self.supervision.host.listener
             serving = asyncio.create_task(asyncio.to_thread(server.serve_forever, 0.1))
+            self.supervision.announce(url_of(server.socket))
             try:
                 await asyncio.shield(serving)
             finally:

@@ -1,8 +1,7 @@
 """Listening socket of the HTTP server, and the conditions under which it may be open."""
 
 import socket
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from ssl import SSLContext
 
@@ -37,8 +36,7 @@ def require_protected(plant: PlantFile, store: AccessStore) -> None:
         )
 
 
-@contextmanager
-def listener_of(plant: PlantFile, port: int) -> Iterator[socket.socket]:
+def listener_of(plant: PlantFile, port: int) -> AbstractContextManager[socket.socket]:
     """Open the listening socket of the server, before other parts of the process start.
 
     `port` replaces the TCP port in the plant file; it has no effect with a Unix socket. Raises
@@ -47,11 +45,8 @@ def listener_of(plant: PlantFile, port: int) -> Iterator[socket.socket]:
     """
     tls_of(plant)
     if plant.service.socket is not None:
-        with socket_file(Path(plant.service.socket)) as listener:
-            yield listener
-    else:
-        with listen(plant.service.host, port) as listener:
-            yield listener
+        return socket_file(Path(plant.service.socket))
+    return listen(plant.service.host, port)
 
 
 def tls_of(plant: PlantFile) -> SSLContext | None:

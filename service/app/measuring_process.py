@@ -21,7 +21,7 @@ from service.live.exchange import MeasuringEnd, Start, write_start
 from service.measuring.analyser import Runner
 from service.measuring.commands import Questions
 from service.measuring.live_view import LiveView
-from service.measuring.snapshots import SocketReports
+from service.measuring.snapshots import Reports
 from service.measuring.sources import WatchedUnit
 from service.runtime.child import Child, start_child
 from service.runtime.heartbeats import Loop, Pulse
@@ -168,7 +168,8 @@ async def run_service(
         await audit.begin()
         held = [*(unit.id for unit in plant.unit), PLANT]
         supervision = Supervision(host, beats, live.status, units)
-        reports = SocketReports([*held, SHARED], analysis.snapshots, analysis.snapshot)
+        snapshots = (analysis.snapshots, analysis.snapshot)
+        reports = Reports("measuring", lambda: [*held, SHARED], *snapshots)
         parts = (analysis.executor, live, analysis.soundness, analysis.metrics)
         questions = Questions(*parts, supervision.announce)
         end = MeasuringEnd(reports.report, questions.answer, REPORT_EVERY_S)

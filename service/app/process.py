@@ -2,8 +2,8 @@
 
 import asyncio
 import socket
-from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable, Collection, Coroutine, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import structlog
@@ -40,6 +40,7 @@ class Host:
     manager: ServiceManager = NO_MANAGER
 
 
+@dataclass
 class Supervision:
     """Supervisor of loops that notifies the watchdog while all loops run, and logs dead loops.
 
@@ -47,44 +48,40 @@ class Supervision:
     `status` returns the link status of a unit.
     """
 
-    def __init__(
-        self,
-        host: Host,
-        beats: Heartbeats,
-        status: Callable[[str], UnitStatus],
-        units: Iterable[str],
-    ) -> None:
-        self._host, self._beats, self._link, self._units = host, beats, status, tuple(units)
-        self._logged: set[str] = set()
-        watchdog_s = host.manager.watchdog_s
-        self._every_s = LOOK_EVERY_S if watchdog_s is None else min(LOOK_EVERY_S, watchdog_s / 2.0)
+    host: Host
+    beats: Heartbeats
+    status: Callable[[str], UnitStatus]
+    units: Collection[str]
+    _logged: set[str] = field(default_factory=set, init=False)
 
     def ready(self) -> None:
         """Notify the service manager that the service is ready."""
-        self._host.manager.notify(READY="1", STATUS=self._status())
+        self.host.manager.notify(READY="1", STATUS=self._status())
 
     def announce(self, url: str, token: str | None = None) -> None:
         """Notify the service manager; announce the URL and, unless it is None, the set-up token."""
         self.ready()
-        self._host.announce(url)
+        self.host.announce(url)
         if token is not None:
-            self._host.announce(
+            self.host.announce(
                 f"token to create the first account, valid once within one hour: {token}"
             )
 
     def stopping(self) -> None:
         """Notify the service manager that the service is stopping."""
-        self._host.manager.notify(STOPPING="1", STATUS="stopping")
+        self.host.manager.notify(STOPPING="1", STATUS="stopping")
 
     async def run(self) -> None:
         """Check the heartbeats of all loops periodically until cancelled."""
+        watchdog_s = self.host.manager.watchdog_s
+        every_s = LOOK_EVERY_S if watchdog_s is None else min(LOOK_EVERY_S, watchdog_s / 2.0)
         while True:
             self.look()
-            await self._host.clock.sleep(self._every_s)
+            await self.host.clock.sleep(every_s)
 
     def look(self) -> None:
         """Check the heartbeats of all loops once; notify the watchdog, log loops that stopped."""
-        troubles = self._beats.troubles
+        troubles = self.beats.troubles
         words = [f"{name} {trouble}" for name, trouble in troubles.items()]
         if set(troubles) != self._logged:
             self._logged = set(troubles)
@@ -93,12 +90,12 @@ class Supervision:
             else:
                 log.info("all background tasks respond again")
         if words:
-            self._host.manager.notify(STATUS="; ".join(words))
+            self.host.manager.notify(STATUS="; ".join(words))
         else:
-            self._host.manager.notify(WATCHDOG="1", STATUS=self._status())
+            self.host.manager.notify(WATCHDOG="1", STATUS=self._status())
 
     def _status(self) -> str:
-        states = [self._link(unit).state for unit in self._units]
+        states = [self.status(unit).state for unit in self.units]
         return f"{states.count(LinkState.CONNECTED)} of {len(states)} units connected"
 
     async def run_until_stopped(
@@ -125,7 +122,7 @@ class Supervision:
             working = tasks.create_task(job(), name="run")
             if ends:
                 working.add_done_callback(lambda _: stopped.set())
-            begun = [working, *self._beats.start(loops, tasks)]
+            begun = [working, *self.beats.start(loops, tasks)]
             supervising = tasks.create_task(self.run(), name="supervise")
             await stopped.wait()
             self.stopping()

@@ -1,13 +1,13 @@
 """Measuring side of a cluster: writes reports to the database, and executes its commands."""
 
 import asyncio
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection
 
 from acquisition.clock import Clock
 from service.live.commands import BASELINE_ACTIONS
 from service.live.snapshot import UnitReport, link_document, snapshot_document
 from service.measuring.commands import CommandExecutor
-from service.measuring.snapshots import LINK_EVERY_S, SnapshotBuilder
+from service.measuring.snapshots import Reports
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import TroubleLog, periodic
 from service.store.access.audit_entries import Acting, Source
@@ -15,26 +15,16 @@ from service.store.port import StoreError
 from service.store.sharing import Answer, CommandState, OpenCommand, UnitRow, UnitStates
 from service.store.store import Store
 
+REPORT_EVERY_S = 1.0
+"""Period of reports, s: a unit without reports counts as not analysed."""
+
 
 class Reporter:
-    """Writer of reports on units to the database, from which the serving processes read them.
+    """Writer of reports on units to the database, from which the serving processes read them."""
 
-    `held` returns the ids of the units that this process is responsible for, also `PLANT` if it
-    reports the alarms without a unit, `SHARED` if it runs the plant-wide tasks.
-    """
-
-    def __init__(
-        self,
-        process: str,
-        held: Callable[[], Iterable[str]],
-        builder: SnapshotBuilder,
-        store: UnitStates,
-        clock: Clock,
-    ) -> None:
-        self._process, self._held, self._store, self._clock = process, held, store, clock
-        self._builder = builder
-        self._written: dict[str, int | None] = {}
-        self._n_beats = 0
+    def __init__(self, reports: Reports, store: UnitStates, clock: Clock) -> None:
+        self._reports, self._store, self._clock = reports, store, clock
+        self._is_written = False
         self._trouble = TroubleLog("unit states are not reported", "unit states are reported again")
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
@@ -42,39 +32,29 @@ class Reporter:
 
         `pulse` receives a heartbeat after each report.
         """
-        await periodic(self.report, LINK_EVERY_S, self._clock, pulse)
+        await periodic(self.report, REPORT_EVERY_S, self._clock, pulse)
 
     async def report(self) -> None:
         """Write one report on each unit; after failed writes, readers treat the units as silent."""
-        found = [self._builder.report(unit) for unit in self._held()]
-        if not found:
-            return
-        self._n_beats += 1
-        # a snapshot is written again after a failure, and after another process wrote the unit
-        held = {each.unit: self._written.get(each.unit) for each in found}
-        self._written = dict.fromkeys(held)
-        rows = [self._row(each, held[each.unit]) for each in found]
-        try:
-            await asyncio.to_thread(self._store.report, self._process, rows)
-        except StoreError as error:
-            self._trouble.note(str(error))
-            return
-        self._trouble.note(None)
-        self._written = {each.unit: each.revision for each in found}
+        report = self._reports.report(is_first=not self._is_written)  # again after a failure
+        rows = [self._row(each, report.number) for each in report.units]
+        self._is_written = False
+        with self._trouble.noting(StoreError):
+            await asyncio.to_thread(self._store.report, report.process, rows)
+            self._is_written = True
 
-    def _row(self, report: UnitReport, written: int | None) -> UnitRow:
+    def _row(self, report: UnitReport, number: int) -> UnitRow:
         status, snapshot = report.link.status, report.snapshot
-        is_new = snapshot is not None and report.revision != written
         return UnitRow(
             unit=report.unit,
-            n_beats=self._n_beats,
+            n_beats=number,
             beat_ns=self._clock.now_ns(),
             link=status.state.value,
             reason=status.reason,
             last_sample_ns=status.last_sample_ns,
             signs=link_document(report.link),
             revision=report.revision,
-            state=snapshot_document(snapshot) if is_new and snapshot is not None else None,
+            state=None if snapshot is None else snapshot_document(snapshot),
         )
 
 
@@ -117,13 +97,9 @@ class CommandWorker:
 
     async def look(self) -> None:
         """Execute all operators' commands on the units of this process that are open now."""
-        try:
+        with self._trouble.noting(StoreError):
             for found in await asyncio.to_thread(self._store.commands.open, self._held()):
                 await self._take_up(found)
-        except StoreError as error:
-            self._trouble.note(str(error))
-        else:
-            self._trouble.note(None)
 
     async def _take_up(self, found: OpenCommand) -> None:
         command, commands = found.command, self._store.commands

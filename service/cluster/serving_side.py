@@ -19,7 +19,7 @@ from service.live.receivers import (
 from service.live.snapshot import (
     Report,
     UnitReport,
-    UnreadableSnapshotError,
+    UnreadableError,
     link_of_document,
     snapshot_of_document,
 )
@@ -63,13 +63,9 @@ class Feed:
 
     async def look(self) -> None:
         """Read the reports once; after a failure the old values remain, and their ages increase."""
-        try:
+        with self._trouble.noting(StoreError):
             await self._take()
-        except StoreError as error:
-            self._live.units.read_error = str(error)
-        else:
-            self._live.units.read_error = None
-        self._trouble.note(self._live.units.read_error)
+        self._live.units.read_error = self._trouble.trouble
 
     async def _take(self) -> None:
         for report, revision in await asyncio.to_thread(self._read):
@@ -93,7 +89,7 @@ class Feed:
             # the snapshot first, whose error names both versions
             snapshot = None if document is None else snapshot_of_document(document[2])
             link = link_of_document(beat.signs)
-        except UnreadableSnapshotError as error:
+        except UnreadableError as error:
             if str(error) != self._unreadable:
                 reason = self._unreadable = str(error)
                 log.error(

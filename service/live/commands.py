@@ -3,7 +3,6 @@
 import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from importlib.metadata import version as version_of
 from typing import Any, TypeAlias, get_args
 
 from pydantic import TypeAdapter, ValidationError
@@ -12,6 +11,7 @@ from core.alarms.alarm import Alarm
 from core.alarms.operation import Action, ActionRefusedError
 from core.machine.unit import Estimator
 from service.live.alarm_list import LiveAlarms
+from service.live.snapshot import OWN_VERSION, UnreadableError, content_of
 from service.store.notes import Note
 from service.store.references import SetVectorReference
 from service.store.sharing import Answer, CommandState
@@ -65,10 +65,6 @@ class Renew:
 BaselineAction: TypeAlias = Accept | Reject | Freeze | Thaw | Renew
 
 
-class UnreadableCommandError(Exception):
-    """Error raised if a command is damaged or from another version of the program."""
-
-
 @dataclass(frozen=True)
 class AlarmCommand:
     """Command to apply an operator's action to an alarm, given by its id."""
@@ -120,8 +116,6 @@ _KINDS: dict[str, tuple[type[OperatorCommand], TypeAdapter[Any]]] = {
 BASELINE_ACTIONS = frozenset(kind.__name__ for kind in get_args(BaselineAction))
 """Kinds of commands with an action on baselines."""
 
-OWN_VERSION = version_of("padwatch")
-
 
 def encoded(command: OperatorCommand) -> tuple[str, str]:
     """Return the kind of a command (the name of its class or action) and its document.
@@ -130,28 +124,22 @@ def encoded(command: OperatorCommand) -> tuple[str, str]:
     """
     kind = type(getattr(command, "action", command)).__name__
     fields = _KINDS[kind][1].dump_json(tuple(vars(command).values())).decode()
-    return kind, f"{OWN_VERSION}\n{fields}"
+    return kind, OWN_VERSION.decode() + fields
 
 
 def decoded(kind: str, document: str) -> OperatorCommand:
     """Decode a command from the kind and the document that `encoded` returned.
 
-    Raises `UnreadableCommandError` if the document is from another version of the program, or
-    damaged.
+    Raises `UnreadableError` if the document is damaged, or from another version of the program.
     """
-    theirs, _, content = document.partition("\n")
-    if theirs != OWN_VERSION:
-        raise UnreadableCommandError(
-            f"the command was sent by padwatch {theirs[:40]}, but this is padwatch {OWN_VERSION};"
-            " update all processes to one version"
-        )
+    content = content_of(document.encode(), "command")
     if kind not in _KINDS:
-        raise UnreadableCommandError(f"unknown command {kind}; update all processes to one version")
+        raise UnreadableError(f"unknown command {kind}; update all processes to one version")
     made, adapter = _KINDS[kind]
     try:
         return made(*adapter.validate_json(content))
     except ValidationError as error:
-        raise UnreadableCommandError(f"command {kind} cannot be read: {error}") from error
+        raise UnreadableError(f"command {kind} cannot be read: {error}") from error
 
 
 class NotAvailableError(Exception):

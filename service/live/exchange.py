@@ -9,7 +9,7 @@ import asyncio
 import pickle
 import struct
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
@@ -153,22 +153,21 @@ class MeasuringEnd:
     report: Callable[[bool], object]
     answer: Callable[[Question], Awaitable[object]]
     period_s: float
-    _places: asyncio.Semaphore = field(
-        default_factory=lambda: asyncio.Semaphore(MAX_QUESTIONS), init=False
-    )
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """Send reports and answers until the other end closes the connection or stops reading."""
         answering: set[asyncio.Task[None]] = set()
+        places = asyncio.Semaphore(MAX_QUESTIONS)
         reporting = asyncio.create_task(self._report_on(writer), name="report")
         reporting.add_done_callback(lambda _: writer.transport.abort())
         try:
             while (content := await _read(reader, MAX_QUESTION_BYTES)) is not None:
                 question = _QUESTION.validate_json(content)
-                await self._places.acquire()
+                await places.acquire()
                 task = asyncio.create_task(self._reply(writer, question), name="answer")
                 answering.add(task)
                 task.add_done_callback(answering.discard)
+                task.add_done_callback(lambda _: places.release())
         except (ValueError, ValidationError) as error:
             log.error("a message of the serving process is refused", reason=str(error))
         finally:
@@ -195,16 +194,14 @@ class MeasuringEnd:
 
     async def _reply(self, writer: asyncio.StreamWriter, question: Question) -> None:
         try:
-            try:
-                reply = Reply(question.number, await self.answer(question), None)
-            except Exception as error:
-                log.exception("a question of the serving process failed", kind=question.kind)
-                reply = Reply(question.number, None, str(error) or type(error).__name__)
+            reply = Reply(question.number, await self.answer(question), None)
+        except Exception as error:
+            log.exception("a question of the serving process failed", kind=question.kind)
+            reply = Reply(question.number, None, str(error) or type(error).__name__)
+        try:
             await _write(writer, pickle.dumps(reply, pickle.HIGHEST_PROTOCOL))
         except ConnectionError:
             log.warning("the serving process ended before an answer", kind=question.kind)
-        finally:
-            self._places.release()
 
 
 class ServingEnd:

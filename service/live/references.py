@@ -82,15 +82,11 @@ class ReferencesInForce:
 
     async def look(self) -> None:
         """Read the stored references once; an error leaves the references in force unchanged."""
-        try:
+        with self._trouble.noting(StoreError):
             found = await asyncio.to_thread(self._store.gap_references.in_force)
-        except StoreError as error:
-            self._trouble.note(str(error))
-            return
-        self._trouble.note(None)
-        for unit in {reference.unit for reference in found if self._take(reference)}:
-            bearings = tuple(self.bearing(unit, each.id) for each in self._units[unit].bearings)
-            self._on_change(replace(self._units[unit], bearings=bearings))
+            for unit in {reference.unit for reference in found if self._take(reference)}:
+                bearings = tuple(self.bearing(unit, each.id) for each in self._units[unit].bearings)
+                self._on_change(replace(self._units[unit], bearings=bearings))
 
     def _take(self, reference: GapReference) -> bool:
         """Put a stored reference in force; return whether it was not in force before."""

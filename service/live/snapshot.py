@@ -23,8 +23,22 @@ MAX_BYTES = 16_000_000
 """Maximum size in bytes of a decompressed document, many times that of the largest unit."""
 
 
-class UnreadableSnapshotError(Exception):
-    """Error raised if a document of a unit's state is damaged or of another program version."""
+class UnreadableError(Exception):
+    """Error raised if a document is damaged, or from another version of the program."""
+
+
+def content_of(document: bytes, what: str) -> bytes:
+    """Return the content of a document, which begins with `OWN_VERSION`; `what` is its kind.
+
+    Raises `UnreadableError` if the document is from another version of the program.
+    """
+    theirs, _, content = document.partition(b"\n")
+    if theirs != OWN_VERSION.rstrip():
+        raise UnreadableError(
+            f"the {what} was written by padwatch {theirs[:40].decode('ascii', 'replace')}, but"
+            f" this is padwatch {version('padwatch')}; update all processes to one version"
+        )
+    return content
 
 
 class PickledBudgets(Mapping[str, Budget]):
@@ -242,24 +256,17 @@ def snapshot_document(snapshot: UnitSnapshot) -> bytes:
 def snapshot_of_document(document: bytes) -> UnitSnapshot:
     """Return the snapshot in a document that `snapshot_document` returned.
 
-    Raises `UnreadableSnapshotError` if the document is damaged, or from another version of the
-    program.
+    Raises `UnreadableError` if the document is damaged, or from another version of the program.
     """
-    theirs, _, compressed = document.partition(b"\n")
-    if theirs != OWN_VERSION.rstrip():
-        raise UnreadableSnapshotError(
-            f"the snapshot was written by padwatch {theirs[:40].decode('ascii', 'replace')}, but"
-            f" this is padwatch {version('padwatch')}; update all processes to one version"
-        )
+    compressed, unpacker = content_of(document, "snapshot"), zlib.decompressobj()
     try:
-        unpacker = zlib.decompressobj()
         content = unpacker.decompress(compressed, MAX_BYTES)
         if unpacker.unconsumed_tail or not unpacker.eof:
             words = f"the snapshot of a unit is truncated or longer than {MAX_BYTES} bytes"
-            raise UnreadableSnapshotError(words)
+            raise UnreadableError(words)
         return _SNAPSHOT.validate_json(content)[0]
     except (zlib.error, ValidationError) as error:
-        raise UnreadableSnapshotError(f"the snapshot of a unit cannot be read: {error}") from error
+        raise UnreadableError(f"the snapshot of a unit cannot be read: {error}") from error
 
 
 def link_document(signs: UnitLink) -> str:
@@ -268,8 +275,8 @@ def link_document(signs: UnitLink) -> str:
 
 
 def link_of_document(document: str) -> UnitLink:
-    """Parse a document of `link_document`; raise `UnreadableSnapshotError` if it is damaged."""
+    """Parse a document of `link_document`; raise `UnreadableError` if it is damaged."""
     try:
         return _SIGNS.validate_json(document)[0]
     except ValidationError as error:
-        raise UnreadableSnapshotError(f"the link of a unit cannot be read: {error}") from error
+        raise UnreadableError(f"the link of a unit cannot be read: {error}") from error

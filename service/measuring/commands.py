@@ -13,10 +13,10 @@ from service.live.commands import (
     BaselineRefusedError,
     ReferenceRefusedError,
     TakeReference,
-    UnreadableCommandError,
     decoded,
 )
 from service.live.exchange import Question
+from service.live.snapshot import UnreadableError
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.films import FilmMonitor
 from service.measuring.integrity import IntegrityMonitor
@@ -33,7 +33,7 @@ from service.store.store import Store
 WITHIN_S = 10.0
 """Maximum wait for the store before a command is carried out, and until it is on the disk, s."""
 
-REFUSALS = ActionRefusedError, BaselineRefusedError, ReferenceRefusedError, UnreadableCommandError
+REFUSALS = ActionRefusedError, BaselineRefusedError, ReferenceRefusedError, UnreadableError
 """Errors with which a command is refused; nothing is changed."""
 
 

@@ -44,7 +44,13 @@ def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
         if gap_um is not None and not is_there:
             words = f"bearing {bearing.id} has no opposite probe in {axis}; omit its gap"
             raise ReferenceRefusedError(words)
-    return (x, y), _across(bearing, (x, y), opposite)
+    if not any(opposite_axes(bearing)):
+        return (x, y), None
+    # an axis without opposite probe needs a placeholder
+    unused_x, unused_y = bearing.opposite_reference_um or (x, y)
+    opposite_x, opposite_y = opposite
+    across_x = unused_x if opposite_x is None else opposite_x
+    return (x, y), (across_x, unused_y if opposite_y is None else opposite_y)
 
 
 def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) -> Gaps:
@@ -62,12 +68,12 @@ def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) 
             f"the newest result is from {rfc3339(newest.time_ns)}, {abs(age_s) / 60:.0f} min"
             f" {side}; the maximum age is {MAX_AGE_S / 60:.0f} min"
         )
-    near = (_usable(newest, NEAR_GAPS[0]), _usable(newest, NEAR_GAPS[1]))
+    near_x, near_y = (_usable(newest, name) for name in NEAR_GAPS)
     x, y = (
         _usable(newest, name) if is_there else None
         for name, is_there in zip(OPPOSITE_GAPS, opposite_axes(bearing), strict=True)
     )
-    return near, _across(bearing, near, (x, y))
+    return given_gaps(bearing, (near_x, near_y), (x, y))
 
 
 def doubts(newest: StoredReadings) -> list[str]:
@@ -78,15 +84,6 @@ def doubts(newest: StoredReadings) -> list[str]:
         for name, reading in gaps.items()
         if reading is not None and reading.quality.level is Level.UNCERTAIN
     ]
-
-
-def _across(bearing: Bearing, near: MicrometrePair, found: GivenPair) -> MicrometrePair | None:
-    """Return the gaps of opposite probes, with a placeholder for an axis without opposite probe."""
-    if not any(opposite_axes(bearing)):
-        return None
-    unused = bearing.opposite_reference_um or near
-    x, y = (old if new is None else new for new, old in zip(found, unused, strict=True))
-    return x, y
 
 
 def _usable(newest: StoredReadings, name: str) -> float:

@@ -87,23 +87,20 @@ def _noise(simulation: SimulationSettings) -> TransducerNoise:
 
 
 def _refuse_misfit(unit: UnitSettings, simulation: SimulationSettings) -> None:
-    speed_rpm = rated_speed_rpm(simulation.life_seed or 0)
-    _compare(unit, "rated_speed_rpm", unit.rated_speed_rpm, speed_rpm)
-    if unit.rated_power_mw is not None:
-        _compare(unit, "rated_power_mw", unit.rated_power_mw, RATED_POWER_MW)
     clearances_um = {life.id: life.configured_clearance_um for life in LIFE_BEARINGS}
-    brackets = {b.bearing: b for b in RotorParameters().brackets}
+    brackets = {b.bearing: b.stiffness_n_per_m for b in RotorParameters().brackets}
+    pairs = {
+        "rated_speed_rpm": (unit.rated_speed_rpm, rated_speed_rpm(simulation.life_seed or 0)),
+        "rated_power_mw": (unit.rated_power_mw, RATED_POWER_MW),
+    }
     for bearing in unit.bearing:
-        bracket, name = brackets[bearing.id], bearing.id
-        _compare(unit, f"{name} clearance_um", bearing.clearance_um, clearances_um[name])
-        if (stiffness := bearing.bracket_stiffness_n_per_m) is not None:
-            key = f"{name} bracket_stiffness_n_per_m"
-            _compare(unit, key, stiffness, bracket.stiffness_n_per_m)
-
-
-def _compare(unit: UnitSettings, key: str, found: float, wanted: float) -> None:
-    if abs(found - wanted) > MAX_MISFIT * wanted:
-        raise ConfigError(f"unit {unit.id}: {key} = {found:g}, but life_seed requires {wanted:g}")
+        name, stiffness = bearing.id, bearing.bracket_stiffness_n_per_m
+        pairs[f"{name} clearance_um"] = (bearing.clearance_um, clearances_um[name])
+        pairs[f"{name} bracket_stiffness_n_per_m"] = (stiffness, brackets[name])
+    for key, (found, wanted) in pairs.items():
+        if found is not None and abs(found - wanted) > MAX_MISFIT * wanted:
+            words = f"{key} = {found:g}, but life_seed requires {wanted:g}"
+            raise ConfigError(f"unit {unit.id}: {words}")
 
 
 def simulated_feed(unit: UnitSettings, clock: Clock) -> SimulatedUnit:

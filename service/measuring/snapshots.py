@@ -1,6 +1,6 @@
 """Snapshots of units, built from the parts of the measuring process, and the reports on them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 from acquisition.clock import Clock
@@ -12,9 +12,6 @@ from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.films import FilmMonitor
 from service.measuring.live_view import LiveView
 from service.settings.units import UnitSettings
-
-LINK_EVERY_S = 1.0
-"""Period of reports on the link of a unit, s: a unit without reports counts as not analysed."""
 
 REBUILT_EVERY_S = 5.0
 """Maximum delay, s, until a snapshot shows that an alarm has ceased to chatter."""
@@ -77,16 +74,17 @@ class SnapshotBuilder:
 
 
 @dataclass
-class SocketReports:
-    """Builder of reports for the serving process, with what changed since the previous report.
+class Reports:
+    """Builder of the reports of a process, with what changed since the previous report.
 
-    `units` are the ids of all reported units, with `PLANT` and `SHARED`; `plant` returns the state
-    of the measuring process.
+    `units` returns the ids of the units to report now, also `PLANT` and `SHARED`; `plant` returns
+    the state of the process, None if it is not reported.
     """
 
-    units: Sequence[str]
+    process: str
+    units: Callable[[], Iterable[str]]
     builder: SnapshotBuilder
-    plant: Callable[[], PlantSnapshot]
+    plant: Callable[[], PlantSnapshot | None] = lambda: None
     _n_reports: int = field(default=0, init=False)
     _sent: dict[str, int] = field(default_factory=dict, init=False)
     _sent_plant: PlantSnapshot | None = field(default=None, init=False)
@@ -95,12 +93,12 @@ class SocketReports:
         """Return a report on all units; it has only changed snapshots unless `is_first`."""
         if is_first:
             self._sent, self._sent_plant = {}, None
-        found, plant = [self.builder.report(unit) for unit in self.units], self.plant()
+        found, plant = [self.builder.report(unit) for unit in self.units()], self.plant()
         units = tuple(
             replace(each, snapshot=None) if self._sent.get(each.unit) == each.revision else each
             for each in found
         )
-        report = Report("measuring", self._n_reports + 1, units, plant)
+        report = Report(self.process, self._n_reports + 1, units, plant)
         if plant == self._sent_plant:
             report = replace(report, plant=None)
         self._sent = {each.unit: each.revision for each in found}

@@ -1,7 +1,7 @@
 """Parts of background loops: repetition, logging of failures, pauses with heartbeats."""
 
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
 
 import structlog
 
@@ -40,6 +40,16 @@ class TroubleLog:
         if trouble is None and self.trouble is not None:
             log.info(self._again)
         self.trouble, self._is_failing = trouble, trouble is not None
+
+    @contextmanager
+    def noting(self, error: type[Exception]) -> Iterator[None]:
+        """Return a context manager that records its outcome; an `error` is recorded, not raised."""
+        try:
+            yield
+        except error as failure:
+            self.note(str(failure))
+        else:
+            self.note(None)
 
 
 async def periodic(

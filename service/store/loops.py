@@ -92,17 +92,14 @@ class RollupLoop:
     async def _round(self, pulse: Pulse) -> bool:
         """Aggregate some new readings of each bearing; return False if there are none."""
         now_ns = self._clock.now_ns()
-        try:
+        with self._trouble.noting(StoreError):
             due = await asyncio.to_thread(self._rollups.due, now_ns)
             for series in due:
                 pulse.beat(ROLLUP_PERIOD_S)
                 async with paced(ROLLUP_REST_SHARE, self._clock, pulse):
                     await asyncio.to_thread(self._rollups.gather, series, now_ns)
-        except StoreError as error:
-            self._trouble.note(str(error))
-            return False
-        self._trouble.note(None)
-        return bool(due)
+            return bool(due)
+        return False
 
 
 SCRUB_REST_SHARE = 49.0

@@ -42,7 +42,7 @@ from service.measuring.integrity import IntegrityMonitor
 from service.measuring.live_view import LiveView
 from service.measuring.recorder import Recorder
 from service.measuring.simulated_sources import simulated_feed
-from service.measuring.snapshots import SnapshotBuilder, SocketReports
+from service.measuring.snapshots import Reports, SnapshotBuilder
 from service.notifications.sender import Deliveries
 from service.recordings.segment import CaptureFile
 from service.reports.collector import EvidenceCollector
@@ -78,7 +78,7 @@ class Service:
 
     live: LiveView
     serving: LiveClient
-    reports: SocketReports
+    reports: Reports
     store: SqliteStore
     access: AccessStore
     clock: SetClock
@@ -208,7 +208,7 @@ async def build(plant: PlantFile, store: SqliteStore, access: AccessStore, folde
             evidence=evidence.status,
         )
 
-    reports = SocketReports(ids, builder, plant_now)
+    reports = Reports("measuring", lambda: ids, builder, plant_now)
     context = Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},

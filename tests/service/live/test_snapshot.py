@@ -21,7 +21,7 @@ from core.quality import Reading, Reason
 from service.live import snapshot
 from service.live.snapshot import (
     UnitSnapshot,
-    UnreadableSnapshotError,
+    UnreadableError,
     snapshot_document,
     snapshot_of_document,
 )
@@ -62,7 +62,7 @@ def test_a_snapshot_is_read_as_it_was_written(published):
 def test_a_snapshot_of_another_version_is_refused_with_both_named(published):
     _, _, content = snapshot_document(published).partition(b"\n")
 
-    with pytest.raises(UnreadableSnapshotError) as refused:
+    with pytest.raises(UnreadableError) as refused:
         snapshot_of_document(b"0.0.1\n" + content)
 
     assert "written by padwatch 0.0.1" in str(refused.value)
@@ -77,10 +77,10 @@ def test_a_damaged_snapshot_is_refused_or_read_as_it_was(published):
         damaged[at] ^= 0x10
         try:
             assert repr(snapshot_of_document(bytes(damaged))) == repr(published)
-        except UnreadableSnapshotError:
+        except UnreadableError:
             refused += 1
     for stop in range(0, len(document), 50):
-        with pytest.raises(UnreadableSnapshotError):
+        with pytest.raises(UnreadableError):
             snapshot_of_document(document[:stop])
 
     assert refused > 0.9 * len(document) / 7
@@ -88,5 +88,5 @@ def test_a_damaged_snapshot_is_refused_or_read_as_it_was(published):
 
 def test_a_snapshot_that_unpacks_to_too_much_is_refused(monkeypatch):
     monkeypatch.setattr(snapshot, "MAX_BYTES", 1000)
-    with pytest.raises(UnreadableSnapshotError, match="longer than 1000 bytes"):
+    with pytest.raises(UnreadableError, match="longer than 1000 bytes"):
         snapshot_of_document(snapshot.OWN_VERSION + zlib.compress(b"0" * 1001))

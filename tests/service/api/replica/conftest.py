@@ -12,7 +12,7 @@ from core.alarms.alarm import PLANT
 from service.app.replica_process import Replica
 from service.cluster.measuring_side import CommandWorker, Reporter
 from service.measuring.commands import CommandExecutor
-from service.measuring.snapshots import SnapshotBuilder
+from service.measuring.snapshots import Reports, SnapshotBuilder
 from service.runtime.heartbeats import Heartbeats
 from service.settings.plant import PlantFile
 
@@ -50,7 +50,7 @@ def process_of(service: Any, plant: PlantFile, name: str) -> tuple[Reporter, Com
     builder = SnapshotBuilder(plant.unit, service.live, *parts, clock)
     executor = CommandExecutor(*parts, service.live, service.recorder, store, clock)
     return (
-        Reporter(name, lambda: held, builder, store.unit_states, clock),
+        Reporter(Reports(name, lambda: held, builder), store.unit_states, clock),
         CommandWorker(name, lambda: held, executor, store, clock),
     )
 

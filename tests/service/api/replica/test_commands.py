@@ -10,7 +10,8 @@ from harness.waiting import at_work
 
 from core.alarms.operation import Comment
 from service.cluster.serving_side import WAIT_S, DatabaseSender
-from service.live.commands import AlarmCommand, UnreadableCommandError, decoded, encoded
+from service.live.commands import AlarmCommand, decoded, encoded
+from service.live.snapshot import UnreadableError
 from service.store.port import AlarmQuery
 from service.store.sharing import Answer, Command, CommandState
 
@@ -176,5 +177,5 @@ def test_a_command_of_another_version_is_refused_by_both_versions():
     kind, document = encoded(AlarmCommand(LINK, Comment("anna", "seen")))
     own, fields = document.split("\n")
 
-    with pytest.raises(UnreadableCommandError, match=f"padwatch 0.0.9, but this is padwatch {own}"):
+    with pytest.raises(UnreadableError, match=f"padwatch 0.0.9, but this is padwatch {own}"):
         decoded(kind, f"0.0.9\n{fields}")
