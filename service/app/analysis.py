@@ -5,7 +5,7 @@ import os
 import socket
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -55,34 +55,7 @@ if TYPE_CHECKING:
     from service.cluster.consumer import Consumer  # slow import, only with a stream
 
 
-@dataclass(frozen=True)
-class ProcessContext:
-    """Context of one measuring process: plant, store, live view and heartbeats.
-
-    `origin` is the origin, live or replay, of the data in the store and in all API responses;
-    `beats` are the heartbeats of all loops of the process; from `alarm_context` alarm messages take
-    values.
-    """
-
-    plant: PlantFile
-    origin: Origin
-    clock: Clock
-    store: Store
-    live: LiveView
-    beats: Heartbeats
-    alarm_context: LiveContext
-
-
-@contextmanager
-def process_context(plant: PlantFile, origin: Origin, clock: Clock) -> Iterator[ProcessContext]:
-    """Open the store of a measuring process; raise `StoreError` if it cannot be used."""
-    live = LiveView([unit.id for unit in plant.unit], clock, stale_after_s(plant))
-    context = LiveContext(live.assessment)
-    router = router_of(plant, origin, context, clock)
-    with closing(open_store(plant, origin, router)) as store:
-        yield ProcessContext(plant, origin, clock, store, live, Heartbeats(clock), context)
-
-
+@dataclass(eq=False)
 class Analysis:
     """Parts of the analysis and the background services of a process.
 
@@ -91,8 +64,10 @@ class Analysis:
 
     Parameters
     ----------
-    process, monitors
-        Context of this process, and the monitor of each of its units by unit id.
+    plant, monitors
+        Plant file with the units of this process, and the monitor of each by unit id.
+    origin
+        Origin, live or replay, of the data in the store and in all API responses.
     part
         Part of the plant for which this process is responsible.
     sources
@@ -100,36 +75,41 @@ class Analysis:
 
     Attributes
     ----------
+    beats
+        Heartbeats of all loops of the process.
     bus
         Queue of the blocks that wait for the analysis; always empty with a stream.
     stream
         Consumer of the stream; None before it is started, and without a stream.
     """
 
-    def __init__(
-        self,
-        process: ProcessContext,
-        monitors: Mapping[str, UnitMonitor],
-        part: PlantPart = WHOLE,
-        sources: Mapping[str, TimedSource] = MappingProxyType({}),
-    ) -> None:
-        plant, origin, store, clock = process.plant, process.origin, process.store, process.clock
-        self.process, self._monitors, self._part, self._sources = process, monitors, part, sources
-        self.bus = Bus(BUS_CAPACITY, clock)
-        self.stream: Consumer | None = None
-        self.soundness = IntegrityMonitor(store, clock, process.live)
+    plant: PlantFile
+    origin: Origin
+    clock: Clock
+    store: Store
+    live: LiveView
+    alarm_context: LiveContext
+    monitors: Mapping[str, UnitMonitor]
+    part: PlantPart = WHOLE
+    sources: Mapping[str, TimedSource] = field(default_factory=dict)
+    stream: "Consumer | None" = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        plant, origin, store, clock = self.plant, self.origin, self.store, self.clock
+        self.beats, self.bus = Heartbeats(clock), Bus(BUS_CAPACITY, clock)
+        self.soundness = IntegrityMonitor(store, clock, self.live)
         self.deliveries = Deliveries(receivers_of(plant, origin, clock), store.outbox, clock)
-        parts = (store, process.live, clock, Path(plant.service.data_folder))
+        parts = (store, self.live, clock, Path(plant.service.data_folder))
         wake = self.deliveries.wake
-        self.recorder = Recorder(*parts, on_stored=wake, finds_again=part != WHOLE)
+        self.recorder = Recorder(*parts, on_stored=wake, finds_again=self.part != WHOLE)
         self.captures = kept_files.captures_of(plant, origin, clock)
         self.recordings = kept_files.waveform_keeper(plant, store, clock)
         pressure = Pressure(self.bus, self.recordings.is_full)
         self.tape = kept_files.tape_of(plant, origin, clock, pressure.look)
         self.space = kept_files.space_watch(plant, clock)
         self.references = ReferencesInForce(
-            *([monitor.unit for monitor in monitors.values()], store, clock),
-            on_change=lambda unit: monitors[unit.id].replace_description(unit),
+            *([monitor.unit for monitor in self.monitors.values()], store, clock),
+            on_change=lambda unit: self.monitors[unit.id].replace_description(unit),
         )
 
     async def start(self, memories: Mapping[str, UnitMemory] = MappingProxyType({})) -> None:
@@ -138,22 +118,21 @@ class Analysis:
         `memories` are saved states by unit, only of units without missing samples since they were
         saved. Raises `StoreError` if stored state cannot be read; a start without it would lose it.
         """
-        plant, origin, store = self.process.plant, self.process.origin, self.process.store
-        live, clock = self.process.live, self.process.clock
-        recorder, monitors = self.recorder, self._monitors
+        plant, origin, store, clock = self.plant, self.origin, self.store, self.clock
+        live, recorder, monitors = self.live, self.recorder, self.monitors
         await self.soundness.look()  # before the first write
         if origin is Origin.LIVE:  # a replay starts without stored results and has no gap
             for unit, monitor in monitors.items():
                 monitor.go_on(await asyncio.to_thread(store.reach, unit))
         self.alarms = alarms = await alarm_engine(
             *(plant, origin, store, recorder.put, clock, self._listen),
-            *(self.health, self._part, {unit: memory.alarms for unit, memory in memories.items()}),
+            *(self.health, self.part, {unit: memory.alarms for unit, memory in memories.items()}),
         )
         machines = {unit: monitor.unit for unit, monitor in monitors.items()}
         self.films = films = await film_monitor(plant, machines, store.films, clock)
         for unit, memory in memories.items():
             films.resume(unit, memory.films)
-        self.process.alarm_context.watch_films(films.newest)
+        self.alarm_context.watch_films(films.newest)
         captures = self.captures
         self.evidence = kept_files.evidence_of(plant, origin, live, films, store, captures, clock)
         if origin is Origin.LIVE:  # a replay collects no evidence
@@ -180,18 +159,18 @@ class Analysis:
             "space": self.space.run,
             "soundness": self.soundness.run,
         }
-        if self.process.origin is Origin.LIVE:  # replayed data are not part of the machine history
+        if self.origin is Origin.LIVE:  # replayed data are not part of the machine history
             loops |= {"learn": self.films.run, "recordings": self.recordings.run}
         return loops
 
     @property
     def shared_loops(self) -> dict[str, Loop]:
         """Loops for the whole plant, by name; only one process runs them."""
-        store, clock = self.process.store, self.process.clock
+        store, clock = self.store, self.clock
         rolling = RollupLoop(store.rollups, clock)
         loops: dict[str, Loop] = {"gather": rolling.run, "deliver": self._deliver}
-        if self.process.origin is Origin.LIVE:
-            ages = ages_of(self.process.plant.retention)
+        if self.origin is Origin.LIVE:
+            ages = ages_of(self.plant.retention)
             loops["retain"] = RetentionLoop(store.retention, ages, clock).run
             loops["scrub"] = ScrubLoop(store.integrity, clock).run
         return loops
@@ -203,14 +182,14 @@ class Analysis:
         `SHARED` if it runs the plant-wide tasks.
         """
         name = f"{socket.gethostname()}:{os.getpid()}:{uuid4().hex[:12]}"
-        store, clock = self.process.store, self.process.clock
+        store, clock = self.store, self.clock
         reporter = Reporter(Reports(name, held, self.snapshots), store.unit_states, clock)
         commands = CommandWorker(name, held, self.executor, store, clock)
         return {"report": reporter.run, "commands": commands.run}
 
     async def _deliver(self, pulse: Pulse) -> None:
         pulse.rest()  # each sender has its own heartbeat
-        await self.deliveries.run(self.process.beats)
+        await self.deliveries.run(self.beats)
         await asyncio.Event().wait()  # without receivers the loop only waits
 
     async def close(self) -> None:
@@ -228,8 +207,8 @@ class Analysis:
 
     def health(self) -> ServiceHealth:
         """Return the present health of the service, for its alarms."""
-        live, bus, stream = self.process.live, self.bus, self.stream
-        found = {unit: live.status(unit) for unit in self._monitors}
+        live, bus, stream = self.live, self.bus, self.stream
+        found = {unit: live.status(unit) for unit in self.monitors}
         return ServiceHealth(
             store_error=live.store_error,
             store_behind_s=self.recorder.behind_s,
@@ -252,9 +231,9 @@ class Analysis:
         """Return the present state of this process."""
         captures = self.captures
         return PlantSnapshot(
-            loops=dict(self.process.beats.look()),
+            loops=dict(self.beats.look()),
             checks={"disk": str(self.space), "stored data": self.soundness.trouble or "ok"},
-            audit_error=self.process.store.audit.head_error,
+            audit_error=self.store.audit.head_error,
             captures=CaptureStatus(captures.trouble, captures.error, captures.being_made),
             evidence=self.evidence.status,
             continuous=tuple(self.tape.units),
@@ -263,7 +242,7 @@ class Analysis:
             receivers=self.deliveries.statuses,
             sources={
                 unit: SourceCounts(source.statistics, dict(source.refused_frames))
-                for unit, source in self._sources.items()
+                for unit, source in self.sources.items()
             },
         )
 
@@ -276,11 +255,9 @@ class Analysis:
             receivers = await self.deliveries.look()
         except StoreError:
             receivers = None
-        process, families = self.process, Families()
-        live, now_ns = process.live, process.clock.now_ns()
-        units = [unit.id for unit in process.plant.unit]
-        families.add_program(process.store.kind)
-        add_samples(families, live, units, self._sources, now_ns)
+        families, live, now_ns = Families(), self.live, self.clock.now_ns()
+        families.add_program(self.store.kind)
+        add_samples(families, live, self.monitors, self.sources, now_ns)
         add_store(families, self.bus, self.recorder, live)
         add_integrity(families, self.soundness)
         add_disks(families, self.space)
@@ -289,6 +266,23 @@ class Analysis:
         add_deliveries(families, receivers, now_ns)
         families.include(ProcessCollector(registry=None))
         return families.text
+
+
+@contextmanager
+def opened_analysis(
+    plant: PlantFile,
+    origin: Origin,
+    clock: Clock,
+    monitors: Mapping[str, UnitMonitor],
+    part: PlantPart = WHOLE,
+    sources: Mapping[str, TimedSource] = MappingProxyType({}),
+) -> Iterator[Analysis]:
+    """Open the store of a process for its analysis; raise `StoreError` if it cannot be used."""
+    live = LiveView([unit.id for unit in plant.unit], clock, stale_after_s(plant))
+    context = LiveContext(live.assessment)
+    router = router_of(plant, origin, context, clock)
+    with closing(open_store(plant, origin, router)) as store:
+        yield Analysis(plant, origin, clock, store, live, context, monitors, part, sources)
 
 
 EVIDENCE = {

@@ -8,7 +8,7 @@ from functools import partial
 
 from core.alarms.alarm import PLANT
 from core.monitor.monitor import UnitMonitor
-from service.app.analysis import Analysis, ProcessContext, process_context
+from service.app.analysis import Analysis, opened_analysis
 from service.app.health_page import HealthServer
 from service.app.process import Host, Supervision
 from service.app.storage import database_path
@@ -93,11 +93,12 @@ async def run_analyse(
     with ExitStack() as stack:
         if plant.store.postgresql is None:
             stack.enter_context(exclusive_use(database_path(plant)))
-        part = partition.part_of(plant)
-        process = stack.enter_context(process_context(part, Origin.LIVE, host.clock))
-        analysing = Analysing(plant, partition, settings, monitors, process)
+        own, share = partition.part_of(plant), partition.share_of(plant)
+        opened = opened_analysis(own, Origin.LIVE, host.clock, monitors, share)
+        analysis = stack.enter_context(opened)
+        analysing = Analysing(plant, settings, analysis)
         parts = (analysing.checks, analysing.add_metrics, analysing.shown)
-        supervision = Supervision(host, process.beats, process.live.status, monitors)
+        supervision = Supervision(host, analysis.beats, analysis.live.status, monitors)
         health = HealthServer(supervision, *parts)
         try:
             await supervision.run_until_stopped({"health": health.run}, analysing.run)
@@ -107,40 +108,38 @@ async def run_analyse(
 
 @dataclass
 class Analysing:
-    """Analysis of the units of a partition, from standby to stop."""
+    """Analysis of the units of a partition of `plant`, from standby to stop."""
 
     plant: PlantFile
-    partition: Partition
     settings: StreamSettings
-    monitors: Mapping[str, UnitMonitor]
-    process: ProcessContext
-    _analysis: Analysis | None = field(default=None, init=False)
+    analysis: Analysis
+    _is_started: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
-        self._holds = Holds(self.process.store, self.monitors, self.process.clock)
+        analysis = self.analysis
+        self._holds = Holds(analysis.store, analysis.monitors, analysis.clock)
 
     async def close(self) -> None:
         """Write all pending data, then release the units to other processes."""
-        if self._analysis is not None:
-            await self._analysis.close()
+        if self._is_started:
+            await self.analysis.close()
         self._holds.release()
 
     async def run(self) -> None:
         """Wait for the locks of the units of this process, then analyse until cancelled."""
-        process, monitors, share = self.process, self.monitors, self.partition.share_of(self.plant)
-        store, clock = process.store, process.clock
+        analysis, monitors = self.analysis, self.analysis.monitors
+        store, clock, live = analysis.store, analysis.clock, analysis.live
         await self._holds.take()
         stored = {unit: await asyncio.to_thread(store.position, unit) for unit in monitors}
         memories = memories_of(found for found in stored.values() if found is not None)
-        analysis = Analysis(process, monitors, share)
         await analysis.start(memories)
-        self._analysis = analysis
+        self._is_started = True
 
         async def begin(stream: str, newest: int) -> dict[str, UnitProgress]:
             """Return the progress of each unit, at which its analysis resumes."""
-            parts = (analysis.analyser, process.live, analysis.recorder, clock)
+            parts = (analysis.analyser, live, analysis.recorder, clock)
             progress = {}
-            for unit in process.plant.unit:
+            for unit in analysis.plant.unit:
                 reach = await asyncio.to_thread(store.reach, unit.id)
                 position = usable(stored[unit.id], stream, newest)
                 identity, memory = identity_of(self.plant, unit), memories.get(unit.id)
@@ -152,8 +151,8 @@ class Analysing:
         analysis.stream = consumer
         everywhere = [unit.id for unit in self.plant.unit]
         silent = SilentUnits(everywhere, analysis.alarms, store, clock)
-        after_s = silences_s(process.plant.unit, self.settings.silent_after_s)
-        silence = SilenceWatch(after_s, analysis.analyser, process.live, clock)
+        after_s = silences_s(analysis.plant.unit, self.settings.silent_after_s)
+        silence = SilenceWatch(after_s, analysis.analyser, live, clock)
 
         async def watch() -> None:
             """Check that this process holds its units, and which units are silent."""
@@ -162,11 +161,11 @@ class Analysing:
 
         def held() -> list[str]:
             """Return the units and shared parts whose state this process publishes now."""
-            service = [PLANT] if share.leads else []
+            service = [PLANT] if analysis.part.leads else []
             return [*monitors, *service, *([SHARED] if silent.is_watching else [])]
 
         shared = {**analysis.shared_loops, "silent units": silent.run}
-        leadership = Leadership(store.hold, shared, process.beats, clock)
+        leadership = Leadership(store.hold, shared, analysis.beats, clock)
         loops: dict[str, Loop] = {
             "lead": leadership.run,
             "record": analysis.recorder.run,
@@ -176,22 +175,21 @@ class Analysing:
             **analysis.own_loops,
         }
         async with asyncio.TaskGroup() as tasks:
-            process.beats.start(loops, tasks)
+            analysis.beats.start(loops, tasks)
 
     def checks(self) -> dict[str, str | None]:
         """Return the fault of each required part, for the health page; None if it works."""
-        waits_for = self._holds.waits_for
-        stream = self._analysis and self._analysis.stream
+        waits_for, stream = self._holds.waits_for, self.analysis.stream
         return {
             "units": None if waits_for is None else f"standing by: {waits_for}",
-            "store": self.process.live.store_error,
+            "store": self.analysis.live.store_error,
             "stream": stream.trouble if stream else "not begun",
         }
 
     def shown(self) -> dict[str, str]:
         """Return conditions of this host; only the leading process raises alarms about them."""
-        shown = {"database": self.process.store.kind}
-        if (parts := self._analysis) is not None:
+        parts, shown = self.analysis, {"database": self.analysis.store.kind}
+        if self._is_started:
             shown |= {
                 "disk": str(parts.space),
                 "stored data": parts.soundness.trouble or "ok",
@@ -202,7 +200,7 @@ class Analysing:
 
     def add_metrics(self, families: Families) -> None:
         """Add the metrics of this process to `families`."""
-        families.add_program(self.process.store.kind)
-        if self._analysis is not None and self._analysis.stream is not None:
-            add_consumer(families, self._analysis.stream)
+        families.add_program(self.analysis.store.kind)
+        if self.analysis.stream is not None:
+            add_consumer(families, self.analysis.stream)
         families.include(MEASURED)

@@ -11,7 +11,7 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
-from service.app.analysis import Analysis, process_context
+from service.app.analysis import opened_analysis
 from service.app.listener import require_protected
 from service.app.process import Host, Supervision
 from service.app.service_audit import ServiceTrail
@@ -152,19 +152,19 @@ async def run_service(
         If the service would be reachable from other hosts without TLS or accounts.
     """
     clock = host.clock
-    with exclusive_use(database_path(plant)), process_context(plant, origin, clock) as process:
+    monitors = {unit: watched.monitor for unit, watched in units.items()}
+    sources = {unit: watched.source for unit, watched in units.items()}
+    timed = {u: each for u, each in sources.items() if isinstance(each, TimedSource)}
+    opened = opened_analysis(plant, origin, clock, monitors, sources=timed)
+    with exclusive_use(database_path(plant)), opened as analysis:
         with closing(open_access(plant, origin)) as access:
             require_protected(plant, access)
-        live, beats = process.live, process.beats
-        monitors = {unit: watched.monitor for unit, watched in units.items()}
-        sources = {unit: watched.source for unit, watched in units.items()}
-        timed = {u: each for u, each in sources.items() if isinstance(each, TimedSource)}
-        analysis = Analysis(process, monitors, sources=timed)
+        live, beats = analysis.live, analysis.beats
         await analysis.start()
         runner = Runner(
             units, live, analysis.analyser, analysis.recorder, analysis.bus, beats, clock
         )
-        audit = ServiceTrail(plant, origin, process.store.audit, clock)
+        audit = ServiceTrail(plant, origin, analysis.store.audit, clock)
         await audit.begin()
         held = [*(unit.id for unit in plant.unit), PLANT]
         supervision = Supervision(host, beats, live.status, units)

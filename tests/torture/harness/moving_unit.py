@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.clock import Clock, SystemClock
-from harness.stream_rig import ground_of
+from harness.stream_rig import analysis_of
 from service.app.analysis import Analysis
 from service.cluster.progress import UnitProgress, memories_of, usable
 from service.cluster.session import identity_of
@@ -105,13 +105,11 @@ class MovingUnit:
         """
         clock, unit = self._clock, self.plant.unit[0]
         store = stack.enter_context(closing(SqliteStore(self.database)))
-        ground, monitors = ground_of(self.plant, clock, store)
-        live = ground.live
         found = store.position(unit.id)
         memories = memories_of([found] if found else [])
-        analysis = Analysis(ground, monitors)
+        analysis = analysis_of(self.plant, clock, store)
         await analysis.start(memories)
-        parts = (analysis.analyser, live, analysis.recorder, clock)
+        parts = (analysis.analyser, analysis.live, analysis.recorder, clock)
         stored, memory = usable(found, STREAM, newest), memories.get(unit.id)
         done = store.reach(unit.id) if stored is None else None
         return Life(analysis, UnitProgress(self.identity, STREAM, stored, memory, *parts, done))

@@ -12,14 +12,13 @@ import numpy as np
 from rigs.blocks import given_block
 
 from acquisition.clock import Clock, SystemClock
-from core.monitor.monitor import UnitMonitor
 from core.quality import GOOD, Reading
 from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
 from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer
 from harness.waiting import at_work
-from service.app.analysis import Analysis, ProcessContext
+from service.app.analysis import Analysis
 from service.app.cluster_processes import Analysing
 from service.app.storage import open_store
 from service.cluster.frames import Taken, decoded
@@ -28,10 +27,10 @@ from service.cluster.publisher import Publisher
 from service.cluster.session import identity_of, stream_name, subject
 from service.live.status import LinkState
 from service.measuring.acquirer import LinkNews
+from service.measuring.alarm_engine import WHOLE, PlantPart
 from service.measuring.live_view import LiveView
 from service.measuring.sources import monitor_of
 from service.notifications.message import LiveContext
-from service.runtime.heartbeats import Heartbeats
 from service.settings.core_values import stale_after_s
 from service.settings.plant import PlantFile, load_plant_file
 from service.settings.storage import Origin
@@ -42,8 +41,6 @@ LEDGER = LedgerPlant(n_units=2, load=1.0, segment_samples=8192, n_segments=2)
 T0 = 1_767_225_600 * NS_PER_S
 N_SAMPLES = 600
 WAIT_S = 60.0
-
-Monitors = dict[str, UnitMonitor]
 
 
 def written_plant(folder: Path, server: NatsServer, name: str = "plant") -> Path:
@@ -100,25 +97,24 @@ async def publish(plant: PlantFile, sent: Iterable[SampleBlock]) -> None:
         await asyncio.wait_for(publisher.waiting.drained(), WAIT_S)
 
 
-def ground_of(plant: PlantFile, clock: Clock, store: Store) -> tuple[ProcessContext, Monitors]:
-    """What the roles of a process stand on, and the monitors of all units."""
+def analysis_of(plant: PlantFile, clock: Clock, store: Store, part: PlantPart = WHOLE) -> Analysis:
+    """The analysis of all units, which has not been started."""
     monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in plant.unit}
-    beats = Heartbeats(clock)
     live = LiveView(monitors, clock, stale_after_s(plant))
     context = LiveContext(live.assessment)
-    return ProcessContext(plant, Origin.LIVE, clock, store, live, beats, context), monitors
+    return Analysis(plant, Origin.LIVE, clock, store, live, context, monitors, part)
 
 
 @asynccontextmanager
-async def analysing(plant: PlantFile) -> AsyncIterator[tuple[Analysing, ProcessContext]]:
+async def analysing(plant: PlantFile) -> AsyncIterator[Analysis]:
     """Run the analysis of a process; what is not stored when this is left is lost."""
     store = open_store(plant)
-    ground, monitors = ground_of(plant, SystemClock(), store)
+    analysis = analysis_of(plant, SystemClock(), store, Partition().share_of(plant))
     assert plant.stream is not None
-    process = Analysing(plant, Partition(), plant.stream, monitors, ground)
+    process = Analysing(plant, plant.stream, analysis)
     task = asyncio.create_task(process.run())
     try:
-        yield process, ground
+        yield analysis
     finally:
         task.cancel()
         await asyncio.wait([task])
@@ -152,8 +148,7 @@ async def single_process(plant_file: Path, sent: Sequence[Sent]) -> Path:
     plant, clock = load_plant_file(plant_file), SystemClock()
     path = Path(plant.service.data_folder) / "padwatch.sqlite3"
     store = SqliteStore(path)
-    ground, monitors = ground_of(plant, clock, store)
-    analysis = Analysis(ground, monitors)
+    analysis = analysis_of(plant, clock, store)
     await analysis.start()
     try:
         for unit, message in sent:

@@ -156,9 +156,9 @@ async def test_a_message_that_cannot_be_used_is_an_alarm_of_its_unit_that_says_w
 
 
 async def test_a_unit_is_known_to_have_blocks_that_wait_while_nothing_can_be_stored(plant, server):
-    async with looking(plant, server) as look, analysing(plant) as (process, _):
-        await until(lambda: _is(getattr(process._analysis, "stream", None) is not None))
-        consumer = process._analysis and process._analysis.stream
+    async with looking(plant, server) as look, analysing(plant) as analysis:
+        await until(lambda: _is(analysis.stream is not None))
+        consumer = analysis.stream
         assert consumer is not None
         async with busy_database(plant):
             await publish(plant)

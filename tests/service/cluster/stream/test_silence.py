@@ -72,7 +72,7 @@ class Process:
 
     def changes_of(self, alarm: str) -> list[tuple[str, int]]:
         """What became of an alarm, oldest first, with its occurrence."""
-        found = self.life.analysis.process.store.alarm_events(AlarmQuery(alarm=alarm))
+        found = self.life.analysis.store.alarm_events(AlarmQuery(alarm=alarm))
         events = [(event.event.change.value, event.event.occurrence) for event in reversed(found)]
         return [each for each in events if not each[0].startswith("condition")]
 
@@ -104,7 +104,7 @@ class Place:
         with ExitStack() as stack:
             life = await self._unit.begun(len(self.messages), stack)
             analysis = life.analysis
-            parts = (analysis.analyser, analysis.process.live, self._clock)
+            parts = (analysis.analyser, analysis.live, self._clock)
             process = Process(life, SilenceWatch({UNIT: AFTER_S}, *parts), self._clock)
             process.is_reached = back is not Back.NO_STREAM
             stored = life.progress.is_replaying
@@ -150,7 +150,7 @@ async def test_a_unit_that_falls_silent_while_not_analysed_is_lost_after_the_sta
         assert again.changes == []
         await again.wait(SURELY_S)
         assert (again.changes, again.n_judged) == ([("raised", 1)], 0)
-        status = again.life.analysis.process.live.status(UNIT)
+        status = again.life.analysis.live.status(UNIT)
         assert (status.state, status.n_failed) == (LinkState.NOT_CONNECTED, 1)
         assert status.reason
 
@@ -168,7 +168,7 @@ async def test_a_unit_of_which_nothing_was_ever_known_is_lost(place, back):
 async def test_a_unit_whose_messages_are_all_of_no_use_is_lost_and_the_reason_is_said(place):
     async with place.process() as first:
         await first.take([(n, b"no block of ours") for n in range(1, 60)])
-        status = first.life.analysis.process.live.status(UNIT)
+        status = first.life.analysis.live.status(UNIT)
         assert status.state is LinkState.NOT_CONNECTED
         assert "padwatch acquire" not in str(status.reason)
 
@@ -196,9 +196,9 @@ async def test_samples_that_were_lost_before_are_no_new_loss_to_a_process_that_t
         await first.take(place.first)
         await first.life.store()
         assert first.changes_of(LOST) == raised
-        account = first.life.analysis.process.live.status(UNIT).account
+        account = first.life.analysis.live.status(UNIT).account
     async with place.process() as again:
-        assert again.life.analysis.process.live.status(UNIT).account == account
+        assert again.life.analysis.live.status(UNIT).account == account
         await again.wait(2.0)
         await again.take(place.messages[N_BLOCKS:])
         await again.wait(500.0)
@@ -235,10 +235,10 @@ async def test_a_process_that_never_reaches_the_stream_says_that_its_units_are_l
     stream = '[stream]\nservers = ["nats://127.0.0.1:9"]\nsilent_after_s = 2.0\n'
     ports = dict.fromkeys(LEDGER.units, 9)
     plant = LEDGER.write(tmp_path / "plant.toml", tmp_path / "data", ports, stream)
-    async with analysing(load_plant_file(plant)) as (_, ground):
+    async with analysing(load_plant_file(plant)) as analysis:
         async with asyncio.timeout(60.0):
-            while ground.live.status(UNIT).state is LinkState.CONNECTING:
+            while analysis.live.status(UNIT).state is LinkState.CONNECTING:
                 await asyncio.sleep(0.01)
-        status = ground.live.status(UNIT)
+        status = analysis.live.status(UNIT)
     assert status.state is LinkState.NOT_CONNECTED
     assert "127.0.0.1:9 cannot be reached" in str(status.reason)
