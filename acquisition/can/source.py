@@ -1,27 +1,22 @@
 """`CanSource`: sample source for a measuring device on a CAN bus."""
 
 import asyncio
-from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterable, Mapping
+from collections.abc import AsyncGenerator, AsyncIterator, Mapping
 from contextlib import aclosing, asynccontextmanager
 from functools import partial
-
-import can
 
 from acquisition.can.assembly import MAX_UNSURE_S, FrameAssembler
 from acquisition.can.bus import open_bus
 from acquisition.can.compiler import compile_plan
 from acquisition.can.plan import SECONDS
 from acquisition.can.reader import FrameReader
-from acquisition.can.settings import CanLinkSettings, CanSettings
+from acquisition.can.settings import CanSettings
 from acquisition.clock import Clock
 from acquisition.delivery.blocks import MIN_BLOCK_S, BlockAssembler
 from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock
 from core.samples.calibration import UnitCalibration
 from core.units import ns_from_s
-
-BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
-"""Function that opens a bus for frames of given ids, such as `acquisition.can.bus.open_bus`."""
 
 _LOOK_S = 0.2
 
@@ -40,27 +35,15 @@ class CanSource:
 
     Listen-only. CAN devices do not buffer samples: frames sent while the bus is closed are a gap.
 
-    Parameters
-    ----------
-    opener
-        Function that opens the bus.
-
     Raises
     ------
     ConfigError
         If DBC, settings and calibration do not match.
     """
 
-    def __init__(
-        self,
-        settings: CanSettings,
-        calibration: UnitCalibration,
-        clock: Clock,
-        opener: BusOpener = open_bus,
-    ) -> None:
+    def __init__(self, settings: CanSettings, calibration: UnitCalibration, clock: Clock) -> None:
         self._settings = settings
         self._clock = clock
-        self._opener = opener
         self._plan = compile_plan(settings, calibration)
         instant_s = self._plan.samples_per_frame / calibration.rate_hz
         self._stale_after_s = max(settings.stale_after_s, _MIN_STALE_INSTANTS * instant_s)
@@ -89,8 +72,8 @@ class CanSource:
         """
         settings, plan = self._settings, self._plan
         ids = [message.message.frame_id for message in plan.messages.values()]
-        open_bus = partial(self._opener, settings.link, ids)
-        reader = FrameReader(settings, open_bus, plan, self._assembler.refused, self._clock)
+        opened = partial(open_bus, settings.link, ids)
+        reader = FrameReader(settings, opened, plan, self._assembler.refused, self._clock)
         self._assembler.listen()
         try:
             await reader.start()

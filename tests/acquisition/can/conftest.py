@@ -129,19 +129,13 @@ def assembler_by(counts_calibration) -> Callable[..., FrameAssembler]:
 def source_of(counts_calibration) -> Callable[..., CanSource]:
     """Builds sources that read a DAQ of a shape at an endpoint; other settings as keywords."""
 
-    def build(
-        shape: CanShape, endpoint, clock=None, options=None, opener=None, **settings
-    ) -> CanSource:
+    def build(shape: CanShape, endpoint, clock=None, options=None, **settings) -> CanSource:
         link = CanLinkSettings(**endpoint, fd=shape.fd, options=options or {})
         n_channels, n_slow = len(shape.channels), len(shape.slow)
         calibration = counts_calibration(n_channels=n_channels, n_slow=n_slow)
         units = ("um",) * n_channels
-        return CanSource(
-            daq_settings(shape, link, units, **settings),
-            calibration,
-            clock or SystemClock(),
-            *([opener] if opener else []),
-        )
+        daq = daq_settings(shape, link, units, **settings)
+        return CanSource(daq, calibration, clock or SystemClock())
 
     return build
 
@@ -163,15 +157,18 @@ def read_up_to() -> Callable:
 
 
 @pytest.fixture
-def fake_bus() -> FakeBus:
-    return FakeBus()
+def fake_bus(monkeypatch) -> FakeBus:
+    """The bus that python-can opens, whatever virtual bus is asked for."""
+    bus = FakeBus()
+    monkeypatch.setattr("can.interfaces.virtual.VirtualBus", lambda *_, **__: bus)
+    return bus
 
 
 @pytest.fixture
-def fake_bus_source(shape_of, fake_bus, source_of):
+def fake_bus_source(shape_of, fake_bus, source_of):  # noqa: ARG001
     """Reads a device that sends when a test wants: that it does not is no pause."""
     settings = {"stale_after_s": 60.0, "when_full": "wait"}
-    return source_of(shape_of(), VIRTUAL, opener=lambda *_: fake_bus, **settings)
+    return source_of(shape_of(), VIRTUAL, **settings)
 
 
 @pytest.fixture

@@ -97,8 +97,9 @@ async def test_an_interface_that_says_it_is_in_error_is_a_lost_link(fake_bus_sou
             await anext(stream)
 
 
-async def test_silence_is_a_lost_link_after_the_stale_time(shape, fake_bus, source_of):
-    source = source_of(shape, VIRTUAL, opener=lambda *_: fake_bus, stale_after_s=0.2)
+@pytest.mark.usefixtures("fake_bus")
+async def test_silence_is_a_lost_link_after_the_stale_time(shape, source_of):
+    source = source_of(shape, VIRTUAL, stale_after_s=0.2)
     async with source.connect() as stream:
         with pytest.raises(LinkError, match="no complete sample for 0"):
             await anext(stream)
@@ -108,7 +109,7 @@ async def test_a_host_that_stood_still_takes_its_own_silence_for_no_silence_of_t
     shape, fake_bus, source_of, device
 ):
     clock, settings = HeldClock(), {"stale_after_s": 1.0, "when_full": "wait"}
-    source = source_of(shape, VIRTUAL, opener=lambda *_: fake_bus, clock=clock, **settings)
+    source = source_of(shape, VIRTUAL, clock=clock, **settings)
     async with source.connect() as stream:
         send_block(device, fake_bus)
         await anext(stream)
@@ -121,16 +122,20 @@ async def test_a_host_that_stood_still_takes_its_own_silence_for_no_silence_of_t
         await following
 
 
-async def test_a_source_cancelled_while_opening_leaves_no_thread(shape, fake_bus, source_of):
+async def test_a_source_cancelled_while_opening_leaves_no_thread(
+    shape, fake_bus, source_of, monkeypatch
+):
     opening, go_on = threading.Event(), threading.Event()
 
-    def slow(*_):
+    def slow(*_, **__):
         opening.set()
         go_on.wait(5.0)
         return fake_bus
 
+    monkeypatch.setattr("can.interfaces.virtual.VirtualBus", slow)
+
     async def connect():
-        async with source_of(shape, VIRTUAL, opener=slow).connect():
+        async with source_of(shape, VIRTUAL).connect():
             pass
 
     task = asyncio.create_task(connect())
@@ -209,11 +214,12 @@ def raised(kind: type[Exception]) -> Exception:
 
 
 @pytest.mark.parametrize("kind", FOREIGN, ids=lambda kind: kind.__name__)
-async def test_what_a_library_raises_on_opening_is_renamed(kind, shape, source_of):
-    def fails(*_):
+async def test_what_a_library_raises_on_opening_is_renamed(kind, shape, source_of, monkeypatch):
+    def fails(*_, **__):
         raise raised(kind)
 
-    source = source_of(shape, VIRTUAL, opener=fails)
+    monkeypatch.setattr("can.interfaces.virtual.VirtualBus", fails)
+    source = source_of(shape, VIRTUAL)
     with pytest.raises(AcquisitionError, match=WORDS):
         async with source.connect():
             pass
