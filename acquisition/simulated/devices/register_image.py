@@ -10,8 +10,7 @@ import numpy as np
 
 from acquisition.modbus.cells import DTYPES, FLOATS, N_BYTES, Cell, NumberType
 from acquisition.modbus.decoding import byte_permutation
-from acquisition.modbus.device_time import EpochTime
-from acquisition.modbus.register_map import FlagCheck, MapValue, Meaning, RegisterMap
+from acquisition.modbus.register_map import EpochTime, FlagCheck, MapValue, Meaning, RegisterMap
 from acquisition.modbus.requests import BIT_FUNCTIONS
 from acquisition.modbus.ring_profile import HEADER, MAGIC, VERSION, RingHeader, Slot
 from core.units import NS_PER_S

@@ -7,9 +7,15 @@ from pydantic import Field, model_validator
 
 from acquisition.modbus.cells import ByteOrder, Cell
 from acquisition.modbus.decoding import MapDecoder
-from acquisition.modbus.device_time import CALENDAR_FIELDS, CalendarTime, EpochTime
 from acquisition.modbus.read_plan import MapError
-from acquisition.modbus.register_map import RegisterMap, Signature, Together
+from acquisition.modbus.register_map import (
+    CALENDAR_FIELDS,
+    CalendarTime,
+    EpochTime,
+    RegisterMap,
+    Signature,
+    Together,
+)
 from service.settings.base import MisfitError, Settings
 from service.settings.sources.registers import (
     Address,

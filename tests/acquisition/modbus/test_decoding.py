@@ -7,8 +7,9 @@ import pytest
 
 from acquisition.modbus.cells import ByteOrder, Cell, NumberType
 from acquisition.modbus.decoding import MapDecoder, ValueState
-from acquisition.modbus.device_time import CalendarTime, EpochTime
 from acquisition.modbus.register_map import (
+    CalendarTime,
+    EpochTime,
     FlagCheck,
     FullScale,
     MapValue,

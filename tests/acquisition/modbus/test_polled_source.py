@@ -7,8 +7,7 @@ from rigs.polled import map_of, take
 from acquisition.delivery.polling import PollClock
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.cells import Cell, NumberType
-from acquisition.modbus.device_time import EpochTime
-from acquisition.modbus.register_map import FullScale, MapValue, RegisterMap, Signature
+from acquisition.modbus.register_map import EpochTime, FullScale, MapValue, RegisterMap, Signature
 from core.quality import GOOD, Level, Reason
 
 FLOAT = Cell(address=30, type=NumberType.FLOAT32)
