@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from pydantic import Field
 
 from core.alarms.alarm import PLANT, AlarmEvent
-from core.alarms.statistics import ChatterRule, figures_of, stale_alarms
+from core.alarms.statistics import figures_of, stale_alarms
 from core.limits import AlarmLevel
 from core.units import DAY_NS
 from service.api.auth.gate import Reach, needs, subject_router
@@ -23,7 +23,6 @@ from service.settings.alarm_kinds import LEVEL_NAMES, AlarmLevelName
 from service.settings.storage import Origin
 from service.store.access.identities import Permission
 from service.store.port import AlarmQuery
-from service.store.store import Store
 
 UnitKey = Annotated[str, Field(examples=["U1"])]
 
@@ -103,35 +102,24 @@ MAX_RATED = 100_000
 """Maximum number of events that are counted for one request."""
 
 
-def counted(
-    store: Store, wanted: AlarmQuery, units: Sequence[str], rule: ChatterRule
-) -> dict[str, object]:
+def counted(context: Context, units: Sequence[str], query: AlarmQuery) -> dict[str, object]:
     """Return the fields of `AlarmRatesModel` except `stale`, from the stored alarm events.
 
-    The function takes seconds for 100,000 events: call it in a thread.
+    `units` are the units to report, also of units without events; `query` has unit, start and end
+    of the events. The function takes seconds for 100,000 events: call it in a thread.
 
     Raises `StoreError` if the events cannot be read.
-
-    Parameters
-    ----------
-    wanted
-        Query with unit, start and end of the events.
-    units
-        Identifiers of the units to report, also of units without events.
-    rule
-        Definition of chattering alarms.
     """
-    newest_first = store.alarm_events(replace(wanted, limit=MAX_RATED + 1))
+    newest_first = context.store.alarm_events(replace(query, limit=MAX_RATED + 1))
     events = [stored.event for stored in reversed(newest_first)]
-    is_complete = len(events) <= MAX_RATED
-    start_ns, end_ns = wanted.start_ns, wanted.end_ns
+    start_ns, end_ns, is_complete = query.start_ns, query.end_ns, len(events) <= MAX_RATED
     if not is_complete:
         start_ns = min(events[0].time_ns + 1, end_ns - 1)
     about_plant = [PLANT] if any(event.identity.unit == PLANT for event in events) else []
     names = dict.fromkeys([*units, *about_plant])
 
     def figures(some: Iterable[AlarmEvent]) -> AlarmFiguresModel:
-        found = figures_of(some, start_ns, end_ns, rule)
+        found = figures_of(some, start_ns, end_ns, context.alarms.chatter_rule)
         n_by_level = {LEVEL_NAMES[level]: found.n_by_level[level] for level in AlarmLevel}
         return AlarmFiguresModel.of(found, n_by_level=n_by_level)
 
@@ -176,9 +164,8 @@ def alarm_rate_router(context: Context) -> APIRouter:
         if unit not in (None, PLANT):
             context.unit(unit)
         units = list(context.units) if unit is None else [unit]
-        wanted = AlarmQuery(unit=unit, start_ns=start_ns, end_ns=end_ns)
-        rule = context.alarms.chatter_rule
-        found = await asyncio.to_thread(counted, context.store, wanted, units, rule)
+        query = AlarmQuery(unit=unit, start_ns=start_ns, end_ns=end_ns)
+        found = await asyncio.to_thread(counted, context, units, query)
         shown = {*units, PLANT} if unit is None else {unit}
         stale = [a for a in stale_alarms(context.alarms.alarms, now_ns) if a.identity.unit in shown]
         return AlarmRatesModel.of(stale=[alarm_model(context, a) for a in stale], **found)

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Response
@@ -127,8 +128,8 @@ def read_page(
     """
     found = {}
     for name, audit in chains.items():
-        limits = {"limit": query.limit + 1, "before": before.get(name, query.before)}
-        found[name] = audit.entries(AuditQuery(**{**vars(query), **limits}))
+        newest = before.get(name, query.before)
+        found[name] = audit.entries(replace(query, limit=query.limit + 1, before=newest))
     merged = list(by_time(found.items(), newest_first=True))
     page = merged[: query.limit]
     if len(merged) == len(page):

@@ -312,17 +312,16 @@ def baseline_router(context: Context) -> APIRouter:
 
 
 def _baselines(context: Context, unit: str, bearing: str) -> BaselinesModel:
-    store, settings = context.store.films, context.films.settings
+    store = context.store.films
     entries, steps = list(store.baselines(unit, bearing)), list(store.steps(unit, bearing))
     versions, place = versions_after(steps), context.films.place(unit, bearing)
-    now_ns = context.clock.now_ns()
     return BaselinesModel.of(
         versions,
         unit=unit,
         bearing=bearing,
         estimator=place and place.estimator,
-        acceptance=settings.acceptance,
-        learning=place and learning_model(store, place, versions, entries, settings, now_ns),
+        acceptance=context.films.settings.acceptance,
+        learning=place and learning_model(context, place, versions, entries),
         versions=[version_model(entry, versions, steps) for entry in entries],
         steps=steps[::-1],
     )

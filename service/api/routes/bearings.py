@@ -219,15 +219,9 @@ def bearing_router(context: Context) -> APIRouter:
         if known is None or not known.has_uncertainty:
             detail = f"quantity {quantity!r} has no uncertainty budget; see /api/v1/quantities"
             raise ProblemError(404, "No uncertainty budget", detail)
-
-        def make() -> BudgetModel:
-            found = _budget(context.live.current(unit, bearing), quantity)
-            if found is None:
-                detail = f"{quantity} has no uncertainty budget: no value or too few segments"
-                raise ProblemError(409, "No result", detail)
-            return found
-
-        return await context.answers.of(request, lambda: context.live.revision(unit), make)
+        revision = partial(context.live.revision, unit)
+        make = partial(_budget, context, unit, bearing, quantity)
+        return await context.answers.of(request, revision, make)
 
     return router
 
@@ -243,23 +237,23 @@ def _bearing(context: Context, unit: str, bearing: str) -> BearingModel:
     )
 
 
-def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
+def _budget(context: Context, unit: str, bearing: str, quantity: str) -> BudgetModel:
     """Return the uncertainty budget of a quantity in the newest result.
 
-    The budget of the preferred stiffness is that of its estimator. None without a current result or
-    a budget.
+    The budget of the preferred stiffness is that of its estimator. Raises a problem of status 409
+    without a current result or a budget.
     """
-    assessment = current.assessment
-    if assessment is None or not current.is_current:
-        return None
-    source = quantity
-    if quantity.startswith("stiffness_"):
+    current = context.live.current(unit, bearing)
+    assessment, source = current.assessment if current.is_current else None, quantity
+    if assessment is not None and quantity.startswith("stiffness_"):
         axes = quantity.split("_")[1]
         estimator = assessment.estimators[axes]
         source = ESTIMATORS[estimator].stiffness.format(axes=axes) if estimator else quantity
-    budget = assessment.budgets.get(reported_name(assessment.budgets, source))
-    if budget is None:
-        return None
+    budgets = assessment.budgets if assessment else {}
+    budget = budgets.get(reported_name(budgets, source))
+    if assessment is None or budget is None:
+        detail = f"{quantity} has no uncertainty budget: no value or too few segments"
+        raise ProblemError(409, "No result", detail)
     quantity, (low, high) = reported_name(assessment.readings, quantity), budget.interval
     lines = sorted(budget.lines, key=lambda line: line.contribution, reverse=True)
     return BudgetModel.of(

@@ -1,7 +1,8 @@
 """Routes for the measuring channels of a unit and their newest samples."""
 
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Literal
 
 import numpy as np
 from fastapi import APIRouter, Response
@@ -9,7 +10,7 @@ from pydantic import Field
 
 from acquisition.delivery.units import UNIT_OF
 from core.arrays import SampleArray
-from core.quality import Level, Quality, Reason, bad, missing, worst
+from core.quality import Level, Reason, bad, missing, worst
 from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
 from service.api.auth.gate import subject_router
@@ -125,21 +126,14 @@ async def channels_model(live: LiveUnits, settings: UnitSettings) -> ChannelsMod
     blocks = await live.blocks(settings.id) if live.can_ask else ()
     newest = blocks[-1] if blocks else None
     shown = newest if why_not is None else None
-    why = why_not or Reason.WAITING_FOR_DATA
-    uses = _uses(settings)
+    why, uses = why_not or Reason.WAITING_FOR_DATA, _uses(settings)
     return ChannelsModel.of(
         unit=settings.id,
         rate_hz=settings.sampling_hz,
         time=newest and newest.stop_ns,
         received=live.status(settings.id).received_ns,
-        waveform=[
-            _waveform(settings, channel, uses.get(channel.id, []), shown, why)
-            for channel in settings.channel
-        ],
-        slow=[
-            _slow(channel, uses.get(channel.id, []), shown, why)
-            for channel in settings.slow_channel
-        ],
+        waveform=[_waveform(settings, one, uses[one.id], shown, why) for one in settings.channel],
+        slow=[_slow(one, uses[one.id], shown, why) for one in settings.slow_channel],
     )
 
 
@@ -162,46 +156,41 @@ def _waveform(
 ) -> WaveformChannelModel:
     rows = rows_of(settings, channel.id)
     quality = bad(why) if block is None else worst(block.channel_quality[row] for row in rows)
+    has_samples = not isinstance(settings.source, ModbusVectorSettings)
+    minimum = maximum = mean = None
+    if block is not None and quality.level is not Level.BAD and has_samples:
+        samples: SampleArray = block.samples[rows[0]]
+        minimum, maximum = float(samples.min()), float(samples.max())
+        mean = float(samples.mean(dtype=np.float64))
     return WaveformChannelModel.of(
         settings=channel,
         unit=UNIT_OF[channel.measurand],
         direction=channel.sign,
         used_by=used_by,
         quality=quality,
-        **_extent(settings, block, rows, quality),
+        minimum=minimum,
+        maximum=maximum,
+        mean=mean,
     )
-
-
-def _extent(
-    settings: UnitSettings, block: SampleBlock | None, rows: list[int], quality: Quality
-) -> dict[str, Any]:
-    """Return minimum, maximum and mean of a channel in a block; each None without samples."""
-    has_samples = not isinstance(settings.source, ModbusVectorSettings)
-    if block is None or quality.level is Level.BAD or not has_samples:
-        return {"minimum": None, "maximum": None, "mean": None}
-    samples: SampleArray = block.samples[rows[0]]
-    mean = float(samples.mean(dtype=np.float64))
-    return {"minimum": float(samples.min()), "maximum": float(samples.max()), "mean": mean}
 
 
 def _slow(
     channel: SlowChannelSettings, used_by: list[str], block: SampleBlock | None, why: Reason
 ) -> SlowChannelModel:
-    why = why if block is None else Reason.NOT_MEASURED
-    reading = (None if block is None else block.slow.get(channel.id)) or missing(why)
-    recorded = channel.recorded
-    name = None if recorded is None else recorded.reading
+    newest = block and block.slow.get(channel.id)
+    reading = newest or missing(Reason.NOT_MEASURED if block else why)
+    name = channel.recorded and channel.recorded.reading
     return SlowChannelModel.of(reading, settings=channel, used_by=used_by, reading=name)
 
 
-def _uses(settings: UnitSettings) -> dict[str, list[str]]:
+def _uses(settings: UnitSettings) -> Mapping[str, list[str]]:
     """Return the keys of the plant file that name each channel, by channel identifier."""
-    found: dict[str, list[str]] = {}
+    found = defaultdict[str, list[str]](list)
     for key in UNIT_USES:
-        found.setdefault(getattr(settings, key), []).append(key)
+        found[getattr(settings, key)].append(key)
     for bearing in settings.bearing:
         for key in USES:
-            found.setdefault(getattr(bearing, key), []).append(f"{bearing.id} {key}")
+            found[getattr(bearing, key)].append(f"{bearing.id} {key}")
     return found
 
 
@@ -262,8 +251,9 @@ def channel_router(context: Context) -> APIRouter:
         """
         settings = context.unit(unit)
         chosen = _chosen(settings, channel)
-        blocks, received_ns = await held_blocks(context.live, unit)
-        n_samples = _n_samples(seconds, blocks[-1].rate_hz, len(chosen))
+        blocks, received_ns = await held_blocks(context.live, settings)
+        words = f" for {len(chosen)} channels"
+        n_samples = count_of(seconds, blocks[-1].rate_hz, MAX_NUMBERS / len(chosen), words)
         rows = {each: rows_of(settings, each)[0] for each in chosen}
 
         def model() -> WaveformModel:
@@ -276,18 +266,16 @@ def channel_router(context: Context) -> APIRouter:
     return router
 
 
-def require_samples(settings: UnitSettings) -> None:
-    """Raise a problem of status 409 if the source of a unit delivers no samples."""
-    if isinstance(settings.source, ModbusVectorSettings):
-        detail = f"unit {settings.id!r} has no samples, because its device sends only amplitudes"
-        raise ProblemError(409, "No samples", detail)
-
-
-async def held_blocks(live: LiveUnits, unit: str) -> tuple[Sequence[SampleBlock], int]:
+async def held_blocks(live: LiveUnits, settings: UnitSettings) -> tuple[Sequence[SampleBlock], int]:
     """Return the newest blocks of a unit, oldest first, and the arrival time of the newest.
 
-    The time is in ns since 1970 UTC. Raises a problem of status 409 before the first block.
+    The time is in ns since 1970 UTC. Raises a problem of status 409 before the first block, and if
+    the device of the unit sends no samples.
     """
+    unit = settings.id
+    if isinstance(settings.source, ModbusVectorSettings):
+        detail = f"unit {unit!r} has no samples, because its device sends only amplitudes"
+        raise ProblemError(409, "No samples", detail)
     blocks, received_ns = await live.blocks(unit), live.status(unit).received_ns
     if not blocks or received_ns is None:
         raise ProblemError(409, "No samples", f"no sample of unit {unit!r} has arrived yet")
@@ -295,7 +283,6 @@ async def held_blocks(live: LiveUnits, unit: str) -> tuple[Sequence[SampleBlock]
 
 
 def _chosen(settings: UnitSettings, channels: list[str] | None) -> list[str]:
-    require_samples(settings)
     known = [channel.id for channel in settings.channel]
     for each in channels or ():
         if each not in known:
@@ -304,10 +291,13 @@ def _chosen(settings: UnitSettings, channels: list[str] | None) -> list[str]:
     return list(dict.fromkeys(channels or known))
 
 
-def _n_samples(seconds: float, rate_hz: float, n_channels: int) -> int:
+def count_of(seconds: float, rate_hz: float, maximum: float, words: str = "") -> int:
+    """Return the number of samples in a duration; raise a problem of status 422 above `maximum`.
+
+    `words` state what the maximum applies to.
+    """
     n_samples = max(1, round(seconds * rate_hz))
-    if n_samples * n_channels > MAX_NUMBERS:
-        longest_s = MAX_NUMBERS / n_channels / rate_hz
-        detail = f"seconds must be at most {longest_s:g} for {n_channels} channels, got {seconds:g}"
+    if n_samples > maximum:
+        detail = f"seconds must be at most {maximum / rate_hz:g}{words}, got {seconds:g}"
         raise ProblemError(422, "Wrong parameter", detail, "seconds")
     return n_samples

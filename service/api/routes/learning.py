@@ -10,12 +10,12 @@ from core.baseline.history import DIRECTIONS, ReadingOutcome
 from core.change.decision import JUDGED
 from core.condition.operating_state import STEADY
 from core.units import DAY_NS
+from service.api.context import Context
 from service.api.values import ApiModel, Time
 from service.live.commands import FilmPlace
 from service.settings.films import FilmAlarmSettings
 from service.store.baselines import BaselineEntry, Versions
 from service.store.film_readings import FilmHistory, FilmQuery
-from service.store.films import FilmStore
 
 RECENT_DAYS = 7.0
 
@@ -65,28 +65,25 @@ class LearningModel(ApiModel):
 
 
 def learning_model(
-    store: FilmStore,
-    place: FilmPlace,
-    versions: Versions,
-    entries: list[BaselineEntry],
-    settings: FilmAlarmSettings,
-    now_ns: int,
+    context: Context, place: FilmPlace, versions: Versions, entries: list[BaselineEntry]
 ) -> LearningModel:
     """Return the API model of the progress of learning a baseline.
 
     `versions` is the state of the baseline versions of the bearing, `entries` are all its
-    baselines. `now_ns` is the host time, ns since 1970 UTC.
+    baselines.
     """
-    since_ns = versions.renewed_ns
-    if since_ns is None:
-        since_ns = store.first_ns(place.unit, place.bearing, place.estimator)
+    store, settings, now_ns = context.store.films, context.films.settings, context.clock.now_ns()
+    film = (place.unit, place.bearing, place.estimator)
+    since_ns = store.first_ns(*film) if versions.renewed_ns is None else versions.renewed_ns
     until_ns: int | None = None
     counts: tuple[int, int] | None = (0, 0)
     if since_ns is not None:
         until_ns = since_ns + round(settings.learning_days * DAY_NS)
         learned = [e for e in entries if e.estimator is place.estimator]
         is_learned = any(entry.learned_from_ns >= since_ns for entry in learned)
-        counts = None if is_learned else _counts(store, place, since_ns, until_ns, settings)
+        period = FilmQuery(*film, since_ns, until_ns + 1)
+        counts = None if is_learned else _counts(store.history(period), settings)
+    recent = store.history(FilmQuery(*film, now_ns - round(RECENT_DAYS * DAY_NS)))
     return LearningModel.of(
         since=since_ns,
         until=until_ns,
@@ -94,30 +91,19 @@ def learning_model(
         n_readings=counts and counts[0],
         n_days=counts and counts[1],
         n_days_wanted=settings.baseline.min_learning_days,
-        recent=_recent(store, place, settings, now_ns),
+        recent=_recent(recent, settings),
     )
 
 
-def _counts(
-    store: FilmStore, place: FilmPlace, since_ns: int, until_ns: int, settings: FilmAlarmSettings
-) -> tuple[int, int]:
-    """Return `LearningModel.n_readings` and `n_days` of a learning period."""
-    found = store.history(
-        FilmQuery(place.unit, place.bearing, place.estimator, since_ns, until_ns + 1)
-    )
-    if not len(found):
-        return 0, 0
+def _counts(found: FilmHistory, settings: FilmAlarmSettings) -> tuple[int, int]:
+    """Return `LearningModel.n_readings` and `n_days` of the readings of a learning period."""
     usable = found.is_settled & ~np.any(found.level > 0, axis=0)
     rows = [usable & complete for complete in _complete(found, settings)]
     time_ns = found.history.time_ns
     return min((int(row.sum()), np.unique(time_ns[row] // DAY_NS).size) for row in rows)
 
 
-def _recent(
-    store: FilmStore, place: FilmPlace, settings: FilmAlarmSettings, now_ns: int
-) -> ReadingCountsModel:
-    since_ns = now_ns - round(RECENT_DAYS * DAY_NS)
-    found = store.history(FilmQuery(place.unit, place.bearing, place.estimator, since_ns))
+def _recent(found: FilmHistory, settings: FilmAlarmSettings) -> ReadingCountsModel:
     n_complete = [(found.is_settled & row).sum() for row in _complete(found, settings)]
     is_judged = np.isin(found.verdict, [int(verdict) for verdict in JUDGED])
     return ReadingCountsModel(

@@ -1,6 +1,5 @@
 """Routes for the sampled motion of a shaft in its bearing, live and from recordings."""
 
-from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
@@ -10,18 +9,16 @@ from pydantic import BeforeValidator, Field
 from acquisition.errors import ConfigError
 from core.arrays import FloatArray
 from core.machine.unit import Bearing
-from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
 from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import duration, parameter
 from service.api.problems import ProblemError, problem_responses
-from service.api.routes.channels import NEWEST, NO_SAMPLES, held_blocks, require_samples
+from service.api.routes.channels import NEWEST, NO_SAMPLES, count_of, held_blocks
 from service.api.routes.recordings import RecordingId, entry_of, library_of, readable
 from service.api.values import ApiModel, BearingAnswer, SampleRange, Time, listed
 from service.live.samples import newest_blocks, sample_window
 from service.live.status import HELD_S
-from service.recordings.library import RecordingEntry
 from service.recordings.motion import (
     ShaftMotion,
     channels_for,
@@ -29,7 +26,6 @@ from service.recordings.motion import (
     recorded_motion,
 )
 from service.settings.core_values import machine_of
-from service.settings.units import UnitSettings
 
 DECIMALS = 3
 """Number of decimals of displacements in µm, finer than a tenth of a converter count."""
@@ -158,10 +154,19 @@ def motion_router(context: Context) -> APIRouter:
         """Return the newest motion of a shaft in its bearing, unfiltered and as 1× component."""
         context.bearing(unit, bearing)
         settings, watched = context.unit(unit), context.references.bearing(unit, bearing)
-        require_samples(settings)
-        blocks, received_ns = await held_blocks(context.live, unit)
-        _require_few(seconds, blocks[-1].rate_hz)
-        return await rendered(lambda: _newest(settings, watched, blocks, seconds, received_ns))
+        blocks, received_ns = await held_blocks(context.live, settings)
+        n_samples = count_of(seconds, blocks[-1].rate_hz, MAX_SAMPLES)
+
+        def model() -> MotionModel:
+            machine = machine_of(settings)
+            ids = [channel.id for channel in machine.channels]
+            rows = {id_: ids.index(id_) for id_ in channels_for(machine, watched)}
+            held, first, n_held = newest_blocks(blocks, n_samples)
+            found = motion_of(sample_window(held, rows, first, n_held), machine, watched)
+            newest = {"recording": None, "offset_s": None, "total_s": None}
+            return motion_model(unit, watched, found, **newest, received=received_ns)
+
+        return await rendered(model)
 
     return router
 
@@ -193,58 +198,25 @@ def recorded_motion_router(context: Context) -> APIRouter:
         """
         kept = await entry_of(context, recording)
         with readable(recording):
-            unit, rate_hz = _described(context, kept)
+            if kept.manifest is None:
+                raise ConfigError(kept.fault or "no manifest")
+            unit = kept.manifest.unit
+            if unit not in context.units:
+                detail = f"recording {kept.name} is of unit {unit!r}, which is not in this plant"
+                raise ProblemError(409, "No samples", detail)
             context.bearing(unit, bearing)
             watched = context.references.bearing(unit, bearing)
-            _require_few(seconds, rate_hz)
-            return await rendered(lambda: _recorded(context, kept.name, watched, start_s, seconds))
+            count_of(seconds, kept.manifest.rate_hz, MAX_SAMPLES)
+
+            def model() -> MotionModel:
+                opened, machine = (
+                    library_of(context).opened(recording),
+                    machine_of(context.unit(unit)),
+                )
+                found = recorded_motion(opened, machine, watched, start_s, seconds)
+                position = {"offset_s": found.offset_s, "total_s": found.total_s, "received": None}
+                return motion_model(unit, watched, found.motion, recording=recording, **position)
+
+            return await rendered(model)
 
     return router
-
-
-def _newest(
-    settings: UnitSettings,
-    bearing: Bearing,
-    blocks: Sequence[SampleBlock],
-    seconds: float,
-    received_ns: int,
-) -> MotionModel:
-    machine = machine_of(settings)
-    ids = [channel.id for channel in machine.channels]
-    rows = {id_: ids.index(id_) for id_ in channels_for(machine, bearing)}
-    n_wanted = max(1, round(seconds * blocks[-1].rate_hz))
-    held, first_index, n_samples = newest_blocks(blocks, n_wanted)
-    found = motion_of(sample_window(held, rows, first_index, n_samples), machine, bearing)
-    newest = {"recording": None, "offset_s": None, "total_s": None, "received": received_ns}
-    return motion_model(settings.id, bearing, found, **newest)
-
-
-def _recorded(
-    context: Context, name: str, bearing: Bearing, start_s: float, seconds: float
-) -> MotionModel:
-    recording = library_of(context).opened(name)
-    unit = recording.manifest.unit
-    machine = machine_of(context.unit(unit))
-    found = recorded_motion(recording, machine, bearing, start_s, seconds)
-    position = {"offset_s": found.offset_s, "total_s": found.total_s}
-    return motion_model(unit, bearing, found.motion, recording=name, received=None, **position)
-
-
-def _described(context: Context, kept: RecordingEntry) -> tuple[str, float]:
-    """Return unit and sampling rate, Hz, of a recording; raise `ConfigError` if they are unknown.
-
-    Raises a problem of status 409 if the unit is not in this plant.
-    """
-    if kept.manifest is None:
-        raise ConfigError(kept.fault or "no manifest")
-    unit = kept.manifest.unit
-    if unit not in context.units:
-        detail = f"recording {kept.name} is of unit {unit!r}, which is not in this plant"
-        raise ProblemError(409, "No samples", detail)
-    return unit, kept.manifest.rate_hz
-
-
-def _require_few(seconds: float, rate_hz: float) -> None:
-    if seconds * rate_hz > MAX_SAMPLES:
-        detail = f"seconds must be at most {MAX_SAMPLES / rate_hz:g}, got {seconds:g}"
-        raise ProblemError(422, "Wrong parameter", detail, "seconds")

@@ -131,20 +131,16 @@ DECIMALS = 6
 """Number of decimals of amplitudes in µm, more than the precision of stored spectra."""
 
 
-def _require_few(n_spectra: int, n_numbers: int) -> None:
-    if n_spectra * n_numbers > MAX_NUMBERS:
-        detail = (
-            f"{n_spectra} spectra of {n_numbers} amplitudes are too many; ask for at most"
-            f" {max(2, MAX_NUMBERS // n_numbers)} spectra or fewer channels, or lower"
-            " max_frequency_hz"
-        )
-        raise ProblemError(422, "Wrong parameter", detail, "max_spectra")
-
-
 def _place(shown: Sequence[StoredSpectrum], place: PlaceName, n_lines: int) -> PlaceSpectraModel:
     rows = [each.amplitude_um_pk[PLACES[place], :n_lines] for each in shown]
     amplitude = [None if np.isnan(row).any() else np.round(row, DECIMALS).tolist() for row in rows]
     return PlaceSpectraModel(unit="um_pk", amplitude=amplitude)
+
+
+def _channel(spectrum: CrossSpectrum, place: int) -> SpectrumChannelModel:
+    is_usable = spectrum.n_segments[place, place]
+    amplitude = spectrum.amplitude_um_pk(place).tolist() if is_usable else None
+    return SpectrumChannelModel(unit="um_pk", amplitude=amplitude)
 
 
 def _full(spectrum: CrossSpectrum, x: int, y: int, sense: int) -> FullSpectrumModel | None:
@@ -167,15 +163,7 @@ def spectrum_model(assessment: Assessment, rotation_sense: int) -> SpectrumModel
     return SpectrumModel.of(
         time=assessment.time_ns,
         frequency_hz=spectrum.frequency_hz.tolist(),
-        channels={
-            name: SpectrumChannelModel(
-                unit="um_pk",
-                amplitude=spectrum.amplitude_um_pk(place).tolist()
-                if spectrum.n_segments[place, place]
-                else None,
-            )
-            for name, place in PLACES.items()
-        },
+        channels={name: _channel(spectrum, place) for name, place in PLACES.items()},
         full={
             "shaft": _full(spectrum, SHAFT_X, SHAFT_Y, rotation_sense),
             "bearing": _full(spectrum, BEARING_X, BEARING_Y, rotation_sense),
@@ -257,7 +245,14 @@ def _read(
     frequency_hz = bin_hz * np.arange(1, n_lines + 1, dtype=np.float64)
     if max_frequency_hz is not None:
         frequency_hz = frequency_hz[frequency_hz <= max_frequency_hz]
-    _require_few(len(shown), len(places) * frequency_hz.size)
+    n_numbers = len(places) * frequency_hz.size
+    if len(shown) * n_numbers > MAX_NUMBERS:
+        detail = (
+            f"{len(shown)} spectra of {n_numbers} amplitudes are too many; ask for at most"
+            f" {max(2, MAX_NUMBERS // n_numbers)} spectra or fewer channels, or lower"
+            " max_frequency_hz"
+        )
+        raise ProblemError(422, "Wrong parameter", detail, "max_spectra")
     return SpectraModel.of(
         query,
         found,
