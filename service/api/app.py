@@ -44,7 +44,6 @@ from service.api.routes.notes import note_router
 from service.api.routes.overview import overview_router
 from service.api.routes.plant import plant_router
 from service.api.routes.recordings import recording_router
-from service.api.routes.references import reference_router
 from service.api.routes.spectra import spectra_router
 from service.api.routes.trends import trend_router
 
@@ -216,6 +215,15 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
         """Return the OpenAPI document, which is rendered once, not for each request."""
         return await context.answers.of(request, lambda: 0, app.openapi)
 
+    async def require_known(request: Request) -> None:
+        """Refuse parameters that a route does not have, and unknown units and bearings."""
+        await refuse_unknown_parameters(request)
+        match request.path_params:
+            case {"unit": unit, "bearing": bearing}:
+                context.bearing(unit, bearing)
+            case {"unit": unit}:
+                context.unit(unit)
+
     for router in (
         # routes are tried in this order: first those that every open page polls
         overview_router(context),
@@ -228,7 +236,6 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
         channel_router(context),
         spectra_router(context),
         motion_router(context),
-        reference_router(context),
         note_router(context),
         film_router(context),
         film_history_router(context),
@@ -240,6 +247,6 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
         access_router(context, authenticator),
         *others,
     ):
-        app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
+        app.include_router(router, dependencies=[Depends(require_known)])
     app.declared = declared(app)  # raises an error for a route without a declaration
     return app

@@ -8,8 +8,7 @@ import typer
 
 from acquisition.clock import SystemClock
 from core.machine.unit import Bearing
-from service.api.routes.bearings import ReferenceModel, reference_model
-from service.api.routes.references import SetReferenceModel
+from service.api.routes.bearings import ReferenceModel, SetReferenceModel, reference_model
 from service.app.storage import has_store
 from service.cli.options import (
     JsonOutput,

@@ -19,7 +19,7 @@ from service.api.values import (
     ByName,
     CellModel,
     FilmConditionModel,
-    OperatingStateName,
+    OperatingStateOf,
     Time,
     TimeNs,
     cell_of,
@@ -56,7 +56,7 @@ class HoldModel(ApiModel):
 class RaisedAtModel(ApiModel):
     """Operating condition under which an occurrence of an alarm was raised."""
 
-    operating_state: Annotated[OperatingStateName, ByName]
+    operating_state: OperatingStateOf
     eccentricity_ratio: Annotated[float | None, Field(examples=[0.37])]
     attitude_deg: Annotated[float | None, Field(examples=[47.0])]
     oil_temperature_c: Annotated[float | None, Field(examples=[46.2])]
@@ -322,9 +322,7 @@ def event_model(stored: StoredEvent, grid: CellGrid) -> AlarmEventModel:
 
 
 def _raised_at(point: OperatingPoint | None, grid: CellGrid) -> RaisedAtModel | None:
-    if point is None:
-        return None
-    return RaisedAtModel.of(point, operating_state=point.state, cell=cell_of(point, grid))
+    return None if point is None else RaisedAtModel.of(point, cell=cell_of(point, grid))
 
 
 def _urgency(alarm: Alarm) -> tuple[bool, bool, int, int]:

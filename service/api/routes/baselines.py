@@ -252,19 +252,16 @@ def baseline_router(context: Context) -> APIRouter:
     @router.get("", response_model=BaselinesModel)
     async def baselines(unit: UnitId, bearing: BearingId) -> Response:
         """Return all baseline versions of a bearing, their history, and progress of learning."""
-        context.bearing(unit, bearing)
         return await rendered(lambda: _baselines(context, unit, bearing))
 
     @router.get("/{version}", response_model=BaselineModel)
     async def one_baseline(unit: UnitId, bearing: BearingId, version: Version) -> Response:
         """Return the cells of a baseline with their bounds, stiffness and scatter."""
-        context.bearing(unit, bearing)
         return await rendered(lambda: _baseline(context, unit, bearing, version))
 
     @router.get("/{version}/export", responses=EXPORTED, response_class=Response)
     async def export_baseline(unit: UnitId, bearing: BearingId, version: Version) -> Response:
         """Export the complete baseline as a JSON document, which padwatch can read without loss."""
-        context.bearing(unit, bearing)
         found = await asyncio.to_thread(lambda: to_json(_stored(context, unit, bearing, version)))
         name = f"{unit}-{bearing}-baseline-{version}.json"
         headers = {"Content-Disposition": f'attachment; filename="{name}"'}
@@ -351,7 +348,6 @@ def _stored(context: Context, unit: str, bearing: str, version: int) -> BearingB
 
 
 def _require_version(context: Context, unit: str, bearing: str, version: int) -> None:
-    context.bearing(unit, bearing)
     entries = context.store.films.baselines(unit, bearing)
     if version not in [entry.version for entry in entries]:
         raise _unknown_version(unit, bearing, version)

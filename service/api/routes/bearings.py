@@ -1,5 +1,6 @@
-"""Routes for guide bearings: configuration, newest result, uncertainty budgets."""
+"""Routes for guide bearings: configuration, newest result, uncertainty budgets, references."""
 
+import asyncio
 from collections.abc import Mapping
 from functools import partial
 from typing import Annotated, Literal
@@ -12,14 +13,19 @@ from core.monitor.catalogue import quantity_named, quantity_of
 from core.spectra.runout import RunoutVerdict
 from core.spectra.speed import SpeedSource
 from core.stiffness.estimators import ESTIMATORS, reported_name
-from service.api.auth.gate import subject_router
+from service.api.auth.gate import actor_or, needs, subject_router
 from service.api.context import BearingId, Context, QuantityName, UnitId
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import (
     PLACES,
+    ActorModel,
     ApiModel,
     BearingAnswer,
+    ByName,
     NoteOrNone,
+    NoteText,
+    OperatingStateName,
+    PlaceName,
     QualityModel,
     ReadingModel,
     Time,
@@ -28,9 +34,11 @@ from service.api.values import (
     reading_model,
     window_model,
 )
+from service.live.commands import TakeReference
 from service.live.current_state import LiveUnits
 from service.live.models import BudgetLineModel
 from service.live.status import CurrentBearing
+from service.store.access.identities import Permission
 from service.store.references import GapReference
 
 MicrometrePair = Annotated[
@@ -145,6 +153,55 @@ class BudgetModel(ApiModel):
     """Contributions to the uncertainty, largest first."""
 
 
+class SetReferenceModel(ApiModel):
+    """Stored gap reference of a bearing: probe gaps with the shaft centred."""
+
+    set: Time
+    author: str
+    note: NoteOrNone
+
+    gap_reference_um: MicrometrePair
+    """Probe gaps [x, y] with the shaft centred, µm."""
+
+    opposite_reference_um: MicrometrePair | None
+    """Gaps of the probes across the shaft, µm; null without such probes."""
+
+    source: Literal["given", "measured"]
+    """Source: values entered by hand ("given"), or mean measured gaps ("measured")."""
+
+
+class VectorModel(ApiModel):
+    """Vibration vector of 1×: amplitude and phase."""
+
+    amplitude_um_pk: Annotated[float, Field(examples=[61.2])]
+    """Amplitude, µm zero-to-peak."""
+
+    phase_deg: Annotated[float | None, Field(examples=[134.8])]
+    """Phase lead over the key-phase pulse, degrees; null without a key-phase, when only amplitudes
+    are compared."""
+
+
+class Order1ReferenceModel(BearingAnswer):
+    """Stored 1× reference of a bearing: vibration vectors in the healthy state."""
+
+    set: Time
+    author: str
+    note: NoteOrNone
+
+    state: Annotated[OperatingStateName, ByName]
+    """Operating state to which the reference applies."""
+
+    vectors: dict[PlaceName, VectorModel]
+    """Reference vectors of 1×, by channel."""
+
+
+class TakeReferenceModel(ActorModel):
+    """Request to store the current 1× vectors of a bearing as reference."""
+
+    note: NoteText = ""
+    """Note, at most 500 printable characters."""
+
+
 def reference_model(reference: GapReference | None) -> ReferenceModel:
     """Return the API model of the origin of a gap reference.
 
@@ -183,6 +240,9 @@ def latest_model(live: LiveUnits, unit: str, bearing: str) -> LatestModel:
     )
 
 
+TAKE_PROBLEMS = problem_responses(own={409: "The present condition does not permit a reference"})
+
+
 def bearing_router(context: Context) -> APIRouter:
     """Return the router for bearings."""
     router = subject_router("/units/{unit}/bearings", "bearing")
@@ -190,7 +250,7 @@ def bearing_router(context: Context) -> APIRouter:
     @router.get("")
     async def bearings(unit: UnitId) -> list[BearingModel]:
         """List the guide bearings of a unit with their configuration and gap reference in force."""
-        return [_bearing(context, unit, bearing.id) for bearing in context.unit(unit).bearing]
+        return [_bearing(context, unit, bearing.id) for bearing in context.units[unit].bearing]
 
     @router.get("/{bearing}")
     async def one_bearing(unit: UnitId, bearing: BearingId) -> BearingModel:
@@ -200,7 +260,6 @@ def bearing_router(context: Context) -> APIRouter:
     @router.get("/{bearing}/latest", response_model=LatestModel)
     async def newest_result(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the newest result of a bearing; readings are null if the result is not current."""
-        context.bearing(unit, bearing)
         make = partial(latest_model, context.live, unit, bearing)
         revision = partial(context.live.revision, unit)
         return await context.answers.of(request, revision, make, is_polled=True)
@@ -214,7 +273,6 @@ def bearing_router(context: Context) -> APIRouter:
         request: Request, unit: UnitId, bearing: BearingId, quantity: QuantityName
     ) -> Response:
         """Return the uncertainty budget of a quantity in the newest result."""
-        context.bearing(unit, bearing)
         known = quantity_named(quantity)
         if known is None or not known.has_uncertainty:
             detail = f"quantity {quantity!r} has no uncertainty budget; see /api/v1/quantities"
@@ -222,6 +280,39 @@ def bearing_router(context: Context) -> APIRouter:
         revision = partial(context.live.revision, unit)
         make = partial(_budget, context, unit, bearing, quantity)
         return await context.answers.of(request, revision, make)
+
+    @router.get("/{bearing}/references")
+    async def gap_references(unit: UnitId, bearing: BearingId) -> list[SetReferenceModel]:
+        """List the stored gap references of a bearing, newest first, at most 1000.
+
+        The newest reference comes into force a few seconds after it was set. Without stored
+        references, the reference of the plant file applies.
+        """
+        history = await asyncio.to_thread(context.store.gap_references.history, unit, bearing)
+        return [SetReferenceModel.of(reference) for reference in history]
+
+    @router.get("/{bearing}/order1-references", name="references")
+    async def order1_references(unit: UnitId, bearing: BearingId) -> list[Order1ReferenceModel]:
+        """List the stored 1× references of a bearing, newest first, at most 1000.
+
+        In each operating state, the newest reference of this state applies. Without stored
+        references, the reference of the plant file applies.
+        """
+        history = await asyncio.to_thread(context.store.order1_references.history, unit, bearing)
+        return [Order1ReferenceModel.of(found, found.reference) for found in history]
+
+    @router.post(
+        "/{bearing}/order1-references",
+        responses=TAKE_PROBLEMS,
+        dependencies=[needs(Permission.CHANGE_MEASURING)],
+    )
+    async def take_order1_reference(
+        unit: UnitId, bearing: BearingId, asked: TakeReferenceModel
+    ) -> Order1ReferenceModel:
+        """Store the 1× vectors of the newest result as reference for its operating state."""
+        command = TakeReference(unit, bearing, actor_or(asked.actor), asked.note)
+        taken = await context.operators.take_reference(command)
+        return Order1ReferenceModel.of(taken, taken.reference)
 
     return router
 

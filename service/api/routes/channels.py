@@ -235,7 +235,7 @@ def channel_router(context: Context) -> APIRouter:
 
         The state is that of the newest block of samples; the values of a bad channel are null.
         """
-        return await channels_model(context.live, context.unit(unit))
+        return await channels_model(context.live, context.units[unit])
 
     @router.get("/waveform", responses=NO_SAMPLES, response_model=WaveformModel)
     async def newest_samples(
@@ -249,7 +249,7 @@ def channel_router(context: Context) -> APIRouter:
 
         Missing samples and samples of a bad channel are null.
         """
-        settings = context.unit(unit)
+        settings = context.units[unit]
         chosen = _chosen(settings, channel)
         blocks, received_ns = await held_blocks(context.live, settings)
         words = f" for {len(chosen)} channels"

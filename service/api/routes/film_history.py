@@ -205,9 +205,6 @@ MAX_READ = 120_000
 """Maximum number of readings that one request reads: two years of readings every ten minutes."""
 
 
-READING_PROBLEMS = problem_responses(own={409: "The film is not watched"})
-
-
 def film_history_router(context: Context) -> APIRouter:
     """Return the router for the stored readings of a film."""
     router = subject_router("/units/{unit}/bearings/{bearing}/film", "film")
@@ -215,7 +212,8 @@ def film_history_router(context: Context) -> APIRouter:
     @router.get(
         "/readings",
         response_model=FilmReadingsModel,
-        responses={**READING_PROBLEMS, **table_content("Readings, by column")},
+        responses=problem_responses(own={409: "The film is not watched"})
+        | table_content("Readings, by column"),
     )
     async def film_readings(
         request: Request,

@@ -397,7 +397,6 @@ def _deviation(finding: FilmFinding) -> FilmDeviationModel | None:
 
 def watched_place(context: Context, unit: str, bearing: str) -> FilmPlace:
     """Return unit, bearing and estimator of a film; raise a problem if the film is not watched."""
-    context.bearing(unit, bearing)
     place = context.films.place(unit, bearing)
     if place is None:
         detail = f"the film of unit {unit} bearing {bearing} is not watched: "
@@ -415,7 +414,6 @@ def film_router(context: Context) -> APIRouter:
 
         A film that cannot be judged is never reported as normal; its verdict states the reason.
         """
-        context.bearing(unit, bearing)
         make = partial(film_model, context, unit, bearing)
         revision = partial(context.now_revision, unit)
         return await context.answers.of(request, revision, make, is_polled=True)

@@ -152,8 +152,7 @@ def motion_router(context: Context) -> APIRouter:
         seconds: Annotated[float, duration(HELD_S, NEWEST, examples=[5.0])] = 5.0,
     ) -> Response:
         """Return the newest motion of a shaft in its bearing, unfiltered and as 1× component."""
-        context.bearing(unit, bearing)
-        settings, watched = context.unit(unit), context.references.bearing(unit, bearing)
+        settings, watched = context.units[unit], context.references.bearing(unit, bearing)
         blocks, received_ns = await held_blocks(context.live, settings)
         n_samples = count_of(seconds, blocks[-1].rate_hz, MAX_SAMPLES)
 
@@ -211,7 +210,7 @@ def recorded_motion_router(context: Context) -> APIRouter:
             def model() -> MotionModel:
                 opened, machine = (
                     library_of(context).opened(recording),
-                    machine_of(context.unit(unit)),
+                    machine_of(context.units[unit]),
                 )
                 found = recorded_motion(opened, machine, watched, start_s, seconds)
                 position = {"offset_s": found.offset_s, "total_s": found.total_s, "received": None}

@@ -38,13 +38,11 @@ def note_router(context: Context) -> APIRouter:
 
         Of a unit, the 1000 notes that were added last are listed, the newest first.
         """
-        context.unit(unit)
         return await asyncio.to_thread(notes_between, context.store.audit, unit, *times)
 
     @router.post("", responses=COMMENT_LIMIT, dependencies=[needs(Permission.ACT_ON_ALARMS)])
     async def add_note(request: Request, unit: UnitId, asked: AddNoteModel) -> Note:
         """Add a note; the audit trail records it, and it is never changed or deleted."""
-        context.unit(unit)
         if asked.bearing is not None:
             context.bearing(unit, asked.bearing)
         time_ns = ns_from_datetime(asked.time, "time")

@@ -207,7 +207,7 @@ def plant_router(context: Context) -> APIRouter:
     @router.get("/units/{unit}")
     async def one_unit(unit: UnitId) -> UnitModel:
         """Return a unit with the state of its source."""
-        return _unit(context, context.unit(unit).id)
+        return _unit(context, unit)
 
     @router.get("/quantities", dependencies=[needs(Permission.READ, Reach.NO_UNIT)])
     async def quantities() -> list[QuantityModel]:
@@ -228,8 +228,8 @@ def plant_router(context: Context) -> APIRouter:
     @router.get("/units/{unit}/gaps")
     async def gaps(unit: UnitId, times: TimeRange) -> list[GapModel]:
         """List gaps that end in the time range, oldest first, including stops of the service."""
-        found = await asyncio.to_thread(context.store.gaps, context.unit(unit).id, *times)
-        rate_hz = context.unit(unit).sampling_hz
+        found = await asyncio.to_thread(context.store.gaps, unit, *times)
+        rate_hz = context.units[unit].sampling_hz
         return [_gap_model(gap, rate_hz) for gap in found]
 
     @router.get(

@@ -186,8 +186,7 @@ def spectra_router(context: Context) -> APIRouter:
     )
     async def newest_spectra(request: Request, unit: UnitId, bearing: BearingId) -> Response:
         """Return the averaged amplitude spectra of the newest result, all as displacement."""
-        context.bearing(unit, bearing)
-        sense = machine_of(context.unit(unit)).rotation_sense
+        sense = machine_of(context.units[unit]).rotation_sense
 
         async def newest() -> SpectrumModel:
             found = await context.live.assessment(unit, bearing)
@@ -218,7 +217,6 @@ def spectra_router(context: Context) -> APIRouter:
 
         Thinning omits spectra between those returned; it does not average them.
         """
-        context.bearing(unit, bearing)
         places = list(dict.fromkeys(channel or PLACES))
         query = SpectraQuery(unit, bearing, *times, max_spectra)
 

@@ -294,7 +294,6 @@ def trend_router(context: Context) -> APIRouter:
 
         As CSV or Parquet: one row per time; with `group_by`, one row per group and time.
         """
-        context.bearing(unit, bearing)
         if cursor is not None and group_by is not None:
             detail = "cursor and group_by cannot be combined; omit one"
             raise ProblemError(422, "Wrong parameter", detail, "cursor")
