@@ -7,6 +7,7 @@ import secrets
 import time
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Hashable, Iterable, Mapping
+from contextlib import suppress
 from contextvars import copy_context
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -273,8 +274,11 @@ class Repetition:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request, or forward it."""
-        began_s = time.perf_counter()
-        answer = await self._repeated(scope)
+        began_s, answer = time.perf_counter(), None
+        if scope["method"] == "GET" and scope["path"].startswith("/api/"):
+            with suppress(StoreError):
+                caller = await self._caller(scope)
+                answer = self._answers.at_once(scope, caller.identity)
         if answer is None:
             await self._app(scope, receive, send)
             return
@@ -283,15 +287,6 @@ class Repetition:
         await send({"type": "http.response.start", "status": status, "headers": headers})
         await send({"type": "http.response.body", "body": answer.body})
         self._observe(scope["route"].path, status, time.perf_counter() - began_s)
-
-    async def _repeated(self, scope: Scope) -> Response | None:
-        if scope["method"] != "GET" or not scope["path"].startswith("/api/"):
-            return None
-        try:
-            caller = await self._caller(scope)
-        except StoreError:
-            return None
-        return self._answers.at_once(scope, caller.identity)
 
 
 TIME_HEADER = "Padwatch-Time"

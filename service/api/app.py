@@ -39,8 +39,7 @@ from service.api.routes.bearings import bearing_router
 from service.api.routes.channels import channel_router
 from service.api.routes.film_history import film_history_router
 from service.api.routes.films import film_router
-from service.api.routes.motion import motion_router, recorded_motion_router
-from service.api.routes.notes import note_router
+from service.api.routes.motion import motion_router
 from service.api.routes.overview import overview_router
 from service.api.routes.plant import plant_router
 from service.api.routes.recordings import recording_router
@@ -127,20 +126,16 @@ def describe(document: dict[str, Any], operations: Mapping[str, Declared]) -> No
             for status in (*statuses, *((404,) if "{unit}" in path else ())):
                 words = {"description": WORDS[status]}
                 answers.setdefault(str(status), {**answers["default"], **words})
-            if path.startswith("/api/"):
-                _add_headers(operation, is_tagged=method == "get")
-
-
-def _add_headers(operation: dict[str, Any], is_tagged: bool) -> None:
-    answers = operation["responses"]
-    for status, answer in answers.items():
-        common = HEADERS if status.startswith("2") else PROBLEM_HEADERS.get(status, {})
-        if common:
-            answer["headers"] = {**common, **answer.get("headers", {})}
-    if is_tagged and JSON in answers["200"].get("content", {}):
-        operation.setdefault("parameters", []).append(IF_NONE_MATCH)
-        answers["304"] = NOT_MODIFIED
-        answers["200"]["headers"] = {"ETag": ETAG, **answers["200"]["headers"]}
+            if not path.startswith("/api/"):
+                continue
+            for code, answer in answers.items():
+                common = HEADERS if code.startswith("2") else PROBLEM_HEADERS.get(code, {})
+                if common:
+                    answer["headers"] = {**common, **answer.get("headers", {})}
+            if method == "get" and JSON in answers["200"].get("content", {}):
+                operation.setdefault("parameters", []).append(IF_NONE_MATCH)
+                answers["304"] = NOT_MODIFIED
+                answers["200"]["headers"] = {"ETag": ETAG, **answers["200"]["headers"]}
 
 
 Repeating = Callable[[ASGIApp, Iterable[tuple[str, str]]], ASGIApp]
@@ -236,12 +231,10 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
         channel_router(context),
         spectra_router(context),
         motion_router(context),
-        note_router(context),
         film_router(context),
         film_history_router(context),
         baseline_router(context),
         recording_router(context),
-        recorded_motion_router(context),
         audit_router(context),
         session_router(authenticator),
         access_router(context, authenticator),

@@ -28,7 +28,6 @@ from service.api.values import (
 )
 from service.live.commands import FilmPlace
 from service.live.models import FilmCauseModel
-from service.live.status import CurrentBearing
 from service.settings.alarm_kinds import AlarmLevelName
 
 VerdictName = Literal[
@@ -251,7 +250,7 @@ def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
         and now
         and now.condition
         and condition_model(now.time_ns, now.condition, grid),
-        baseline_version=seen and _version(seen.baseline),
+        baseline_version=seen and seen.baseline and seen.baseline.origin.version,
         limits=seen and _limits(seen.rules.change),
         damping_limits=seen and _limits(seen.rules.change_ck),
         x=x,
@@ -287,26 +286,17 @@ def _seen(context: Context, unit: str, bearing: str) -> WatchedFilm | None:
     rules = context.films.rules(unit)
     if rules is None or context.films.place(unit, bearing) is None:
         return None
-    baseline = context.films.baseline(unit, bearing)
+    baseline, why = context.films.baseline(unit, bearing), None
     news, current = context.films.newest(unit, bearing), context.live.current(unit, bearing)
-    why = _why_not_current(news, current, rules, _version(baseline))
-    return WatchedFilm(rules, news, baseline, why)
-
-
-def _version(baseline: BearingBaseline | None) -> int | None:
-    return baseline.origin.version if baseline else None
-
-
-def _why_not_current(
-    news: FilmNews | None, current: CurrentBearing, rules: FilmRules, version: int | None
-) -> str | None:
     if current.assessment is None or not current.is_current:
-        return current.quality.reason.value
-    if news is None:
-        return "waiting_for_data"
-    if current.assessment.time_ns - news.reading.time_ns > CURRENT_PERIODS * rules.reading_ns:
-        return "stale"
-    return None if news.findings[0].baseline_version == version else "baseline_changed"
+        why = current.quality.reason.value
+    elif news is None:
+        why = "waiting_for_data"
+    elif current.assessment.time_ns - news.reading.time_ns > CURRENT_PERIODS * rules.reading_ns:
+        why = "stale"
+    elif news.findings[0].baseline_version != (baseline and baseline.origin.version):
+        why = "baseline_changed"
+    return WatchedFilm(rules, news, baseline, why)
 
 
 def _directions(seen: WatchedFilm) -> list[FilmDirectionModel]:

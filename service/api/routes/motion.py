@@ -1,4 +1,4 @@
-"""Routes for the sampled motion of a shaft in its bearing, live and from recordings."""
+"""Route for the newest motion of a shaft in its bearing, and the model of a motion."""
 
 from typing import Annotated, Literal
 
@@ -6,16 +6,13 @@ import numpy as np
 from fastapi import APIRouter, Response
 from pydantic import BeforeValidator, Field
 
-from acquisition.errors import ConfigError
 from core.arrays import FloatArray
 from core.machine.unit import Bearing
 from service.api.answers import rendered
 from service.api.auth.gate import subject_router
 from service.api.context import BearingId, Context, UnitId
-from service.api.parameters import duration, parameter
-from service.api.problems import ProblemError, problem_responses
+from service.api.parameters import duration
 from service.api.routes.channels import NEWEST, NO_SAMPLES, count_of, held_blocks
-from service.api.routes.recordings import RecordingId, entry_of, library_of, readable
 from service.api.values import ApiModel, BearingAnswer, SampleRange, Time, listed
 from service.live.samples import newest_blocks, sample_window
 from service.live.status import HELD_S
@@ -23,7 +20,6 @@ from service.recordings.motion import (
     ShaftMotion,
     channels_for,
     motion_of,
-    recorded_motion,
 )
 from service.settings.core_values import machine_of
 
@@ -130,16 +126,6 @@ def motion_model(unit: str, bearing: Bearing, motion: ShaftMotion, **origin: obj
 MAX_SAMPLES = 60_000
 """Maximum number of samples per direction in one answer: 100 s at 600 Hz, about 2 MB."""
 
-MAX_SECONDS = 600.0
-
-RECORDING_PROBLEMS = problem_responses(
-    410,
-    own={
-        404: "Unknown recording or bearing",
-        409: "The recording has no samples of the bearing, or none at that time",
-    },
-)
-
 
 def motion_router(context: Context) -> APIRouter:
     """Return the router for the newest motion."""
@@ -166,56 +152,5 @@ def motion_router(context: Context) -> APIRouter:
             return motion_model(unit, watched, found, **newest, received=received_ns)
 
         return await rendered(model)
-
-    return router
-
-
-def recorded_motion_router(context: Context) -> APIRouter:
-    """Return the router for the shaft motion in recordings."""
-    router = subject_router("/recordings", "recordings")
-
-    @router.get("/{recording}/motion", responses=RECORDING_PROBLEMS, response_model=MotionModel)
-    async def motion(
-        recording: RecordingId,
-        bearing: Annotated[str, parameter("Identifier of the bearing.", "UJB", max_length=32)],
-        start_s: Annotated[
-            float,
-            parameter(
-                "Start, seconds from the first sample of the recording.",
-                30.0,
-                ge=0.0,
-                le=1e7,
-                allow_inf_nan=False,
-            ),
-        ] = 0.0,
-        seconds: Annotated[float, duration(MAX_SECONDS, "Duration.")] = 10.0,
-    ) -> Response:
-        """Return the motion of a shaft in its bearing from a part of a recording.
-
-        The calibration stored in the recording applies. If the device restarted within this part,
-        samples after the restart are omitted.
-        """
-        kept = await entry_of(context, recording)
-        with readable(recording):
-            if kept.manifest is None:
-                raise ConfigError(kept.fault or "no manifest")
-            unit = kept.manifest.unit
-            if unit not in context.units:
-                detail = f"recording {kept.name} is of unit {unit!r}, which is not in this plant"
-                raise ProblemError(409, "No samples", detail)
-            context.bearing(unit, bearing)
-            watched = context.references.bearing(unit, bearing)
-            count_of(seconds, kept.manifest.rate_hz, MAX_SAMPLES)
-
-            def model() -> MotionModel:
-                opened, machine = (
-                    library_of(context).opened(recording),
-                    machine_of(context.units[unit]),
-                )
-                found = recorded_motion(opened, machine, watched, start_s, seconds)
-                position = {"offset_s": found.offset_s, "total_s": found.total_s, "received": None}
-                return motion_model(unit, watched, found.motion, recording=recording, **position)
-
-            return await rendered(model)
 
     return router

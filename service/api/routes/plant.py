@@ -1,22 +1,23 @@
-"""Routes for units, sources, gaps, the configuration, and the catalogue of quantities."""
+"""Routes for units, sources, gaps, notes, the configuration, and the catalogue of quantities."""
 
 import asyncio
 import json
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 from pydantic import Field
 
 from core.monitor.catalogue import CATALOGUE, quantity_named
 from core.samples.blocks import StampFault
 from core.samples.gaps import Gap
 from core.units import ns_from_s
-from service.api.auth.gate import Reach, needs, subject_router
+from service.api.auth.gate import Reach, actor_or, needs, subject_router
 from service.api.context import Context, UnitId
 from service.api.downloads import file_content
-from service.api.parameters import TimeRange
+from service.api.parameters import Moment, OptionalTimeRange, TimeRange, ns_from_datetime
 from service.api.problems import ProblemError, problem_responses
-from service.api.values import ApiModel, Time
+from service.api.routes.alarms import COMMENT_LIMIT, Allowances
+from service.api.values import ActorModel, ApiModel, ReasonText, Time
 from service.live.current_state import LiveUnits
 from service.live.snapshot import SourceCounts
 from service.live.status import LinkState
@@ -24,6 +25,7 @@ from service.runtime.polls import PollStatistics
 from service.settings.plant import plant_file_schema
 from service.settings.units import UnitSettings
 from service.store.access.identities import Permission
+from service.store.notes import Note, notes_between
 
 
 class DeviceClockModel(ApiModel):
@@ -190,14 +192,26 @@ class ConfigurationModel(ApiModel):
     """All settings, structured like the plant file."""
 
 
+class AddNoteModel(ActorModel):
+    """Request to add a note."""
+
+    bearing: Annotated[str | None, Field(examples=["UJB"])] = None
+
+    text: ReasonText
+    """Text, 1 to 500 printable characters."""
+
+    time: Annotated[Moment, Field(strict=False, examples=["2026-11-21T08:00:00Z"])]
+    """Time to which the note refers, RFC 3339 with offset."""
+
+
 SCHEMA_TYPE = "application/schema+json"
 
 SCHEMA_OF_SCHEMA = {"type": "object", "examples": [{"title": "PlantFile", "type": "object"}]}
 
 
 def plant_router(context: Context) -> APIRouter:
-    """Return the router for units, sources, gaps, quantities and the configuration."""
-    router = subject_router("", "plant")
+    """Return the router for units, sources, gaps, notes, quantities and the configuration."""
+    router, allowances = subject_router("", "plant"), Allowances()
 
     @router.get("/units")
     async def units() -> list[UnitModel]:
@@ -231,6 +245,29 @@ def plant_router(context: Context) -> APIRouter:
         found = await asyncio.to_thread(context.store.gaps, unit, *times)
         rate_hz = context.units[unit].sampling_hz
         return [_gap_model(gap, rate_hz) for gap in found]
+
+    @router.get("/units/{unit}/notes")
+    async def notes(unit: UnitId, times: OptionalTimeRange) -> list[Note]:
+        """List the notes about a unit and its bearings that refer to a time range.
+
+        Of a unit, the 1000 notes that were added last are listed, the newest first.
+        """
+        return await asyncio.to_thread(notes_between, context.store.audit, unit, *times)
+
+    @router.post(
+        "/units/{unit}/notes",
+        responses=COMMENT_LIMIT,
+        dependencies=[needs(Permission.ACT_ON_ALARMS)],
+    )
+    async def add_note(request: Request, unit: UnitId, asked: AddNoteModel) -> Note:
+        """Add a note; the audit trail records it, and it is never changed or deleted."""
+        if asked.bearing is not None:
+            context.bearing(unit, asked.bearing)
+        time_ns = ns_from_datetime(asked.time, "time")
+        allowances.take(request, context.clock.monotonic_s())
+        note = Note(unit, asked.bearing, time_ns, asked.text, actor_or(asked.actor))
+        await context.operators.add_note(note)
+        return note
 
     @router.get(
         "/configuration",

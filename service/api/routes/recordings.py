@@ -1,4 +1,4 @@
-"""Routes for recordings of samples: list, description and download of recordings."""
+"""Routes for recordings of samples: list, description, shaft motion and download."""
 
 import asyncio
 from collections.abc import Callable, Generator, Iterator
@@ -16,12 +16,15 @@ from service.api.answers import rendered
 from service.api.auth.gate import subject_router
 from service.api.context import Context
 from service.api.downloads import attachment, file_content
-from service.api.parameters import at_most, only
+from service.api.parameters import at_most, duration, only, parameter
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.alarm_models import AlarmIdText
-from service.api.routes.channels import ChannelUnit
+from service.api.routes.channels import ChannelUnit, count_of
+from service.api.routes.motion import MAX_SAMPLES, MotionModel, motion_model
 from service.api.values import ApiModel, Time
 from service.recordings.library import RecordingEntry, RecordingLibrary
+from service.recordings.motion import recorded_motion
+from service.settings.core_values import machine_of
 from service.store.waveforms import WaveformKind
 
 
@@ -49,7 +52,7 @@ class RecordingModel(ApiModel):
     rate_hz: float | None
     n_samples: int | None
 
-    id: Annotated[str, Field(examples=["U1-20261121T090312.400Z-shaft_x"])]
+    id: Annotated[str, Field(validation_alias="name", examples=["U1-20261121T090312.400Z-shaft_x"])]
     """Name of the recording."""
 
     kind: WaveformKind
@@ -58,7 +61,7 @@ class RecordingModel(ApiModel):
     state: Literal["complete", "damaged"]
     """State of the files according to the manifest and the newest check."""
 
-    reason: str | None
+    reason: Annotated[str | None, Field(validation_alias="fault")]
     """Reason why the recording is damaged; null if it is complete."""
 
     unit: str | None
@@ -102,7 +105,7 @@ class RecordingInfoModel(ApiModel):
     made_by: str
     """Program that made the recording, and its purpose."""
 
-    end: Time
+    end: Annotated[Time, Field(validation_alias="stop_ns")]
     """End of the recording: time of the last sample plus one sampling interval."""
 
     n_gaps: int
@@ -131,9 +134,7 @@ def recording_model(kept: RecordingEntry) -> RecordingModel:
     described = ("unit", "start", "rate_hz", "n_samples")
     return RecordingModel.of(
         kept,
-        id=kept.name,
         state="complete" if kept.fault is None else "damaged",
-        reason=kept.fault,
         duration_s=manifest and manifest.n_samples / manifest.rate_hz,
         **{name: manifest and getattr(manifest, name) for name in described},
     )
@@ -152,7 +153,6 @@ def recording_info(shelf: RecordingLibrary, kept: RecordingEntry) -> RecordingIn
         summary,
         manifest,
         recording=recording_model(kept),
-        end=summary.stop_ns,
         channels={each.id: UNIT_OF[each.measurand] for each in manifest.channels},
         slow_channels={each.id: each.unit for each in manifest.slow_channels},
     )
@@ -172,6 +172,16 @@ LIST_PROBLEMS = problem_responses(own={404: "This process has no recordings"})
 PROBLEMS = problem_responses(
     410, own={404: "Unknown recording", 503: "Too many concurrent downloads"}
 )
+
+MOTION_PROBLEMS = problem_responses(
+    410,
+    own={
+        404: "Unknown recording or bearing",
+        409: "The recording has no samples of the bearing, or none at that time",
+    },
+)
+
+MAX_SECONDS = 600.0
 
 Pieces = Generator[bytes, None, None]
 
@@ -208,6 +218,50 @@ def recording_router(context: Context) -> APIRouter:
         kept = await entry_of(context, recording)
         with readable(recording):
             return await rendered(lambda: recording_info(library_of(context), kept))
+
+    @router.get("/{recording}/motion", responses=MOTION_PROBLEMS, response_model=MotionModel)
+    async def motion(
+        recording: RecordingId,
+        bearing: Annotated[str, parameter("Identifier of the bearing.", "UJB", max_length=32)],
+        start_s: Annotated[
+            float,
+            parameter(
+                "Start, seconds from the first sample of the recording.",
+                30.0,
+                ge=0.0,
+                le=1e7,
+                allow_inf_nan=False,
+            ),
+        ] = 0.0,
+        seconds: Annotated[float, duration(MAX_SECONDS, "Duration.")] = 10.0,
+    ) -> Response:
+        """Return the motion of a shaft in its bearing from a part of a recording.
+
+        The calibration stored in the recording applies. If the device restarted within this part,
+        samples after the restart are omitted.
+        """
+        kept = await entry_of(context, recording)
+        with readable(recording):
+            if kept.manifest is None:
+                raise ConfigError(kept.fault or "no manifest")
+            unit = kept.manifest.unit
+            if unit not in context.units:
+                detail = f"recording {kept.name} is of unit {unit!r}, which is not in this plant"
+                raise ProblemError(409, "No samples", detail)
+            context.bearing(unit, bearing)
+            watched = context.references.bearing(unit, bearing)
+            count_of(seconds, kept.manifest.rate_hz, MAX_SAMPLES)
+
+            def model() -> MotionModel:
+                opened, machine = (
+                    library_of(context).opened(recording),
+                    machine_of(context.units[unit]),
+                )
+                found = recorded_motion(opened, machine, watched, start_s, seconds)
+                position = {"offset_s": found.offset_s, "total_s": found.total_s, "received": None}
+                return motion_model(unit, watched, found.motion, recording=recording, **position)
+
+            return await rendered(model)
 
     @router.get(
         "/{recording}/files.zip",
