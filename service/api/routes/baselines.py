@@ -244,7 +244,9 @@ def baseline_router(context: Context) -> APIRouter:
     ) -> BaselinesModel:
         """Execute an action on baselines; return the baselines after the action is stored."""
         if isinstance(action, commands.Accept | commands.Reject):
-            await asyncio.to_thread(_require_version, context, unit, bearing, action.version)
+            entries = await asyncio.to_thread(context.store.films.baselines, unit, bearing)
+            if action.version not in [entry.version for entry in entries]:
+                raise _unknown_version(unit, bearing, action.version)
         place = watched_place(context, unit, bearing)
         await context.operators.act(place, action, actor_or(asked.actor), asked.reason)
         return await asyncio.to_thread(_baselines, context, unit, bearing)
@@ -345,12 +347,6 @@ def _stored(context: Context, unit: str, bearing: str, version: int) -> BearingB
     if found is None:
         raise _unknown_version(unit, bearing, version)
     return found
-
-
-def _require_version(context: Context, unit: str, bearing: str, version: int) -> None:
-    entries = context.store.films.baselines(unit, bearing)
-    if version not in [entry.version for entry in entries]:
-        raise _unknown_version(unit, bearing, version)
 
 
 def _unknown_version(unit: str, bearing: str, version: int) -> ProblemError:

@@ -19,7 +19,7 @@ from service.api.parameters import duration, several
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, QualityModel, SampleRange, Time, listed
 from service.live.current_state import LiveUnits
-from service.live.samples import SampleWindow, newest_blocks, sample_window
+from service.live.samples import newest_blocks, sample_window
 from service.live.status import HELD_S
 from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS
 from service.settings.channels import ChannelSettings, SlowChannelSettings
@@ -194,30 +194,6 @@ def _uses(settings: UnitSettings) -> Mapping[str, list[str]]:
     return found
 
 
-def waveform_model(
-    settings: UnitSettings, channels: Sequence[str], window: SampleWindow, received_ns: int
-) -> WaveformModel:
-    """Return the API model of the samples in a window.
-
-    `channels` are the identifiers of the channels in the window, at least one; `received_ns` is the
-    arrival time of the newest sample, UTC nanoseconds since 1970.
-    """
-    units = {each.id: UNIT_OF[each.measurand] for each in settings.channel}
-    return WaveformModel.of(
-        window,
-        unit=settings.id,
-        time=window.start_ns,
-        received=received_ns,
-        n_samples=window.samples[channels[0]].size,
-        channels={
-            id_: ChannelSamplesModel.of(
-                unit=units[id_], quality=window.quality[id_], sample=listed(window.samples[id_])
-            )
-            for id_ in channels
-        },
-    )
-
-
 NO_SAMPLES = problem_responses(own={409: "The unit has no samples"})
 NEWEST = "Duration of the newest samples; limited to those in memory."
 
@@ -259,7 +235,21 @@ def channel_router(context: Context) -> APIRouter:
         def model() -> WaveformModel:
             held, first, n_held = newest_blocks(blocks, n_samples)
             window = sample_window(held, rows, first, n_held, held[-1])
-            return waveform_model(settings, chosen, window, received_ns)
+            return WaveformModel.of(
+                window,
+                unit=unit,
+                time=window.start_ns,
+                received=received_ns,
+                n_samples=n_held,
+                channels={
+                    id_: ChannelSamplesModel.of(
+                        unit=UNIT_OF[channel.measurand],
+                        quality=window.quality[id_],
+                        sample=listed(window.samples[id_]),
+                    )
+                    for id_, channel in chosen.items()
+                },
+            )
 
         return await rendered(model)
 
@@ -282,13 +272,13 @@ async def held_blocks(live: LiveUnits, settings: UnitSettings) -> tuple[Sequence
     return blocks, received_ns
 
 
-def _chosen(settings: UnitSettings, channels: list[str] | None) -> list[str]:
-    known = [channel.id for channel in settings.channel]
+def _chosen(settings: UnitSettings, channels: list[str] | None) -> dict[str, ChannelSettings]:
+    known = {channel.id: channel for channel in settings.channel}
     for each in channels or ():
         if each not in known:
             detail = f"unknown waveform channel {each!r}; known channels: {', '.join(known)}"
             raise ProblemError(422, "Wrong parameter", detail, "channel")
-    return list(dict.fromkeys(channels or known))
+    return {each: known[each] for each in channels or known}
 
 
 def count_of(seconds: float, rate_hz: float, maximum: float, words: str = "") -> int:

@@ -220,47 +220,39 @@ def spectra_router(context: Context) -> APIRouter:
         places = list(dict.fromkeys(channel or PLACES))
         query = SpectraQuery(unit, bearing, *times, max_spectra)
 
+        def read() -> SpectraModel:
+            found = context.store.spectra.read(query)
+            if found.damaged_ns:
+                words, n = "stored spectra are damaged and left out", len(found.damaged_ns)
+                log.error(words, unit=unit, bearing=bearing, n=n)
+            shown = [one for one in found.spectra if one.resolution == found.spectra[-1].resolution]
+            bin_hz, n_lines = shown[-1].resolution if shown else (0.0, 0)
+            frequency_hz = bin_hz * np.arange(1, n_lines + 1, dtype=np.float64)
+            if max_frequency_hz is not None:
+                frequency_hz = frequency_hz[frequency_hz <= max_frequency_hz]
+            n_numbers = len(places) * frequency_hz.size
+            if len(shown) * n_numbers > MAX_NUMBERS:
+                detail = (
+                    f"{len(shown)} spectra of {n_numbers} amplitudes are too many; ask for at most"
+                    f" {max(2, MAX_NUMBERS // n_numbers)} spectra or fewer channels, or lower"
+                    " max_frequency_hz"
+                )
+                raise ProblemError(422, "Wrong parameter", detail, "max_spectra")
+            return SpectraModel.of(
+                query,
+                found,
+                frequency_hz=frequency_hz.tolist(),
+                time=[each.time_ns for each in shown],
+                operating_state=[STATE_NAMES[each.state] for each in shown],
+                level=[LEVEL_NAMES[each.quality.level] for each in shown],
+                reason=[each.quality.reason.value for each in shown],
+                **{name: [getattr(each, name) for each in shown] for name in OWN_FIELDS},
+                channels={place: _place(shown, place, frequency_hz.size) for place in places},
+                n_other_resolution=len(found.spectra) - len(shown),
+                simulated_until=context.store.films.past_end_ns(unit, bearing),
+            )
+
         revision = partial(context.past_revision, unit, times)
-        make = partial(_read, context, query, places, max_frequency_hz)
-        return await context.answers.of(request, revision, make)
+        return await context.answers.of(request, revision, read)
 
     return router
-
-
-def _read(
-    context: Context, query: SpectraQuery, places: list[PlaceName], max_frequency_hz: float | None
-) -> SpectraModel:
-    found = context.store.spectra.read(query)
-    if found.damaged_ns:
-        log.error(
-            "stored spectra are damaged and left out",
-            unit=query.unit,
-            bearing=query.bearing,
-            n=len(found.damaged_ns),
-        )
-    shown = [each for each in found.spectra if each.resolution == found.spectra[-1].resolution]
-    bin_hz, n_lines = shown[-1].resolution if shown else (0.0, 0)
-    frequency_hz = bin_hz * np.arange(1, n_lines + 1, dtype=np.float64)
-    if max_frequency_hz is not None:
-        frequency_hz = frequency_hz[frequency_hz <= max_frequency_hz]
-    n_numbers = len(places) * frequency_hz.size
-    if len(shown) * n_numbers > MAX_NUMBERS:
-        detail = (
-            f"{len(shown)} spectra of {n_numbers} amplitudes are too many; ask for at most"
-            f" {max(2, MAX_NUMBERS // n_numbers)} spectra or fewer channels, or lower"
-            " max_frequency_hz"
-        )
-        raise ProblemError(422, "Wrong parameter", detail, "max_spectra")
-    return SpectraModel.of(
-        query,
-        found,
-        frequency_hz=frequency_hz.tolist(),
-        time=[each.time_ns for each in shown],
-        operating_state=[STATE_NAMES[each.state] for each in shown],
-        level=[LEVEL_NAMES[each.quality.level] for each in shown],
-        reason=[each.quality.reason.value for each in shown],
-        **{name: [getattr(each, name) for each in shown] for name in OWN_FIELDS},
-        channels={place: _place(shown, place, frequency_hz.size) for place in places},
-        n_other_resolution=len(found.spectra) - len(shown),
-        simulated_until=context.store.films.past_end_ns(query.unit, query.bearing),
-    )
