@@ -72,7 +72,7 @@ async def test_the_life_of_a_source_begins_when_it_is_made(
     settings = settings_of(DBC.format(n_bits=32), {"x": "M.x"})
     stepped_clock.step(begun_s)
     calibration = counts_calibration(n_channels=1, n_slow=0)
-    source = CanSource(settings, calibration, stepped_clock, lambda *_: fake_bus)
+    source = CanSource(settings, calibration, stepped_clock)
     async with source.connect() as stream:
         for number in range(100):
             data = bytes(6) + number.to_bytes(2, "little")
@@ -99,7 +99,7 @@ PATIENCE_S = 120.0
 
 
 @pytest.fixture
-def plant(request, settings_of, counts_calibration, fake_bus):
+def plant(request, settings_of, counts_calibration, fake_bus):  # noqa: ARG001
     """A message with or without a counter, and a sample that is its own number."""
     clock, n_bits = SetClock(), request.param
     counter = f' SG_ c : 0|{n_bits}@1+ (1,0) [0|0] "" N\n' if n_bits else ""
@@ -107,7 +107,7 @@ def plant(request, settings_of, counts_calibration, fake_bus):
     text = f'VERSION ""\nBU_: N\nBO_ 256 M: 6 N\n{counter}{sample}'
     settings = settings_of(text, {"x": "M.x"}, counters=("M.c",) if n_bits else ())
     calibration = counts_calibration(n_channels=1, n_slow=0)
-    return CanSource(settings, calibration, clock, lambda *_: fake_bus), clock, n_bits
+    return CanSource(settings, calibration, clock), clock, n_bits
 
 
 def frame(number: int, n_bits: int) -> can.Message:
