@@ -288,16 +288,21 @@ class SegmentTransform(KeptSegments):
         prepared = centred * taper_weights(samples.shape[1])
         lines = bin_phasors(prepared, prepared.shape[1] // 2 - 1)
         bins = self._resolution.phasors(lines[:, : self.frequency_hz.size] * self._bin_factor)
-        key_phase = self._key_phase(samples, window.rate_hz, usable_channels(quality))
-        speed = self._speed(window, bins, usable_channels(quality), key_phase)
-        clipped = self._clipped(quality, samples)
-        quality = self._judged(quality, samples, mean, speed)
+        usable = usable_channels(quality)
+        key_phase = self._key_phase(samples, window.rate_hz, usable)
+        shaft_power: FloatArray = (np.abs(bins[usable & self._is_shaft]) ** 2).sum(axis=0)
+        speed = running_speed(
+            self._unit, window.slow, self.frequency_hz, shaft_power, self._settings, key_phase
+        )
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
+        turn_samples, is_turning = window.rate_hz / turn_hz, speed.rpm.value is not None
+        clipped = self._clipped(quality, samples)
+        quality = self._judged(quality, samples, mean, is_turning, turn_samples)
         resolved = self._resolution.qualities(quality)
-        vortex_hz = self._vortex_hz(turn_hz, bins, usable_channels(resolved))
+        usable = usable_channels(resolved)
+        vortex_hz = self._vortex_hz(turn_hz, bins, usable)
         order_hz = np.array([turn_hz, vortex_hz or self._settings.vortex_order * turn_hz])
         factors = displacement_factors(self._unit.channels, order_hz)
-        turn_samples = window.rate_hz / turn_hz
         turning = turning_factors(samples.shape[1], window.rate_hz, order_hz)
         orders = factors * line_phasors(prepared, turning)
         shafts = np.flatnonzero(self._is_shaft).tolist()
@@ -305,7 +310,7 @@ class SegmentTransform(KeptSegments):
             orders[:, ORDER1], self._unit, shafts, speed, key_phase
         )
         orders = self._resolution.phasors(orders)
-        angle_rad, usable = shaft_angle_rad(speed, key_phase), usable_channels(resolved)
+        angle_rad = shaft_angle_rad(speed, key_phase)
         segment = Segment(
             epoch=window.epoch,
             first_index=window.first_index,
@@ -336,19 +341,17 @@ class SegmentTransform(KeptSegments):
         quality: tuple[Quality, ...],
         samples: FloatArray,
         mean: FloatArray,
-        speed: Speed,
+        is_turning: bool,
+        turn_samples: float,
     ) -> tuple[Quality, ...]:
         """Return the channel qualities after checks of signal and level; bad for failed sensors."""
-        turning, limits = speed.rpm.value is not None, self._settings.sensors
-        turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
-        turn_samples = round(self._unit.rate_hz / turn_hz)
-        found = []
+        limits, found = self._settings.sensors, []
         moved = zip(quality, self._unit.channels, quietest_rms(samples), mean, samples, strict=True)
         for before, channel, rms, at, own in moved:
-            signal = signal_quality(rms, at, channel.unit_per_count, turning, limits)
+            signal = signal_quality(rms, at, channel.unit_per_count, is_turning, limits)
             if before in (OUTSIDE, CLIPPED):
                 # a breaking cable clips first; the lost signal is the more important reason
-                level = level_quality(own, turn_samples, channel.ok_limits)
+                level = level_quality(own, round(turn_samples), channel.ok_limits)
                 found.append(worst((signal, level, GOOD if before == OUTSIDE else before)))
             else:
                 found.append(worst((before, signal)))
@@ -367,18 +370,6 @@ class SegmentTransform(KeptSegments):
         if row is None or not usable[row]:
             return None
         return read_key_phase(self._unit.channels[row].direction * samples[row], rate_hz)
-
-    def _speed(
-        self,
-        window: Window,
-        bins: ComplexArray,
-        usable: BoolArray,
-        key_phase: KeyPhase | None,
-    ) -> Speed:
-        power: FloatArray = (np.abs(bins[usable & self._is_shaft]) ** 2).sum(axis=0)
-        return running_speed(
-            self._unit, window.slow, self.frequency_hz, power, self._settings, key_phase
-        )
 
     def _recent(
         self,
