@@ -134,11 +134,6 @@ class DynamicStiffness:
         return self.coefficients[:, :2]
 
     @property
-    def c_n_s_per_m(self) -> FloatArray:
-        """Damping coefficients, (2, 2); rows are force directions, columns motion directions."""
-        return self.coefficients[:, 2:]
-
-    @property
     def std(self) -> FloatArray:
         """Random standard uncertainties of the coefficients, (2, 4)."""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))

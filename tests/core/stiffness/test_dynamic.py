@@ -44,7 +44,7 @@ def test_exact_motion_gives_all_coefficients_whatever_its_axes_and_its_size(reco
     result = found(recording())
 
     np.testing.assert_allclose(result.k_n_per_m, STIFFNESS, rtol=1e-7)
-    np.testing.assert_allclose(result.c_n_s_per_m, DAMPING, rtol=1e-7)
+    np.testing.assert_allclose(result.coefficients[:, 2:], DAMPING, rtol=1e-7)
     np.testing.assert_allclose(result.coherence, 1.0)
     np.testing.assert_allclose(found(recording(n_segments=4)).k_n_per_m, STIFFNESS, rtol=1e-6)
     few = averaged(recording(n_segments=3))
@@ -86,7 +86,7 @@ def test_the_stated_change_with_the_bracket_is_the_change(recording):
 
 def rms_z(results: list[DynamicStiffness]) -> FloatArray:
     """Root mean square of error over stated random uncertainty: (k, c) by (2, 2)."""
-    errors = np.array([(r.k_n_per_m - STIFFNESS, r.c_n_s_per_m - DAMPING) for r in results])
+    errors = np.array([(r.k_n_per_m - STIFFNESS, r.coefficients[:, 2:] - DAMPING) for r in results])
     stated = np.array([(r.std[:, :2], r.std[:, 2:]) for r in results])
     z: FloatArray = np.sqrt(((errors / stated) ** 2).mean(axis=0))
     return z
@@ -135,7 +135,7 @@ def test_channels_that_are_late_show_as_a_delay_and_are_put_right_by_it(recordin
     change = result.delay_s * result.changes[DELAY, :, 2:]
     right = found(recording(bearing_um=0.05))
     np.testing.assert_allclose(
-        result.c_n_s_per_m + change, right.c_n_s_per_m, atol=0.06 * DAMPING[0, 0]
+        result.coefficients[:, 2:] + change, right.coefficients[:, 2:], atol=0.06 * DAMPING[0, 0]
     )
 
 
@@ -192,7 +192,7 @@ def test_the_stated_uncertainty_is_the_scatter_also_where_integration_alone_limi
 
     results = [found(integrated_at_the_bins(seed), n_integrations=(2, 2)) for seed in range(150)]
 
-    damping = np.array([result.c_n_s_per_m for result in results]).std(axis=0)
+    damping = np.array([result.coefficients[:, 2:] for result in results]).std(axis=0)
     stated = np.mean([result.std[:, 2:] for result in results], axis=0)
     # Edges between used and unused lines are not followed exactly: a fifth, beside 6 % by chance.
     assert np.diag(scatter_over_stated(results)) == pytest.approx(1.0, abs=0.25)
@@ -332,7 +332,7 @@ def test_lines_that_do_not_show_what_lags_leave_it_to_the_stated_uncertainty(rec
 def test_a_film_of_negative_damping_is_no_number(recording):
     backwards = recording(bearing_um=0.05).conj()  # of K − iωC, as the bracket has no damping
     result = found(backwards, DynamicSettings())
-    assert np.all(np.diag(result.c_n_s_per_m) < 0.0)
+    assert np.all(np.diag(result.coefficients[:, 2:]) < 0.0)
     bearing = Bearing("UJB", 1.18e9, "ux", "uy", "vx", "vy", 500.0, (2000.0, 2000.0))
     at_lines = {
         name: missing(Reason.NO_VORTEX)
