@@ -6,7 +6,7 @@ import numpy as np
 
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.shaft import ConditionChange
-from benchmarks.detection_unit import DAY_NS, Later, LearnedUnit
+from benchmarks.detection_unit import DAY_NS, Later, LearnedUnit, raised
 from core.baseline.history import DIRECTIONS, QUANTITIES
 from core.change.cause import Cause
 from core.change.decision import Verdict
@@ -128,7 +128,7 @@ def find_damage(
     alarms = [
         (int(row), (bearing, QUANTITIES[quantity].direction))
         for quantity in QUANTITIES
-        for row in unit.decide(later, bearing, quantity).raised()
+        for row in raised(unit.decide(later, bearing, quantity))
         if onset <= row < end
     ]
     by_fixed = any(
@@ -164,7 +164,7 @@ def false_alarms(unit: LearnedUnit, band: float) -> tuple[int, int]:
 
 
 def _alarms(unit: LearnedUnit, later: Later, first: int, end: int, band: float) -> tuple[int, int]:
-    decided = [unit.decide(later, *place).raised() for place in unit.watched()]
+    decided = [raised(unit.decide(later, *place)) for place in unit.watched()]
     fixed = [_fixed(unit, later, *place, band) for place in unit.places()]
     decisions, crossings = (
         sum(int(np.sum((rows >= first) & (rows < end))) for rows in found)

@@ -7,7 +7,7 @@ import numpy as np
 
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.operation import HeldLoad
-from benchmarks.detection_unit import DAY_NS, START_NS, LearnedUnit
+from benchmarks.detection_unit import DAY_NS, START_NS, LearnedUnit, raised
 from core.baseline.history import DIRECTIONS, QUANTITIES
 from core.change.cause import Cause
 from core.change.decision import JUDGED
@@ -127,7 +127,7 @@ def judged_per_day(seed: int) -> tuple[float, int]:
     unit = LearnedUnit(seed, TWO_SHIFTS)
     decided = [unit.decide(unit.healthy, *place) for place in unit.watched()]
     judged = [np.isin(one.verdict, [int(each) for each in JUDGED]).sum() for one in decided]
-    n_alarms = sum(one.raised().size for one in decided)
+    n_alarms = sum(raised(one).size for one in decided)
     return float(min(judged)) / (365.25 * unit.healthy.years), n_alarms
 
 

@@ -64,6 +64,11 @@ class Later:
         return float(self.time_ns[-1] - self.time_ns[0]) / DAY_NS / 365.25
 
 
+def raised(decided: DecisionHistory) -> npt.NDArray[np.intp]:
+    """Rows at which the level is higher than just before."""
+    return np.flatnonzero(np.diff(decided.level, prepend=np.int8(0)) > 0)
+
+
 class LearnedUnit:
     """A unit with its baselines; damage comes to it after it has been learned."""
 

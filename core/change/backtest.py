@@ -8,7 +8,7 @@ from itertools import repeat
 
 import numpy as np
 
-from core.arrays import BoolArray, FloatArray, IntArray, TimeArray
+from core.arrays import BoolArray, FloatArray, TimeArray
 from core.baseline.baseline import QuantityBaseline
 from core.baseline.history import CodeArray, StiffnessHistory
 from core.change.decision import INITIAL_DECISION, Decision, outcomes, step
@@ -103,10 +103,6 @@ class DecisionHistory:
     change: FloatArray
     significance: FloatArray
     time_scale_h: FloatArray
-
-    def raised(self) -> IntArray:
-        """Return the indices (n_raised,) at which the level is higher than just before."""
-        return np.flatnonzero(np.diff(self.level, prepend=np.int8(0)) > 0)
 
 
 def decide_all(

@@ -85,10 +85,6 @@ class ResponseTable:
         log_magnitude, phase_rad = PchipInterpolator(points, values, axis=1)(place)
         return np.asarray(np.exp(log_magnitude + 1j * phase_rad))
 
-    def covers(self, low_hz: float, high_hz: float) -> bool:
-        """Whether a frequency band lies completely within the table."""
-        return self.frequency_hz[0] <= low_hz and high_hz <= self.frequency_hz[-1]
-
 
 @dataclass(frozen=True)
 class ResponseChain:

@@ -66,7 +66,7 @@ def test_a_back_test_says_what_the_plant_would_have_said(watch, size):
 def test_a_healthy_film_raises_nothing(watch, n_seeds):
     for seed in range(n_seeds):
         found = watch(seed, days=300).whole()
-        assert found.raised().size == 0
+        assert not found.level.any()
         assert np.mean(found.verdict == Verdict.NORMAL) > 0.7
 
 
@@ -77,7 +77,7 @@ def test_a_softened_film_is_found_in_time(watch, size, within_h, n_seeds):
         seen = watch(seed, days=160, change=loss(size))
         found, time_ns = seen.whole(), seen.later.time_ns
         onset = int(np.searchsorted(time_ns, time_ns[0] + 20 * 86_400 * 10**9))
-        first = int(found.raised()[0])
+        first = int(np.flatnonzero(found.level)[0])
         assert 0.0 <= (first - onset) / 6.0 <= within_h
         assert found.change[first] < -0.02
 
@@ -107,7 +107,7 @@ def test_spikes_raise_nothing_and_where_nothing_was_learned_nothing_is_decided(w
     seen = watch(1, days=160)
     rows = np.arange(len(seen.later)) % 40
     spiky = replace(seen.later, ln_k=seen.later.ln_k - np.where(rows < 2, 1.5, 0.0))
-    assert replace(seen, later=spiky).whole().raised().size == 0
+    assert not replace(seen, later=spiky).whole().level.any()
     seen = watch(1, change=loss(0.5, LATER_H))
     elsewhere = replace(seen.later, oil_temperature_c=seen.later.oil_temperature_c + 60.0)
     found = replace(seen, later=elsewhere).whole()
