@@ -14,19 +14,21 @@ MAX_ADDRESSES = 4
 """Maximum number of addresses used per host name."""
 
 
-class NameLookUp:
+class HostAddresses:
     """Resolver of one host name; concurrent calls share one look-up."""
 
     def __init__(self, host: str, port: int) -> None:
         self._host, self._port = host, port
         self._asking: concurrent.futures.Future[list[str]] | None = None
+        self._found: list[str] = []
 
-    async def addresses(self) -> list[str]:
+    async def within(self, limit_s: float | None) -> list[str]:
         """Return up to `MAX_ADDRESSES` IP addresses of the host, in the order in which to try them.
 
-        The look-up runs in a daemon thread, and continues if the caller is cancelled.
+        The look-up runs in a daemon thread, and continues if the caller is cancelled. If it fails
+        or takes longer than `limit_s`, the last known addresses are returned.
 
-        Raises OSError if the name cannot be resolved.
+        Raises OSError if resolution fails and no address is known.
         """
         if _is_address(self._host):
             return [self._host]
@@ -39,24 +41,9 @@ class NameLookUp:
                 name=f"look up {self._host}",
                 daemon=True,  # must not delay the end of the program
             ).start()
-        return await asyncio.wrap_future(self._asking)
-
-
-class KnownAddresses:
-    """Cache of the last resolved addresses of a host name."""
-
-    def __init__(self, host: str, port: int) -> None:
-        self._look_up = NameLookUp(host, port)
-        self._found: list[str] = []
-
-    async def within(self, limit_s: float) -> list[str]:
-        """Return the IP addresses within a time limit; if resolution fails, the last known ones.
-
-        Raises OSError if resolution fails and no address is known.
-        """
         try:
             async with asyncio.timeout(limit_s):
-                self._found = await self._look_up.addresses()
+                self._found = await asyncio.wrap_future(self._asking)
         except TimeoutError:
             if not self._found:
                 raise OSError(f"no name server answered within {limit_s} s; check DNS") from None

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from itertools import chain, repeat
 
-from acquisition.delivery.network import KnownAddresses
+from acquisition.delivery.network import HostAddresses
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.connection import (
     CLOSED,
@@ -77,7 +77,7 @@ class ModbusClient:
     def __init__(self, settings: LinkSettings) -> None:
         self._settings = settings
         self._protocol = ReplyProtocol(settings.transport)
-        self._addresses: KnownAddresses | None = None
+        self._addresses: HostAddresses | None = None
         self._transactions = chain.from_iterable(repeat(range(1, _N_TRANSACTIONS + 1)))
         self._n_interrupted = 0
         self._has_answered_several = False
@@ -270,7 +270,7 @@ class ModbusClient:
         except ValueError as error:  # a host name that no resolver accepts
             raise ConfigError(f"{self.where}: {error}") from error
         if self._addresses is None:
-            self._addresses = KnownAddresses(transport.host, transport.port)
+            self._addresses = HostAddresses(transport.host, transport.port)
         loop, timeout_s = asyncio.get_running_loop(), self._settings.timeout_s
         why = f"no connection within {timeout_s} s"
         try:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from acquisition.delivery.network import NameLookUp
+from acquisition.delivery.network import HostAddresses
 from service.notifications.message import Message
 from service.settings.notifications import SecretSettings
 
@@ -116,16 +116,14 @@ def _context(ca_file: str | None) -> ssl.SSLContext:
         raise OSError(f"ca_file {ca_file} cannot be used: {error}") from error
 
 
-async def connected_socket(look_up: NameLookUp, port: int, timeout_s: float) -> socket.socket:
+async def connected_socket(look_up: HostAddresses, port: int, timeout_s: float) -> socket.socket:
     """Return a non-blocking socket connected to the first address that accepts a connection.
 
     `timeout_s` limits the name resolution and each attempt. Raises `OSError` if the name cannot be
     resolved, or the `OSError` of the last address if no address accepts a connection.
     """
     failure: OSError = OSError("the host has no address")
-    async with asyncio.timeout(timeout_s):
-        addresses = await look_up.addresses()
-    for address in addresses:
+    for address in await look_up.within(timeout_s):
         try:
             async with asyncio.timeout(timeout_s):
                 return await _connected(address, port)

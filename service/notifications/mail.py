@@ -10,7 +10,7 @@ from email.policy import SMTP as SMTP_POLICY
 
 import aiosmtplib
 
-from acquisition.delivery.network import NameLookUp
+from acquisition.delivery.network import HostAddresses
 from core.alarms.kinds import FILM_STIFFNESS
 from service.notifications.channel import (
     Delivered,
@@ -133,7 +133,7 @@ class Mail:
     def __init__(self, settings: SmtpSettings, recipient: str, trusted: TrustedAuthorities) -> None:
         self.address = recipient
         self._settings, self._trusted = settings, trusted
-        self._look_up = NameLookUp(settings.host, settings.port)
+        self._look_up = HostAddresses(settings.host, settings.port)
 
     async def send(self, message: Message, body: str) -> Outcome:  # noqa: ARG002
         """Make one delivery attempt over a new SMTP connection; return its outcome or failure."""

@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 import httpcore2
 
 from acquisition.clock import Clock
-from acquisition.delivery.network import NameLookUp
+from acquisition.delivery.network import HostAddresses
 from core.units import NS_PER_S
 from service.notifications.channel import (
     Delivered,
@@ -84,9 +84,9 @@ class _BoundedStream(httpcore2.AsyncNetworkStream):
 
 
 class _BoundedNetwork(httpcore2.AsyncNetworkBackend):
-    """Network backend that connects to one host, resolved with `NameLookUp`, in bounded streams."""
+    """Network backend that connects to the `HostAddresses` of one host, in bounded streams."""
 
-    def __init__(self, look_up: NameLookUp) -> None:
+    def __init__(self, look_up: HostAddresses) -> None:
         self._look_up, self._network = look_up, httpcore2.AnyIOBackend()
 
     async def connect_tcp(
@@ -103,9 +103,7 @@ class _BoundedNetwork(httpcore2.AsyncNetworkBackend):
         `httpcore2.ConnectTimeout` if no address accepts a connection.
         """
         failure: Exception = httpcore2.ConnectError(f"{host} has no address")
-        async with asyncio.timeout(timeout):
-            addresses = await self._look_up.addresses()
-        for address in addresses:
+        for address in await self._look_up.within(timeout):
             try:
                 stream = await self._network.connect_tcp(
                     address, port, timeout, local_address, socket_options
@@ -138,7 +136,7 @@ class Webhook:
         self.address = f"{url.scheme}://{url.netloc}"
         """Scheme and host of the URL; its path may contain a token."""
         port = url.port or (443 if url.scheme == "https" else 80)
-        self._look_up = NameLookUp(url.hostname or "", port)
+        self._look_up = HostAddresses(url.hostname or "", port)
 
     async def send(self, message: Message, body: str) -> Outcome:
         """Make one delivery attempt with a POST request; return its outcome or failure."""

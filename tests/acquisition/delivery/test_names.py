@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from acquisition.delivery.network import KnownAddresses
+from acquisition.delivery.network import HostAddresses
 from acquisition.errors import LinkError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.transport import LinkSettings, TcpTransport
@@ -40,7 +40,7 @@ def names(monkeypatch: pytest.MonkeyPatch) -> Iterator[NameServer]:
 
 
 async def test_what_was_known_last_is_used_while_no_name_server_answers(names):
-    known = KnownAddresses("daq.plant", 502)
+    known = HostAddresses("daq.plant", 502)
     assert await known.within(5.0) == ["127.0.0.1"]
 
     names.answer = None
