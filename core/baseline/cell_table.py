@@ -142,7 +142,8 @@ def cells_between(own: frozenset[Cell], reach: int) -> frozenset[Cell]:
     found: set[Cell] = set()
     for cell in own:
         for axis in range(len(cell)):
-            line = [_moved(cell, axis, step) for step in range(1, reach + 2)]
+            before, at, after = cell[:axis], cell[axis], cell[axis + 1 :]
+            line = [(*before, at + step, *after) for step in range(1, reach + 2)]
             ends = [place for place, other in enumerate(line) if other in own]
             if ends:
                 found.update(line[: ends[0]])
@@ -153,7 +154,3 @@ def neighbourhood(cell: Cell) -> tuple[Cell, ...]:
     """Return a cell and all cells that touch it, including diagonal neighbours."""
     steps = itertools.product((-1, 0, 1), repeat=len(cell))
     return tuple(tuple(i + step for i, step in zip(cell, by, strict=True)) for by in steps)
-
-
-def _moved(cell: Cell, axis: int, by: int) -> Cell:
-    return (*cell[:axis], cell[axis] + by, *cell[axis + 1 :])

@@ -70,9 +70,8 @@ def recent_readings(
             readings = {}
             for place, name in SHAFTS.items():
                 row = rows[place]
-                readings[f"order1_{name}_um_pk"] = _turning(
-                    segment, _order1(segment, row, float(recent.order1_um_pk[part, row]))
-                )
+                order1_um_pk = float(recent.order1_um_pk[part, row])
+                readings[f"order1_{name}_um_pk"] = _order1(segment, row, order1_um_pk)
                 if overall is not None:
                     is_span = not math.isnan(overall.peak_to_peak_um[row])
                     span = recent.peak_to_peak_um[part, row] if is_span else math.nan
@@ -86,18 +85,13 @@ def recent_readings(
 
 
 def _order1(segment: Segment, row: int, amplitude_um_pk: float) -> Reading:
-    quality = segment.order_quality[ORDER1][row]
+    """Return a 1× amplitude with the worse of its own and the speed's quality; missing at rest."""
+    quality, speed = segment.order_quality[ORDER1][row], segment.speed.rpm
+    if speed.value is None:
+        return speed
     if quality.level is Level.BAD:
         return missing(quality.reason)
-    return Reading(amplitude_um_pk, quality)
-
-
-def _turning(segment: Segment, amplitude: Reading) -> Reading:
-    """Return a 1× amplitude with the worse of its own and the speed's quality; missing at rest."""
-    speed = segment.speed.rpm
-    if speed.value is None or amplitude.value is None:
-        return speed if speed.value is None else amplitude
-    return Reading(amplitude.value, worst((amplitude.quality, speed.quality)))
+    return Reading(amplitude_um_pk, worst((quality, speed.quality)))
 
 
 def _mean_budget(

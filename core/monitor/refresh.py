@@ -1,6 +1,5 @@
 """Evaluation of one bearing over the segments of one averaging window."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -92,6 +91,7 @@ class Refresh:
     def assessment(self) -> Assessment:
         """Return the assessment of the bearing, computed from this input."""
         newest, rows = self._segment, self._rows
+        clipped = newest.clipped_share[rows].tolist()
         averaged = self.evaluation.bearings[self.bearing.id]
         readings, budgets, estimators = self.evaluation.of(self.bearing, self._position)
         return Assessment(
@@ -110,7 +110,7 @@ class Refresh:
                 "shaft_x": newest.runout[self.bearing.shaft_x],
                 "shaft_y": newest.runout[self.bearing.shaft_y],
             },
-            clipped_share=self._clipped_share(),
+            clipped_share={} if self._is_polled else dict(zip(AMPLITUDES, clipped, strict=True)),
             evidence=averaged.evidence,
             recent=recent_readings(
                 list(self.kept.segments)[-self.kept.result_samples :], rows, self.unit.rate_hz
@@ -134,12 +134,6 @@ class Refresh:
     def _position(self) -> Found:
         segments = list(self.kept.segments)
         return position_results(self.unit, self.bearing, segments, self.last_growth)
-
-    def _clipped_share(self) -> Mapping[str, float]:
-        if self._is_polled:
-            return {}
-        shares = self._segment.clipped_share[self._rows].tolist()
-        return dict(zip(AMPLITUDES, shares, strict=True))
 
     def _orbit(self, rows: list[int]) -> OrbitTrace | None:
         newest, window = self._segment, self.newest
