@@ -155,16 +155,11 @@ class StiffnessHistory:
         return np.asarray(amplitude * np.exp(1j * phase))
 
     def of(self, name: str) -> tuple[FloatArray, FloatArray, CodeArray]:
-        """Return ln, random uncertainty and outcome (n,) of one of the `QUANTITIES`.
-
-        A missing c/k has the outcome of the stiffness, or `BAD_QUALITY` if that was measured.
-        """
+        """Return ln and random uncertainty of one of the `QUANTITIES`, and `outcome`, (n,) each."""
         quantity = QUANTITIES[name]
-        value = getattr(self, quantity.value)[quantity.row]
-        known, outcome = np.isfinite(value), self.outcome[quantity.row]
-        silent = np.where(outcome == ReadingOutcome.MEASURED, ReadingOutcome.BAD_QUALITY, outcome)
-        outcome = np.where(known, ReadingOutcome.MEASURED, silent).astype(np.int8)
-        return value, getattr(self, quantity.uncertainty)[quantity.row], outcome
+        columns = (quantity.value, quantity.uncertainty, "outcome")
+        value, u_random, outcome = (getattr(self, column)[quantity.row] for column in columns)
+        return value, u_random, outcome
 
     def rows(self, start: int, stop: int) -> "StiffnessHistory":
         """Return the readings with the indices `start` to `stop - 1`."""

@@ -34,13 +34,6 @@ class Verdict(IntEnum):
 JUDGED = (Verdict.NORMAL, Verdict.ALERT, Verdict.DANGER)
 """Verdicts on a reading that was judged."""
 
-WITHOUT_NUMBER = {
-    ReadingOutcome.INSUFFICIENT_EXCITATION: Verdict.INSUFFICIENT_EXCITATION,
-    ReadingOutcome.BAD_QUALITY: Verdict.BAD_QUALITY,
-}
-"""Verdict for each `ReadingOutcome` that has no stiffness value."""
-
-
 Outcome: TypeAlias = Comparison | Verdict
 """Comparison of a reading with its baseline, or a verdict if it cannot be compared."""
 
@@ -57,7 +50,8 @@ def outcomes(
 
     A verdict is yielded instead if a reading is not settled or cannot be compared, or if there is
     no baseline. All arrays are (n,): `value` is ln of the stiffness (NaN if not measured),
-    `u_random` its random standard uncertainty, and `codes` are values of `ReadingOutcome`.
+    `u_random` its random standard uncertainty, and `codes` are values of `ReadingOutcome` of the
+    stiffness, which explain a missing value.
     """
     unusable = np.full(value.size, -1)
     columns: tuple[FloatArray, ...] = (np.zeros(value.size),) * 4
@@ -68,9 +62,9 @@ def outcomes(
         unusable[found.place < 0] = Verdict.NO_BASELINE
         unusable[~baseline.is_known(conditions)] = Verdict.BAD_QUALITY
         columns = (found.deviation, found.weight, found.scatter, found.offset_std)
-    unusable[np.isnan(value)] = Verdict.BAD_QUALITY
-    for code, verdict in WITHOUT_NUMBER.items():
-        unusable[codes == code] = verdict
+    is_missing, is_quiet = np.isnan(value), codes == ReadingOutcome.INSUFFICIENT_EXCITATION
+    unusable[is_missing] = Verdict.BAD_QUALITY
+    unusable[is_missing & is_quiet] = Verdict.INSUFFICIENT_EXCITATION
     unusable[~is_settled] = Verdict.TRANSIENT
     rows = zip(*(column.tolist() for column in (*columns, u_random)), strict=True)
     for why, row in zip(unusable.tolist(), rows, strict=True):

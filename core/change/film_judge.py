@@ -274,7 +274,8 @@ class FilmJudge:
     def _decide(self, reading: FilmReading, name: str) -> FilmFinding:
         key, quantity, limits = (reading.bearing, name), QUANTITIES[name], self._rules.limits(name)
         learned, before = self._learned(*key), self._decisions.get(key, INITIAL_DECISION)
-        value, u_random, code = (np.array([x]) for x in reading.values[quantity.row].of(quantity))
+        own, columns = reading.values[quantity.row], (quantity.value, quantity.uncertainty)
+        value, u_random, code = (np.array([getattr(own, x)]) for x in (*columns, "outcome"))
         is_settled = np.array([reading.condition.is_settled])
         [outcome] = outcomes(reading.conditions, value, u_random, code, is_settled, learned)
         now_ns = self._rules.lapsed_ns(reading.time_ns)

@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from core.baseline.history import DIRECTIONS, FilmQuantity, ReadingOutcome
+from core.baseline.history import DIRECTIONS, ReadingOutcome
 from core.condition.cells import BearingCondition, FilmConditions
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
@@ -52,18 +52,6 @@ class FilmValue:
             cmath.rect(self.shaft_um_pk, math.radians(self.shaft_phase_deg)),
             cmath.rect(self.bearing_um_pk, math.radians(self.bearing_phase_deg)),
         )
-
-    def of(self, quantity: FilmQuantity) -> tuple[float, float, ReadingOutcome]:
-        """Return ln of a quantity, its random standard uncertainty, and the outcome.
-
-        A missing c/k has the outcome of the stiffness, or `BAD_QUALITY` if that was measured.
-        """
-        value, outcome = getattr(self, quantity.value), self.outcome
-        if not math.isnan(value):
-            outcome = ReadingOutcome.MEASURED
-        elif outcome is ReadingOutcome.MEASURED:
-            outcome = ReadingOutcome.BAD_QUALITY
-        return value, getattr(self, quantity.uncertainty), outcome
 
 
 @dataclass(frozen=True)
