@@ -1,9 +1,11 @@
 """What tests of every package share: a plant of numbers, a clock, results, readings of films."""
 # ruff: noqa: E402 - what is set first must be set before numpy is imported
 
+import gc
 import os
 import sys
 
+gc.disable()  # until the tests are collected: nothing of them is garbage
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # workers share the cores: threads only wait
 
 # Without bytecode every worker and every started program compiles a thousand files again.
@@ -11,7 +13,6 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 import asyncio
-import gc
 import re
 import shutil
 import subprocess
@@ -26,7 +27,6 @@ import uvloop
 from hypothesis import settings as hypothesis_settings
 from rigs.assessments import assessment as build_assessment
 from rigs.blocks import cell_block
-from scipy.signal import lfilter
 
 from acquisition.simulated.feed import FeedEndedError
 from core.arrays import FloatArray
@@ -75,6 +75,7 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
+    gc.enable()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
@@ -263,6 +264,8 @@ def film_life() -> FilmLife:
 def _wander(
     random: np.random.Generator, hours: FloatArray, std: float, memory_h: float
 ) -> FloatArray:
+    from scipy.signal import lfilter  # slow import, not needed by every process
+
     memory = float(np.exp(-(hours[1] - hours[0]) / memory_h))
     fresh = random.standard_normal(hours.size) * std * np.sqrt(1.0 - memory**2)
     return np.asarray(lfilter([1.0], [1.0, -memory], fresh))

@@ -4,6 +4,7 @@ Each request is one line of JSON. A fork with limits on memory, time and file si
 :mod:`acquisition.recordings.messages`. A malicious file can affect only that fork.
 """
 
+import importlib
 import json
 import os
 import signal
@@ -21,7 +22,6 @@ from pydantic import TypeAdapter
 from acquisition.errors import ConfigError
 from acquisition.recordings import tables  # loaded once, before the forks
 from acquisition.recordings.confined import confine, memory_in_use_bytes
-from acquisition.recordings.imports.can_log import read_frames
 from acquisition.recordings.imports.csv_file import csv_rows
 from acquisition.recordings.imports.hdf5_file import hdf5_file
 from acquisition.recordings.imports.job import ImportJob
@@ -54,15 +54,22 @@ _ROWS: Mapping[str, Callable[[Path, ImportJob], Iterator[Rows]]] = {
     "mdf4": lambda path, job: series_rows(mdf_file(path, job), job),
 }
 
+_LIBRARIES = {"hdf5": "h5py", "tdms": "nptdms", "mdf4": "asammdf", "candump": "can", "blf": "can"}
+"""Libraries of formats; slow imports, not needed by a process that reads recordings alone."""
+
 
 def main() -> None:
     """Answer requests, each in a fork, until standard input ends or a fork fails."""
     sys.stdout.buffer.write(READY)
     sys.stdout.buffer.flush()
     for line in sys.stdin.buffer:
+        request = json.loads(line)
+        if request["format"] in _LIBRARIES:
+            with suppress(ImportError):  # the fork reports what is missing
+                importlib.import_module(_LIBRARIES[request["format"]])  # once, before the forks
         child = os.fork()
         if child == 0:
-            _answer_and_exit(line)
+            _answer_and_exit(request)
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         if code < 0:
             with suppress(OSError):  # the action of SIGKILL cannot be set
@@ -74,10 +81,9 @@ def main() -> None:
         sys.stdout.buffer.flush()
 
 
-def _answer_and_exit(line: bytes) -> None:
+def _answer_and_exit(request: Mapping[str, Any]) -> None:
     code = 1
     try:
-        request = json.loads(line)
         confine(memory_in_use_bytes() + _memory_bytes(request))
         code = FAILED  # later exceptions are caused by the file
         answer(request, sys.stdout.buffer)
@@ -121,6 +127,8 @@ def answer(request: Mapping[str, Any], out: BinaryIO) -> None:
 def _import(path: Path, request: Mapping[str, Any]) -> Iterator[Message]:
     job = TypeAdapter(ImportJob).validate_python(request["job"])
     if job.format in ("candump", "blf"):
+        from acquisition.recordings.imports.can_log import read_frames  # loads python-can
+
         for batch, done in read_frames(path, job):
             yield frames_message(batch, done)
     else:
