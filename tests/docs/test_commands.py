@@ -53,14 +53,14 @@ def parsed(arguments: list[str]) -> None:
             raise AssertionError(f"{name} {arguments}: {refusal}") from refusal
 
 
-def test_command_lines_in_examples_are_taken(page):
-    for arguments in lines(page.read_text(encoding="utf-8")):
-        parsed(arguments)
+def test_command_lines_in_examples_are_taken(pages):
+    for page in pages:
+        for arguments in lines(page.read_text(encoding="utf-8")):
+            parsed(arguments)
 
 
-def test_commands_named_in_sentences_exist(page):
-    text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
-    for words in INLINE.findall(text):
+def test_commands_named_in_sentences_exist(pages):
+    for words in [words for page in pages for words in INLINE.findall(text_of(page))]:
         command = command_line()
         for word in words.split():
             if not hasattr(command, "commands"):
@@ -78,30 +78,33 @@ ANY_FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 HEADING = re.compile(r"^#{1,6} +(.+?) *$", re.MULTILINE)
 
 
+@cache
 def text_of(page: Path) -> str:
     return ANY_FENCE.sub("", page.read_text(encoding="utf-8"))
 
 
+@cache
 def anchors_of(page: Path) -> set[str]:
     """Names of the places on a page, as forges and MyST make them of headings."""
     headings = HEADING.findall(text_of(page))
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-def test_links_on_pages_lead_somewhere(page):
-    for link in LINK.findall(text_of(page)):
+def test_links_on_pages_lead_somewhere(pages):
+    for page, link in [(each, link) for each in pages for link in LINK.findall(text_of(each))]:
         path, _, anchor = unquote(link).partition("#")
         target = (page.parent / path).resolve() if path else page
-        assert target.exists(), f"{link} leads nowhere"
+        assert target.exists(), f"{page}: {link} leads nowhere"
         if anchor.startswith("table-"):  # of tables that are made when the documentation is built
             assert target.parent.name == "reference"
         elif anchor:
-            assert anchor in anchors_of(target), f"{link}: no such heading; {anchors_of(target)}"
+            assert anchor in anchors_of(target), f"{page}: {link}: no such heading"
 
 
-def test_images_have_words_for_those_who_cannot_see_them(page):
-    for words, image in re.findall(r"!\[([^\]]*)\]\(([^)]+)\)", text_of(page)):
-        assert words, f"{image} has no words"
+def test_images_have_words_for_those_who_cannot_see_them(pages):
+    for page in pages:
+        for words, image in re.findall(r"!\[([^\]]*)\]\(([^)]+)\)", text_of(page)):
+            assert words, f"{page}: {image} has no words"
 
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference"

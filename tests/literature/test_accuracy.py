@@ -8,23 +8,30 @@ s / √n, and that, three times over, is all that is added to a limit here.
 import math
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 from rigs.tiers import first_fast
 
-from benchmarks.accuracy import simulate
 from benchmarks.accuracy_estimates import Estimate, estimates
 from benchmarks.accuracy_plant import spectra
-from benchmarks.accuracy_rows import ROWS, Row
 
 N_RUNS = 2
 SHORT_S = 300.0
 
 
+def row_of(name: str) -> Any:
+    from benchmarks.accuracy_rows import ROWS  # takes 0.4 s, which each worker would spend
+
+    return ROWS[name]
+
+
 @cache
 def one_run(name: str, seed: int) -> dict[str, list[Estimate]]:
     """Estimates of one run by bearing; several tests look at the same."""
+    from benchmarks.accuracy import simulate  # loads the rows
+
     return simulate((name, seed))
 
 
@@ -40,7 +47,7 @@ def run_some(name: str, n_runs: int = N_RUNS) -> dict[tuple[str, str], list[Esti
 
 @pytest.mark.parametrize("name", first_fast(1, ["crossed", "balanced-0.5", "balanced-3"]))
 def test_a_balanced_machine_with_runout_shows_all_eight_coefficients(name):
-    row = ROWS[name]
+    row = row_of(name)
     for (bearing, figure), given in run_some(name).items():
         limit = row.limits_of(figure).mean
         if limit is None:
@@ -53,7 +60,7 @@ def test_a_balanced_machine_with_runout_shows_all_eight_coefficients(name):
 
 @pytest.mark.parametrize("condition", range(1, 6))
 def test_the_papers_conditions_are_found_within_a_percent_in_five_minutes(condition):
-    row = ROWS[f"paper-{condition}"]
+    row = row_of(f"paper-{condition}")
     found = spectra(replace(row.run, duration_s=SHORT_S), 1)
 
     for bearing in row.bearings:
@@ -80,7 +87,7 @@ def test_little_excitation_gives_wide_intervals_and_runout_misleads_equation_5_a
 
 @pytest.mark.parametrize("name", ["still-standing", "still-balanced", "still-dead-probe"])
 def test_a_machine_that_is_not_shaken_never_shows_a_stiffness(name):
-    row = ROWS[name]
+    row = row_of(name)
     for (bearing, figure), given in run_some(name, 1).items():
         if row.limits_of(figure).silent:
             assert all(math.isnan(e.error) for e in given), f"{bearing} {figure}"
@@ -88,7 +95,7 @@ def test_a_machine_that_is_not_shaken_never_shows_a_stiffness(name):
 
 @pytest.mark.long
 def test_a_corner_of_half_a_hertz_and_a_speed_that_wanders_read_true():
-    corrected, uncorrected = (_at_vortex(ROWS[name]) for name in ("corner", "corner-uncorrected"))
+    corrected, uncorrected = (_at_vortex(row_of(name)) for name in ("corner", "corner-uncorrected"))
 
     # 5 minutes, one run: stated 2.8 % at random.
     assert abs(corrected.error) <= 3.0 * corrected.std
@@ -99,7 +106,7 @@ def test_a_corner_of_half_a_hertz_and_a_speed_that_wanders_read_true():
         assert all(abs(estimate.error) <= 0.01 for estimate in given)
 
 
-def _at_vortex(row: Row) -> Estimate:
+def _at_vortex(row: Any) -> Estimate:
     found = spectra(replace(row.run, duration_s=SHORT_S), 3, row.response)["UJB"]
     given = estimates(found, row.accuracy, row.lines)
     return next(e for e in given if e.name == "transfer vortex k_xx")
