@@ -5,6 +5,7 @@ import stat
 from collections import Counter
 from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -16,88 +17,6 @@ from acquisition.recordings.reading import confined_messages
 from core.samples.blocks import Rejection, SampleBlock
 from core.samples.gaps import Gap
 from core.units import ns_from_s
-
-
-@dataclass(frozen=True)
-class Recording:
-    """Recording whose files match its manifest; see :func:`open_recording`.
-
-    The Parquet files are read in the confined child process. All methods raise ConfigError if a
-    file has become unreadable.
-    """
-
-    folder: Path
-    manifest: Manifest
-
-    def blocks(self, first_block: int = 0, stop_block: int | None = None) -> Generator[SampleBlock]:
-        """Yield the blocks from `first_block` to `stop_block` (excluded; None for all).
-
-        Blocks without a gap between them are joined; each is then a cell of the joined block. The
-        first block of the recording has number 0.
-        """
-        calibration = self.manifest.calibration
-        stop_block = self.manifest.n_blocks if stop_block is None else stop_block
-        for message in self._messages(first_block, stop_block, with_samples=True):
-            yield from blocks_in(message, calibration, (self.manifest.sample_type,))
-
-    def heads(self) -> Iterator[tuple[Heads, Mapping[int, list[Rejection]]]]:
-        """Yield arrays of some hundred block headers, and rejections before them by array index."""
-        for message in self._messages(0, self.manifest.n_blocks, with_samples=False):
-            heads, rejected, _ = heads_in(message, len(self.manifest.slow_channels))
-            if heads.size:
-                yield heads, rejected
-
-    def _messages(self, first: int, stop: int, *, with_samples: bool) -> Iterator[Message]:
-        request = {"first": first, "stop": stop, "samples": with_samples}
-        manifest = {"manifest": self.manifest.model_dump(mode="json")}
-        return confined_messages(self.folder, "recording", "blocks", request | manifest)
-
-
-def open_recording(folder: Path) -> Recording:
-    """Open a recording and check it fully: manifest, file sizes, checksums, columns, lengths.
-
-    Raises ConfigError if a check fails; the message states the file and the fault in one sentence.
-    """
-    manifest = read_manifest(folder)
-    for name, expected in manifest.files.items():
-        _require_file(folder / name, expected)
-    recording = Recording(folder, manifest)
-    _require_lengths(recording)
-    return recording
-
-
-def _require_file(path: Path, expected: RecordedFile) -> None:
-    try:
-        status = path.lstat()
-        if not stat.S_ISREG(status.st_mode):
-            raise ConfigError(f"{path}: not a regular file")
-        if status.st_size != expected.size:
-            raise ConfigError(f"{path}: file has {status.st_size} bytes, expected {expected.size}")
-        with path.open("rb") as file:
-            found = hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise ConfigError(f"{path}: {error.strerror}") from error
-    if found != expected.sha256:
-        raise ConfigError(
-            f"{path}: file is damaged: its checksum is {found[:12]}…, expected"
-            f" {expected.sha256[:12]}…"
-        )
-
-
-def _require_lengths(recording: Recording) -> None:
-    """Check the block headers: each must be valid, and the total length must match the manifest."""
-    path, manifest, progress = recording.folder / BLOCKS, recording.manifest, Progress()
-    for heads, rejected in recording.heads():
-        try:
-            progress = progress.after(heads, rejected, len(manifest.channels))
-        except ConfigError as error:
-            raise ConfigError(f"{path}: {error}") from error
-    if progress.n_samples != manifest.n_samples:
-        found = (
-            f"{progress.n_samples} samples in all blocks, but {manifest.n_samples} in the manifest"
-        )
-        raise ConfigError(f"{path}: {found}")
-
 
 MAX_GAPS_LISTED = 1000
 
@@ -143,12 +62,83 @@ class RecordingSummary:
     n_not_ok: Mapping[str, int]
 
 
-def summary_of(recording: Recording) -> RecordingSummary:
+@dataclass(frozen=True)
+class Recording:
+    """Recording whose files match its manifest; see :func:`open_recording`.
+
+    The Parquet files are read in the confined child process. All methods raise ConfigError if a
+    file has become unreadable.
+    """
+
+    folder: Path
+    manifest: Manifest
+
+    @cached_property
+    def summary(self) -> RecordingSummary:
+        """Start, end, gaps and rejections of the recording; computed when it is opened."""
+        return _summary_of(self)
+
+    def blocks(self, first_block: int = 0, stop_block: int | None = None) -> Generator[SampleBlock]:
+        """Yield the blocks from `first_block` to `stop_block` (excluded; None for all).
+
+        Blocks without a gap between them are joined; each is then a cell of the joined block. The
+        first block of the recording has number 0.
+        """
+        calibration = self.manifest.calibration
+        stop_block = self.manifest.n_blocks if stop_block is None else stop_block
+        for message in self._messages(first_block, stop_block, with_samples=True):
+            yield from blocks_in(message, calibration, (self.manifest.sample_type,))
+
+    def heads(self) -> Iterator[tuple[Heads, Mapping[int, list[Rejection]]]]:
+        """Yield arrays of some hundred block headers, and rejections before them by array index."""
+        for message in self._messages(0, self.manifest.n_blocks, with_samples=False):
+            heads, rejected, _ = heads_in(message, len(self.manifest.slow_channels))
+            if heads.size:
+                yield heads, rejected
+
+    def _messages(self, first: int, stop: int, *, with_samples: bool) -> Iterator[Message]:
+        request = {"first": first, "stop": stop, "samples": with_samples}
+        manifest = {"manifest": self.manifest.model_dump(mode="json")}
+        return confined_messages(self.folder, "recording", "blocks", request | manifest)
+
+
+def open_recording(folder: Path) -> Recording:
+    """Open a recording and check it fully: manifest, file sizes, checksums, columns, lengths.
+
+    Raises ConfigError if a check fails; the message states the file and the fault in one sentence.
+    """
+    manifest = read_manifest(folder)
+    for name, expected in manifest.files.items():
+        _require_file(folder / name, expected)
+    recording = Recording(folder, manifest)
+    _ = recording.summary  # checks the headers of all blocks
+    return recording
+
+
+def _require_file(path: Path, expected: RecordedFile) -> None:
+    try:
+        status = path.lstat()
+        if not stat.S_ISREG(status.st_mode):
+            raise ConfigError(f"{path}: not a regular file")
+        if status.st_size != expected.size:
+            raise ConfigError(f"{path}: file has {status.st_size} bytes, expected {expected.size}")
+        with path.open("rb") as file:
+            found = hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise ConfigError(f"{path}: {error.strerror}") from error
+    if found != expected.sha256:
+        raise ConfigError(
+            f"{path}: file is damaged: its checksum is {found[:12]}…, expected"
+            f" {expected.sha256[:12]}…"
+        )
+
+
+def _summary_of(recording: Recording) -> RecordingSummary:
     """Return the summary of a recording, from the headers of all its blocks.
 
-    Raises ConfigError if a file of the recording has become unreadable.
+    Raises ConfigError if a header is invalid, or the total length differs from the manifest.
     """
-    manifest, progress = recording.manifest, Progress()
+    path, manifest, progress = recording.folder / BLOCKS, recording.manifest, Progress()
     channels = np.arange(len(manifest.channels))[:, np.newaxis]
     start_ns: int | None = None
     stop_ns = n_gaps = n_gap_samples = 0
@@ -158,6 +148,10 @@ def summary_of(recording: Recording) -> RecordingSummary:
     n_not_ok = np.zeros(len(channels), dtype=np.int64)
     for heads, rejections in recording.heads():
         continues, n_missing = progress.missing(heads)
+        try:
+            progress = progress.after(heads, rejections, len(channels))
+        except ConfigError as error:
+            raise ConfigError(f"{path}: {error}") from error
         n_lost = np.where(continues, n_missing, 0)
         for row, before in rejections.items():
             n_lost[row] -= sum(rejection.n_samples for rejection in before)
@@ -172,7 +166,11 @@ def summary_of(recording: Recording) -> RecordingSummary:
         start_ns = int(heads["start_ns"][0]) if start_ns is None else start_ns
         last_s = int(heads["n_samples"][-1]) / manifest.rate_hz
         stop_ns = int(heads["start_ns"][-1]) + ns_from_s(last_s)
-        progress = progress.after(heads, rejections, len(channels))
+    if progress.n_samples != manifest.n_samples:
+        found = (
+            f"{progress.n_samples} samples in all blocks, but {manifest.n_samples} in the manifest"
+        )
+        raise ConfigError(f"{path}: {found}")
     return RecordingSummary(
         start_ns=start_ns or 0,
         stop_ns=stop_ns,

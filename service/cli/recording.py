@@ -10,7 +10,7 @@ import typer
 from acquisition.clock import SystemClock
 from acquisition.delivery.units import UNIT_OF
 from acquisition.recordings.export import ExportFormat, export_recording
-from acquisition.recordings.reader import Recording, RecordingSummary, open_recording, summary_of
+from acquisition.recordings.reader import Recording, RecordingSummary, open_recording
 from service.app.kept_files import retention_rules
 from service.app.storage import has_store
 from service.cli.offline.importing import import_recording
@@ -172,7 +172,7 @@ def _losses(summary: RecordingSummary) -> Iterator[str]:
 def info(folder: RecordingFolder, json_output: JsonOutput = False) -> None:
     """Describe a recording: channels, length, gaps, restarts, rejections, checksums."""
     recording = open_recording(folder)
-    summary = summary_of(recording)
+    summary = recording.summary
     print_result(json_of(recording, summary), lines_of(recording, summary), json_output)
 
 

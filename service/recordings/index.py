@@ -12,7 +12,7 @@ from pathlib import Path
 from acquisition.clock import Clock
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import MANIFEST
-from acquisition.recordings.reader import open_recording, summary_of
+from acquisition.recordings.reader import open_recording
 from service.recordings.folders import DAMAGED, UNFINISHED, finished, is_recording, n_bytes_of
 from service.store.waveforms import WaveformFile, WaveformKind, WaveformState, WaveformStore
 
@@ -123,7 +123,7 @@ def inspected(folder: Path, place: str, kind: WaveformKind, now_ns: int) -> Wave
         checked_ns=now_ns,
     )
     try:
-        summary = summary_of(recording := open_recording(folder))
+        summary = (recording := open_recording(folder)).summary
         return replace(
             entry,
             unit=recording.manifest.unit,

@@ -12,7 +12,7 @@ import numpy as np
 from acquisition.errors import ConfigError
 from acquisition.recordings.export import ExportFormat, write_rows
 from acquisition.recordings.manifest import Manifest, checksum_of, read_manifest
-from acquisition.recordings.reader import Recording, RecordingSummary, open_recording, summary_of
+from acquisition.recordings.reader import Recording, RecordingSummary, open_recording
 from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S, ns_from_s
 from service.recordings.folders import ALARM, CONTINUOUS, FILES, finished, n_bytes_of, unit_of
@@ -96,7 +96,7 @@ class RecordingLibrary:
 
     def summary(self, name: str) -> RecordingSummary:
         """Return the summary of a recording; raise `ConfigError` if damaged or missing."""
-        return summary_of(self.opened(name))
+        return self.opened(name).summary
 
     def zip_pieces(self, name: str) -> Generator[bytes, None, None]:
         """Yield the content of a ZIP file with all files of a recording.

@@ -16,7 +16,7 @@ from harness.everything import Rows, fill, fill_access, served
 from rigs.recording import recorded
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.reader import open_recording, summary_of
+from acquisition.recordings.reader import open_recording
 from acquisition.recordings.writer import RecordingWriter
 from service.store.access.tables import AccessStore
 from service.store.port import StoreError
@@ -145,7 +145,7 @@ def read(folder: Path) -> bytes:
         f"{b.epoch} {b.first_index} {b.start_ns} {b.side} {b.slow}".encode() + b.counts.tobytes()
         for b in opened.blocks()
     ]
-    told = f"{opened.manifest} {summary_of(opened).n_samples}"
+    told = f"{opened.manifest} {opened.summary.n_samples}"
     return told.encode() + b"".join(blocks)
 
 

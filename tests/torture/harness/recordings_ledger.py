@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.reader import Recording, open_recording, summary_of
+from acquisition.recordings.reader import Recording, open_recording
 from harness.ledger_daq import Offered
 from harness.ledger_plant import LedgerPlant
 from harness.truth import Truth
@@ -77,7 +77,7 @@ def _compared(
     recording: Recording, plant: LedgerPlant, unit: int, found: Recorded
 ) -> list[tuple[int, int]]:
     """Return the first index and the number of samples of each block."""
-    summary, heads = summary_of(recording), []
+    summary, heads = recording.summary, []
     for some, _ in recording.heads():
         heads += some[["first_index", "n_samples"]].tolist()
     found.told.update(summary.rejected)

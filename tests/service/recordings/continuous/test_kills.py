@@ -9,7 +9,7 @@ import pytest
 from rigs.capturing import BLOCK, counted_block, numbers, samples
 
 from acquisition.recordings.manifest import RecordedUnit
-from acquisition.recordings.reader import Recording, open_recording, summary_of
+from acquisition.recordings.reader import Recording, open_recording
 from core.samples.blocks import SampleBlock
 from service.recordings.continuous_recorder import UnitRecorder, last_end
 from service.recordings.folders import remove_incomplete
@@ -70,7 +70,8 @@ def record(root: Path, unit: RecordedUnit, blocks: list[SampleBlock], synced: li
 def account(recordings: list[Recording]) -> tuple[list[int], int]:
     """Numbers of the samples, and how many are told to be missing."""
     found = [number for each in recordings for number in samples(each)]
-    missing = sum(s.n_gap_samples + sum(s.rejected.values()) for s in map(summary_of, recordings))
+    summaries = [recording.summary for recording in recordings]
+    missing = sum(s.n_gap_samples + sum(s.rejected.values()) for s in summaries)
     return found, missing
 
 

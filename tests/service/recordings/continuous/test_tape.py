@@ -4,7 +4,7 @@ import pytest
 from rigs.capturing import counted_block, numbers, samples
 from rigs.standing_clock import StandingClock
 
-from acquisition.recordings.reader import open_recording, summary_of
+from acquisition.recordings.reader import open_recording
 from service.app import analysis as pressure
 from service.app.analysis import Pressure
 from service.measuring.acquirer import Bus
@@ -65,7 +65,7 @@ async def test_samples_that_yield_to_analysis_are_a_hole_with_a_reason(running, 
     [recording] = rig.recordings()
 
     assert samples(recording) == numbers(0, 10) + numbers(17, 30)
-    assert summary_of(recording).rejected == {reason.value: 70}
+    assert recording.summary.rejected == {reason.value: 70}
     assert rig.tape.n_dropped == {reason: 70, DropReason.DISK_REFUSED: 0}
 
 
@@ -79,7 +79,7 @@ async def test_a_disk_that_does_not_keep_up_costs_samples_and_never_memory(runni
     [recording] = rig.recordings()
 
     assert samples(recording) == numbers(0, 10) + numbers(13, 20)
-    assert summary_of(recording).rejected == {"disk_slow": 30}
+    assert recording.summary.rejected == {"disk_slow": 30}
 
 
 async def test_a_refusing_disk_is_told_and_recording_goes_on_after_it(running, root, monkeypatch):
@@ -98,7 +98,7 @@ async def test_a_refusing_disk_is_told_and_recording_goes_on_after_it(running, r
     [recording] = rig.recordings()
 
     assert samples(recording) == numbers(10, 20)
-    assert summary_of(recording).rejected == {"disk_refused": 100}
+    assert recording.summary.rejected == {"disk_refused": 100}
     assert rig.tape.n_dropped[DropReason.DISK_REFUSED] == 100
 
 
@@ -131,7 +131,7 @@ async def test_a_hole_is_told_by_number_and_reason_and_nothing_is_recorded_twice
     assert [samples(one) for one in found] == [
         [number for span in spans for number in numbers(*span)] for spans in expected
     ]
-    summary = summary_of(found[-1])
+    summary = found[-1].summary
     gaps = {"gap": summary.n_gap_samples} if summary.gaps else {}
     assert {**summary.rejected, **gaps} == missing
 
@@ -142,7 +142,7 @@ async def test_a_device_that_counts_anew_is_recorded_with_both_epochs(running, r
         rig.send(20, 30, epoch=2)
     [recording] = rig.recordings()
 
-    assert summary_of(recording).epochs == (1, 2)
+    assert recording.summary.epochs == (1, 2)
     assert samples(recording) == numbers(10, 30)
 
 
