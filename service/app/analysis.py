@@ -34,6 +34,7 @@ from service.measuring.metrics import add_disks, add_integrity, add_samples, add
 from service.measuring.recorder import Recorder
 from service.measuring.service_alarms import ServiceHealth
 from service.measuring.snapshots import Reports, SnapshotBuilder
+from service.measuring.sources import monitor_of
 from service.notifications.message import LiveContext
 from service.notifications.metrics import add_deliveries
 from service.notifications.sender import Deliveries
@@ -273,12 +274,12 @@ def opened_analysis(
     plant: PlantFile,
     origin: Origin,
     clock: Clock,
-    monitors: Mapping[str, UnitMonitor],
     part: PlantPart = WHOLE,
     sources: Mapping[str, TimedSource] = MappingProxyType({}),
 ) -> Iterator[Analysis]:
     """Open the store of a process for its analysis; raise `StoreError` if it cannot be used."""
-    live = LiveView([unit.id for unit in plant.unit], clock, stale_after_s(plant))
+    monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in plant.unit}
+    live = LiveView(monitors, clock, stale_after_s(plant))
     context = LiveContext(live.assessment)
     router = router_of(plant, origin, context, clock)
     with closing(open_store(plant, origin, router)) as store:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from core.alarms.alarm import PLANT
-from core.monitor.monitor import UnitMonitor
 from service.app.analysis import Analysis, opened_analysis
 from service.app.health_page import HealthServer
 from service.app.process import Host, Supervision
@@ -38,10 +37,7 @@ DRAIN_S = 3.0
 async def run_acquire(
     plant: PlantFile, settings: StreamSettings, units: Mapping[str, WatchedUnit], host: Host
 ) -> None:
-    """Acquire and publish the samples of units until SIGINT or SIGTERM.
-
-    The monitors of the units are not used.
-    """
+    """Acquire and publish the samples of units until SIGINT or SIGTERM."""
     clock, beats = host.clock, Heartbeats(host.clock)
     live = LiveView([unit.id for unit in plant.unit], clock, stale_after_s(plant))
     identities = {unit.id: identity_of(plant, unit) for unit in plant.unit if unit.id in units}
@@ -64,11 +60,7 @@ WATCH_EVERY_S = 1.0
 
 
 async def run_analyse(
-    plant: PlantFile,
-    partition: Partition,
-    settings: StreamSettings,
-    monitors: Mapping[str, UnitMonitor],
-    host: Host,
+    plant: PlantFile, partition: Partition, settings: StreamSettings, host: Host
 ) -> None:
     """Analyse the units of a partition until SIGINT or SIGTERM.
 
@@ -78,8 +70,6 @@ async def run_analyse(
         Plant with the units of all partitions, and the partition of this process.
     settings
         Settings of the stream of sample blocks.
-    monitors
-        Monitors of the units of the partition, by unit id.
     host
         Surroundings of the process, with the listening socket of the health page.
 
@@ -94,11 +84,11 @@ async def run_analyse(
         if plant.store.postgresql is None:
             stack.enter_context(exclusive_use(database_path(plant)))
         own, share = partition.part_of(plant), partition.share_of(plant)
-        opened = opened_analysis(own, Origin.LIVE, host.clock, monitors, share)
+        opened = opened_analysis(own, Origin.LIVE, host.clock, share)
         analysis = stack.enter_context(opened)
         analysing = Analysing(plant, settings, analysis)
         parts = (analysing.checks, analysing.add_metrics, analysing.shown)
-        supervision = Supervision(host, analysis.beats, analysis.live.status, monitors)
+        supervision = Supervision(host, analysis.beats, analysis.live.status, analysis.monitors)
         health = HealthServer(supervision, *parts)
         try:
             await supervision.run_until_stopped({"health": health.run}, analysing.run)

@@ -65,7 +65,6 @@ class ServingChild:
     end: MeasuringEnd
     clock: Clock
     child: Child | None = None
-    process: subprocess.Popen[bytes] | None = field(default=None, init=False)
     _is_stopping: bool = field(default=False, init=False)
 
     async def run(self, pulse: Pulse) -> None:
@@ -83,14 +82,12 @@ class ServingChild:
     async def stop(self) -> None:
         """Let the serving process finish its requests; kill it after `STOPS_WITHIN_S` seconds."""
         self._is_stopping = True
-        if self.process is None:
-            return
-        self.process.terminate()
-        await asyncio.to_thread(_end_of, self.process)
+        if self.child is not None:
+            self.child.process.terminate()
+            await asyncio.to_thread(_end_of, self.child.process)
 
     async def _run_once(self) -> int:
-        child, self.child = self.child or start_child(), None
-        self.process = child.process
+        child = self.child = self.child or start_child()
         with suppress(ConnectionError):  # it has ended
             socket.send_fds(child.connection, [b"."], [self.listener.fileno()])
         reader, writer = await asyncio.open_connection(sock=child.connection)
@@ -101,7 +98,9 @@ class ServingChild:
             pass  # it has ended
         finally:
             writer.close()
-        return await asyncio.to_thread(_end_of, child.process)
+        code = await asyncio.to_thread(_end_of, child.process)
+        self.child = None
+        return code
 
 
 def _end_of(process: subprocess.Popen[bytes]) -> int:
@@ -130,7 +129,7 @@ async def run_service(
     Parameters
     ----------
     units
-        Source and monitor of every unit of the plant.
+        Source of every unit of the plant.
     host
         Surroundings of the process; the serving process inherits the listening socket.
     origin
@@ -152,10 +151,9 @@ async def run_service(
         If the service would be reachable from other hosts without TLS or accounts.
     """
     clock = host.clock
-    monitors = {unit: watched.monitor for unit, watched in units.items()}
     sources = {unit: watched.source for unit, watched in units.items()}
     timed = {u: each for u, each in sources.items() if isinstance(each, TimedSource)}
-    opened = opened_analysis(plant, origin, clock, monitors, sources=timed)
+    opened = opened_analysis(plant, origin, clock, sources=timed)
     with exclusive_use(database_path(plant)), opened as analysis:
         with closing(open_access(plant, origin)) as access:
             require_protected(plant, access)

@@ -22,7 +22,7 @@ from service.live.commands import Operators
 from service.live.metrics import add_plant
 from service.live.receivers import ReceiverView
 from service.notifications.metrics import add_deliveries
-from service.runtime.heartbeats import Heartbeats, Pulse
+from service.runtime.heartbeats import Heartbeats
 from service.runtime.metrics import Families
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
@@ -110,22 +110,19 @@ async def run_serve(plant: PlantFile, host: Host) -> None:
         audit = ServiceTrail(plant, Origin.LIVE, store.audit, clock)
         await audit.begin()
         supervision = Supervision(host, beats, replica.live.units.status, context.units)
-        ended, served = asyncio.Event(), asyncio.Event()
+        ended = asyncio.Event()
 
         async def ready(url: str, token: str | None) -> None:
             supervision.announce(url, token)
 
-        async def serve(pulse: Pulse) -> None:
-            pulse.rest()
-            loops = {"feed": replica.feed.run}
-            await serve_requests(context, plant, host.listener, loops, ended, ready)
-            served.set()
+        async def serve() -> None:
+            await serve_requests(context, plant, host.listener, {}, ended, ready)
 
-        async def drain(_: asyncio.Task[None]) -> None:
+        async def drain(serving: asyncio.Task[None]) -> None:
             ended.set()
-            await served.wait()
+            await asyncio.wait([serving])
 
         try:
-            await supervision.run_until_stopped({"serve": serve}, drain=drain)
+            await supervision.run_until_stopped({"feed": replica.feed.run}, serve, drain)
         finally:
             await audit.end()

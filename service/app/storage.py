@@ -39,9 +39,8 @@ def has_store(plant: PlantFile, name: str = DATABASE) -> bool:
 
 def store_name(plant: PlantFile, name: str = DATABASE) -> str:
     """Return the name of a database of the plant for messages."""
-    if plant.store.postgresql is not None:
-        return _server(plant, plant.store.postgresql)[0].name
-    return str(database_path(plant, name).absolute())
+    server = _server(plant)
+    return str(database_path(plant, name).absolute()) if server is None else server[0].name
 
 
 def open_store(
@@ -58,15 +57,12 @@ def open_store(
     `StoreError` if the database cannot be used, or contains results of another origin (live,
     replay).
     """
-    if plant.store.postgresql is None:
-        path = database_path(plant)
-        return (
-            SqliteReader(path) if only_reads else SqliteStore(path, origin, address, plant.spectra)
-        )
-    from service.store.postgres import PostgresStore  # slow import
+    if (server := _server(plant)) is not None:
+        from service.store.postgres import PostgresStore  # slow import
 
-    server = _server(plant, plant.store.postgresql)
-    return PostgresStore(*server, origin, address, plant.spectra)
+        return PostgresStore(*server, origin, address, plant.spectra)
+    path = database_path(plant)
+    return SqliteReader(path) if only_reads else SqliteStore(path, origin, address, plant.spectra)
 
 
 def open_access(plant: PlantFile, origin: Origin = Origin.LIVE) -> AccessStore:
@@ -74,28 +70,33 @@ def open_access(plant: PlantFile, origin: Origin = Origin.LIVE) -> AccessStore:
 
     Raises `StoreError` if the database cannot be used.
     """
-    if plant.store.postgresql is None:
+    if (server := _server(plant)) is None:
         return open_access_file(access_path(plant))
     from service.store.postgres.store import open_server_access
 
-    return open_server_access(*_server(plant, plant.store.postgresql), origin)
+    return open_server_access(*server, origin)
 
 
 def open_trails(plant: PlantFile) -> list[Trail]:
     """Open the plant's audit trail, one chain of entries per database, for reading."""
-    if plant.store.postgresql is None:
+    if (server := _server(plant)) is None:
         return [file_trail(database_path(plant)), file_trail(access_path(plant))]
     from service.store.postgres.store import server_trail
 
-    return [server_trail(*_server(plant, plant.store.postgresql))]
+    return [server_trail(*server)]
 
 
-def _server(plant: PlantFile, conninfo: str) -> "tuple[PostgresAddress, Path]":
-    """Return the address of the PostgreSQL database, and the local head file of its audit trail."""
+def _server(plant: PlantFile) -> "tuple[PostgresAddress, Path] | None":
+    """Return the address of the PostgreSQL database and the local head file of its audit trail.
+
+    None if the plant has SQLite files.
+    """
+    if plant.store.postgresql is None:
+        return None
     from service.store.postgres.connection import PostgresAddress
 
     head = head_path(Path(plant.service.data_folder) / "postgresql")
-    return PostgresAddress(conninfo, plant.store.password_path), head
+    return PostgresAddress(plant.store.postgresql, plant.store.password_path), head
 
 
 CAPTURES, RECORDINGS = "captures", "recordings"

@@ -24,7 +24,7 @@ from service.cli.options import (
     fail,
     terminal_to_itself,
 )
-from service.measuring.sources import live_units, monitor_of
+from service.measuring.sources import live_units
 from service.runtime.child import Child
 from service.runtime.listening import PortInUseError, listen
 from service.runtime.process import leave, run_to_its_end
@@ -123,14 +123,13 @@ def analyse(
     settings = _stream_settings(plant)
     try:
         part = Partition.of(partition)
-        units = part.part_of(plant).unit
+        part.part_of(plant)  # refuses an empty part
     except ValueError as error:
         fail(str(error), 2)
-    monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in units}
     with listen(HOST, settings.analyse_port if port is None else port) as listener:
         host = Host(listener, SystemClock(), _announcer("analyse"), ServiceManager(os.environ))
         try:
-            run_to_its_end(run_analyse(plant, part, settings, monitors, host))
+            run_to_its_end(run_analyse(plant, part, settings, host))
         except ExceptionGroup as group:
             _, others = group.split((StoreError, StreamAnewError))
             if others is not None:

@@ -68,12 +68,10 @@ class Feed:
         self._live.units.read_error = self._trouble.trouble
 
     async def _take(self) -> None:
-        for report, revision in await asyncio.to_thread(self._read):
+        for report in await asyncio.to_thread(self._read):
             await self._live.take(report)
-            if revision is not None:
-                self._revisions[report.units[0].unit] = revision
 
-    def _read(self) -> list[tuple[Report, Revision | None]]:
+    def _read(self) -> list[Report]:
         states = self._store.unit_states
         beats = [beat for beat in states.beats() if beat.unit in self._live.units.units]
         new = [b.unit for b in beats if self._revisions.get(b.unit) != (b.process, b.revision)]
@@ -81,9 +79,7 @@ class Feed:
         found = (self._report(beat, documents.get(beat.unit)) for beat in beats)
         return [each for each in found if each is not None]
 
-    def _report(
-        self, beat: UnitBeat, document: tuple[str, int, bytes] | None
-    ) -> tuple[Report, Revision | None] | None:
+    def _report(self, beat: UnitBeat, document: tuple[str, int, bytes] | None) -> Report | None:
         """Decode a report; log an unreadable report once and return None."""
         try:
             # the snapshot first, whose error names both versions
@@ -98,9 +94,10 @@ class Feed:
                     reason=reason,
                 )
             return None
+        if document is not None:
+            self._revisions[beat.unit] = document[:2]
         unit = UnitReport(beat.unit, link, beat.revision, snapshot)
-        revision = None if document is None else document[:2]
-        return Report(beat.process, beat.n_beats, (unit,), None), revision
+        return Report(beat.process, beat.n_beats, (unit,), None)
 
 
 WAIT_S = 5.0

@@ -116,26 +116,23 @@ class LiveAlarms:
 
     def _show(self, unit: str) -> None:
         self._alive[unit] = self._is_alive(unit)
-        known = ((a, self.is_judged(a), self.is_chattering(a)) for a in self._of(unit))
+        alarms = list(self._alarms.get(unit, {}).values())
+        known = ((a, self.is_judged(a), self.is_chattering(a)) for a in alarms)
         shown = [each for each in known if each[0].state is not AlarmState.NORMAL or not each[1]]
         self._revision += shown != self._shown.get(unit, [])
         self._shown[unit] = shown
 
-    def _of(self, unit: str) -> Sequence[Alarm]:
-        return list(self._alarms.get(unit, {}).values())
-
     @property
     def alarms(self) -> Sequence[Alarm]:
         """All alarms of the plant, active or not."""
-        return [alarm for unit in list(self._alarms) for alarm in self._of(unit)]
+        return [alarm for alarms in list(self._alarms.values()) for alarm in list(alarms.values())]
 
     def alarm(self, id_: str) -> Alarm:
         """Return the alarm with an id; raise `LookupError` if it does not exist."""
-        found = (alarms[id_] for alarms in self._alarms.values() if id_ in alarms)
-        alarm = next(found, None)
-        if alarm is None:
-            raise LookupError(id_)
-        return alarm
+        for alarms in self._alarms.values():
+            if id_ in alarms:
+                return alarms[id_]
+        raise LookupError(id_)
 
     def is_judged(self, alarm: Alarm) -> bool:
         """Return whether the condition of an alarm is known now according to the latest report."""

@@ -4,6 +4,7 @@ import asyncio
 import json
 from collections.abc import Awaitable, Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import structlog
@@ -43,7 +44,7 @@ SILENT_AFTER_S = 5.0
 """Age of the last report, s, above which a unit counts as not analysed; the period is 1 s."""
 
 CHECK_S = 0.2
-"""Time after which a unit without a new report is looked at again for stale results, s."""
+"""Time after which units without new reports are looked at again for stale results, s."""
 
 NOT_ANALYSED = "no process is analysing this unit"
 
@@ -68,8 +69,6 @@ class LatestReport:
     received_ns
         Arrival time of the samples of each result by the host clock of this process, UTC
         nanoseconds since 1970, by bearing id; without the results whose age is unknown.
-    n_changes
-        Number of changes of `results`.
     """
 
     beat: tuple[str, int] | None = None
@@ -77,7 +76,11 @@ class LatestReport:
     link: UnitLink = NO_LINK
     results: Mapping[str, BearingResult] = field(default_factory=dict)
     received_ns: Mapping[str, int] = field(default_factory=dict)
-    n_changes: int = 0
+
+    @cached_property
+    def times_ns(self) -> Mapping[str, int]:
+        """Time of each result, ns since 1970 UTC, by bearing id."""
+        return {bearing: result.time_ns for bearing, result in self.results.items()}
 
 
 Ask = Callable[[str, str], Awaitable[Any]]
@@ -104,7 +107,6 @@ class LiveUnits:
         self._latest = dict.fromkeys((*units, PLANT, SHARED), LatestReport())
         self._revisions = dict.fromkeys(self._latest, 0)
         self._seen: dict[str, object] = {}
-        self._checked: dict[str, tuple[LatestReport, float]] = {}
         self._asked: dict[tuple[str, ...], tuple[object, asyncio.Future[Any]]] = {}
         self.n_reports = 0
         """Number of applied reports."""
@@ -121,16 +123,11 @@ class LiveUnits:
 
         A result that becomes outdated is a change; new samples and greater ages are not.
         """
-        latest, now_s = self._latest[unit], self._clock.monotonic_s()
-        checked, checked_s = self._checked.get(unit, (None, 0.0))
-        if latest is checked and now_s - checked_s < CHECK_S:
-            return self._revisions[unit]
-        self._checked[unit] = latest, now_s
-        status = self.status(unit)
+        latest, status = self._latest[unit], self.status(unit)
         ages_s = (self._age_s(unit, latest.link.result_ages_s.get(b)) for b in latest.results)
         current = [self._why_not_current(unit, age_s) is None for age_s in ages_s]
         link = (status.state, status.reason, status.since_ns)
-        seen = (latest.n_changes, latest.received_ns, current, link)
+        seen = (latest.times_ns, latest.received_ns, current, link)
         if seen != self._seen.get(unit):
             self._seen[unit] = seen
             self._revisions[unit] += 1
@@ -174,14 +171,9 @@ class LiveUnits:
     def set_results(self, unit: str, results: Mapping[str, BearingResult]) -> None:
         """Set the newest results of a unit, by bearing id."""
         latest = self._latest[unit]
-        times_ns = {bearing: known.time_ns for bearing, known in latest.results.items()}
-        same = {b for b, result in results.items() if times_ns.get(b) == result.time_ns}
-        self._latest[unit] = replace(
-            latest,
-            results=results,
-            received_ns={b: then_ns for b, then_ns in latest.received_ns.items() if b in same},
-            n_changes=latest.n_changes + (len(same) < len(results)),
-        )
+        same = {b for b, each in results.items() if latest.times_ns.get(b) == each.time_ns}
+        received_ns = {b: then_ns for b, then_ns in latest.received_ns.items() if b in same}
+        self._latest[unit] = replace(latest, results=results, received_ns=received_ns)
 
     def past_revision(self, unit: str, end_ns: int) -> Hashable:
         """Return a value that changes with the stored results of a unit before a time.

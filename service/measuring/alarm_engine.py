@@ -10,7 +10,7 @@ import structlog
 
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival
-from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmNews
+from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmNews
 from core.alarms.board import AlarmBoard, AlarmMemory
 from core.alarms.judgements import VectorReference
 from core.alarms.kinds import LINK_LOST
@@ -74,7 +74,7 @@ class AlarmEngine:
     service
         Alarms about the service itself.
     chatter
-        Rule that classifies alarms as chattering.
+        Detection of chattering alarms, with the past alarm events.
     stream
         Alarms about refused stream messages; None if blocks do not come over a stream.
     """
@@ -86,14 +86,14 @@ class AlarmEngine:
         clock: Clock,
         listener: Listener | None = None,
         service: ServiceAlarms | None = None,
-        chatter: ChatterRule | None = None,
+        chatter: ChatterWatch | None = None,
         stream: RefusedMessages | None = None,
     ) -> None:
         self.units, self._put, self._clock, self._listener = units, put, clock, listener
         self._service = service or ServiceAlarms()
         self._stream = stream
         self._reported: list[ReportedAlarms] = [] if stream is None else [stream]
-        self._chatter = ChatterWatch(chatter or ChatterRule())
+        self._chatter = chatter or ChatterWatch(ChatterRule())
         self._looked = Arrival.now(clock)
         self._observer: Callable[[Sequence[AlarmNews]], None] | None = None
 
@@ -130,11 +130,6 @@ class AlarmEngine:
         """Raise a unit's alarm about a refused stream message; no effect without a stream."""
         if self._stream is not None:
             self._stream.refuse(unit, reason)
-
-    def recall(self, events: Iterable[AlarmEvent]) -> None:
-        """Add past alarm events, oldest first, to the detection of chattering alarms."""
-        for event in events:
-            self._chatter.note(event, event.time_ns)
 
     def take(
         self,
@@ -336,7 +331,10 @@ async def alarm_engine(
     # the health of a replay depends on the host, not on the recording
     probe = look if origin is Origin.LIVE else None
     service = ServiceAlarms(units, service_rules_of(plant.alarms), probe, leads=part.leads)
-    chatter, is_alone = chatter_rule_of(plant.alarms), part == WHOLE
+    recent = AlarmQuery(start_ns=max(0, clock.now_ns() - SHOWN_NS), limit=MAX_RECALLED)
+    chatter, is_alone = ChatterWatch(chatter_rule_of(plant.alarms)), part == WHOLE
+    for found in reversed(await asyncio.to_thread(store.alarm_events, recent)):
+        chatter.note(found.event, found.event.time_ns)
     stream = None if is_alone else RefusedMessages(units)
     engine = AlarmEngine(units, put, clock, listener, service, chatter, stream)
     own = [
@@ -347,7 +345,4 @@ async def alarm_engine(
     engine.restore(own, memories)
     for stored in await asyncio.to_thread(store.order1_references.in_force):
         engine.set_reference(stored.reference)
-    recent = AlarmQuery(start_ns=max(0, clock.now_ns() - SHOWN_NS), limit=MAX_RECALLED)
-    events = await asyncio.to_thread(store.alarm_events, recent)
-    engine.recall(found.event for found in reversed(events))
     return engine

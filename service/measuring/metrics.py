@@ -51,13 +51,10 @@ def add_samples(
     for unit in units:
         status = live.status(unit)
         account, clock, last_ns = status.account, status.clock, status.last_sample_ns
-        for name, n_samples in (
-            ("samples_offered_total", account.n_offered),
-            ("samples_missing_total", account.n_gap),
-            ("samples_repeated_total", account.n_repeated),
-            ("device_restarts_total", account.n_restarts),
-        ):
-            families.add(name, n_samples, unit=unit)
+        families.add("samples_offered_total", account.n_offered, unit=unit)
+        families.add("samples_missing_total", account.n_gap, unit=unit)
+        families.add("samples_repeated_total", account.n_repeated, unit=unit)
+        families.add("device_restarts_total", account.n_restarts, unit=unit)
         families.add("samples_received_total", account.n_stored, unit=unit, quality="good")
         families.add("samples_received_total", account.n_flagged, unit=unit, quality="flagged")
         for reason, n in bounded(account.rejected).items():

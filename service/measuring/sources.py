@@ -33,14 +33,13 @@ DEFAULT_RETRY_S = 0.5
 
 @dataclass(frozen=True)
 class WatchedUnit:
-    """Sample source of a unit, and the monitor of its blocks.
+    """Sample source of a unit.
 
     `retry_s` is the maximum wait before a lost link is reconnected: the poll period of the source,
     so that samples arrive within two periods after the device is back.
     """
 
     source: SampleSource
-    monitor: UnitMonitor
     retry_s: float = DEFAULT_RETRY_S
 
 
@@ -51,11 +50,8 @@ QUEUE_RETRY_S = 0.25
 def watched_units(
     plant: PlantFile, source: Callable[[UnitSettings], SampleSource]
 ) -> dict[str, WatchedUnit]:
-    """Return the source and the monitor of every unit of a plant, by unit id."""
-    return {
-        unit.id: WatchedUnit(source(unit), monitor_of(unit, plant.analysis), retry_s(unit))
-        for unit in plant.unit
-    }
+    """Return the source of every unit of a plant, by unit id."""
+    return {unit.id: WatchedUnit(source(unit), retry_s(unit)) for unit in plant.unit}
 
 
 def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> UnitMonitor:
@@ -77,7 +73,7 @@ def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> UnitMonitor:
 
 
 def live_units(plant: PlantFile, clock: Clock) -> dict[str, WatchedUnit]:
-    """Return the sources, with measured poll durations, and the monitors by unit id."""
+    """Return the sources, with measured poll durations, by unit id."""
     return watched_units(plant, lambda unit: TimedSource(partial(source_of, unit), clock))
 
 

@@ -27,7 +27,7 @@ from service.live.status import LinkState
 from service.measuring.analyser import ASSESSMENTS
 from service.measuring.live_view import LiveView
 from service.measuring.simulated_sources import simulated_feed
-from service.measuring.sources import WatchedUnit, monitor_of
+from service.measuring.sources import WatchedUnit
 from service.runtime.listening import listen
 from service.runtime.polls import TimedSource
 from service.settings.plant import PlantFile, load_plant_file
@@ -156,9 +156,7 @@ async def told_by_a_service(folder: Path) -> Told:
         return lambda clock: ScriptedDevice(scripts[unit], clock, let_go)
 
     units = {
-        unit.id: WatchedUnit(
-            TimedSource(device(unit.id), clock), monitor_of(unit, plant.analysis), retry_s=0.5
-        )
+        unit.id: WatchedUnit(TimedSource(device(unit.id), clock), retry_s=0.5)
         for unit in plant.unit
     }
     said: asyncio.Queue[str] = asyncio.Queue()

@@ -54,7 +54,7 @@ class Plant:
         self.gates = Gates(clock)
         self.beats, self.live = Heartbeats(self.gates), LiveView(["U1", "U2"], self.gates, 10.0)
         self.devices: dict[str, Device] = {}
-        units = {name: WatchedUnit(self._source(name), None) for name in ("U1", "U2")}
+        units = {name: WatchedUnit(self._source(name)) for name in ("U1", "U2")}
         acquirer = Acquirer(units, self.live, self.gates, self._publish, lambda _: None, self.beats)
         host = Host(None, self.gates, print, ServiceManager(manager_socket.environment))
         self.supervision = Supervision(host, self.beats, self.live.status, units)

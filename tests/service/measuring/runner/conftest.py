@@ -184,13 +184,10 @@ class Plant:
 
     def runner(self, reach: Reach | None = None, **units: ScriptedPlant) -> Runner:
         settings = AnalysisSettings(segment_samples=SEGMENT, n_segments=4, min_segments=2)
-        watched = {
-            name: WatchedUnit(source, UnitMonitor(unit_named(name), settings))
-            for name, source in units.items()
-        }
-        for unit in watched.values():
-            unit.monitor.go_on(reach)
-        monitors = {name: unit.monitor for name, unit in watched.items()}
+        watched = {name: WatchedUnit(source) for name, source in units.items()}
+        monitors = {name: UnitMonitor(unit_named(name), settings) for name in units}
+        for monitor in monitors.values():
+            monitor.go_on(reach)
         analyser = Analyser(monitors, self.live, self.alarms, self.films)
         bus, beats = Bus(BUS_CAPACITY, self.clock), Heartbeats(self.clock)
         return Runner(watched, self.live, analyser, self.recorder, bus, beats, self.clock)
