@@ -142,7 +142,7 @@ class Analysis:
         await self.references.look()  # before the first result
         self.analyser = Analyser(monitors, live, alarms, films)
         self.executor = CommandExecutor(alarms, films, live, recorder, store, clock)
-        self.snapshots = SnapshotBuilder(plant.unit, live, alarms, films, clock)
+        self.snapshots = SnapshotBuilder(plant.unit, live, alarms, films)
 
     def _listen(self, block: SampleBlock, news: Sequence[AlarmNews]) -> None:
         self.captures.take(block, news)

@@ -168,7 +168,7 @@ async def run_service(
         supervision = Supervision(host, beats, live.status, units)
         snapshots = (analysis.snapshots, analysis.snapshot)
         reports = Reports("measuring", lambda: [*held, SHARED], *snapshots)
-        parts = (analysis.executor, live, analysis.soundness, analysis.metrics)
+        parts = (analysis.executor, analysis.soundness, analysis.metrics)
         questions = Questions(*parts, supervision.announce)
         end = MeasuringEnd(reports.report, questions.answer, REPORT_EVERY_S)
         serving = ServingChild(Start(plant, origin, is_demo), host.listener, end, clock, child)

@@ -75,22 +75,21 @@ def timed(
         began_s = now_s()
 
 
+@dataclass(eq=False)
 class Analyser:
     """Analyser of the blocks of all units, one block at a time.
 
     If a device restarts its sample count within an epoch, the analyser assigns a new epoch.
     """
 
-    def __init__(
-        self,
-        monitors: Mapping[str, UnitMonitor],
-        live: LiveView,
-        alarms: AlarmEngine,
-        films: FilmMonitor,
-    ) -> None:
-        self.monitors, self._live, self.alarms, self._films = monitors, live, alarms, films
-        self._counts = {unit: Counts() for unit in monitors}
-        for unit in monitors:
+    monitors: Mapping[str, UnitMonitor]
+    live: LiveView
+    alarms: AlarmEngine
+    films: FilmMonitor
+
+    def __post_init__(self) -> None:
+        self._counts = {unit: Counts() for unit in self.monitors}
+        for unit in self.monitors:
             ASSESSMENTS.labels(unit)  # a unit without results has a count of zero
 
     async def analyse(self, block: SampleBlock, sampled_s: float) -> list[Finding]:
@@ -101,12 +100,12 @@ class Analyser:
         for assessment in timed(monitor.steps(block), block.unit):
             found.append(assessment)
             await _yield()
-        assessments, films = self._films.take(block.unit, found)
+        assessments, films = self.films.take(block.unit, found)
         gaps = [UnitGap(block.unit, gap) for gap in monitor.drain_gaps()]
         for assessment in assessments:
-            self._live.set_assessment(assessment, sampled_s)
-        self._live.set_received(block, monitor.account, sampled_s)
-        news = self.alarms.take(block, assessments, self._films.conditions(films))
+            self.live.set_assessment(assessment, sampled_s)
+        self.live.set_received(block, monitor.account, sampled_s)
+        news = self.alarms.take(block, assessments, self.films.conditions(films))
         return [*assessments, *gaps, *news, *films]
 
     async def replay(
@@ -122,12 +121,12 @@ class Analyser:
         for _ in monitor.steps(block):
             await _yield()
         monitor.drain_gaps()
-        self._live.set_received(block, account or monitor.account, sampled_s)
+        self.live.set_received(block, account or monitor.account, sampled_s)
 
     def memory(self, unit: str) -> UnitMemory:
         """Return the analysis state of a unit, from which another process continues."""
         monitor, alarms = self.monitors[unit].state, self.alarms.units[unit].memory
-        return UnitMemory(monitor, alarms, self._films.memory(unit), self._counts[unit].count)
+        return UnitMemory(monitor, alarms, self.films.memory(unit), self._counts[unit].count)
 
     def rewind(self, unit: str, memory: UnitMemory) -> None:
         """Prepare the monitor of a unit for a replay of its newest samples, from a stored state."""

@@ -110,7 +110,6 @@ class Questions:
     """
 
     executor: CommandExecutor
-    live: LiveView
     integrity: IntegrityMonitor
     metrics: Callable[[], Awaitable[bytes]]
     on_ready: Callable[[str, str | None], None] = lambda *_: None
@@ -121,10 +120,10 @@ class Questions:
         match question.kind:
             case "blocks":
                 (unit,) = json.loads(question.document)
-                return self.live.blocks(unit)
+                return self.executor.live.blocks(unit)
             case "result":
                 unit, bearing = json.loads(question.document)
-                return self.live.assessment(unit, bearing)
+                return self.executor.live.assessment(unit, bearing)
             case "access":
                 (self.integrity.access_trouble,) = json.loads(question.document)
                 return None

@@ -37,7 +37,6 @@ class LiveView:
         }
         self._blocks: dict[str, BlockHistory] = {}
         self._received_s: dict[str, float] = {}
-        self._revisions = dict.fromkeys(self._status, 0)
         self._stored = dict.fromkeys(self._status, StoredResults())
 
         self.store_error: str | None = None
@@ -59,13 +58,13 @@ class LiveView:
     def set_link(self, unit: str, state: LinkState, reason: str | None = None) -> bool:
         """Set the state and reason of a unit's link; return whether the state changed."""
         before = self._status[unit]
-        if state is LinkState.NOT_CONNECTED:
-            before = self._status[unit] = replace(before, n_failed=before.n_failed + 1)
-        if (before.state, before.reason) == (state, reason):
-            return False
-        self._revisions[unit] += 1
-        since_ns = before.since_ns if before.state is state else self._clock.now_ns()
-        self._status[unit] = replace(before, state=state, reason=reason, since_ns=since_ns)
+        self._status[unit] = replace(
+            before,
+            state=state,
+            reason=reason,
+            since_ns=before.since_ns if before.state is state else self._clock.now_ns(),
+            n_failed=before.n_failed + (state is LinkState.NOT_CONNECTED),
+        )
         return before.state is not state
 
     def set_received(
@@ -87,13 +86,8 @@ class LiveView:
 
     def set_assessment(self, assessment: Assessment, sampled_s: float | None = None) -> None:
         """Set a bearing's newest result; ``sampled_s`` is its monotonic time, by default now."""
-        self._revisions[assessment.unit] += 1
         since_s = self._clock.monotonic_s() if sampled_s is None else sampled_s
         self._results[assessment.unit][assessment.bearing] = (since_s, assessment)
-
-    def revision(self, unit: str) -> int:
-        """Return a counter that increases with each result and change of the link of a unit."""
-        return self._revisions[unit]
 
     def status(self, unit: str) -> UnitStatus:
         """Return the status of the link and the samples of a unit."""

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 
-from acquisition.clock import Clock
 from core.alarms.alarm import Alarm
 from core.monitor.assessment import Assessment, BearingResult
 from service.live.alarm_list import owner_of
@@ -13,18 +12,16 @@ from service.measuring.films import FilmMonitor
 from service.measuring.live_view import LiveView
 from service.settings.units import UnitSettings
 
-REBUILT_EVERY_S = 5.0
-"""Maximum delay, s, until a snapshot shows that an alarm has ceased to chatter."""
+RESULTS = [each.name for each in fields(BearingResult)]
 
 
 def bearing_snapshot(assessment: Assessment) -> BearingResult:
     """Return a result of a bearing without its arrays (spectrum, orbit)."""
-    names = [each.name for each in fields(BearingResult)]
-    return BearingResult(**{name: getattr(assessment, name) for name in names})
+    return BearingResult(**{name: getattr(assessment, name) for name in RESULTS})
 
 
 class SnapshotBuilder:
-    """Builder of snapshots of units; it builds a snapshot again only after a change of the unit."""
+    """Builder of snapshots of units, with a revision number for each unit."""
 
     def __init__(
         self,
@@ -32,38 +29,30 @@ class SnapshotBuilder:
         live: LiveView,
         alarms: AlarmEngine,
         films: FilmMonitor,
-        clock: Clock,
     ) -> None:
         self._bearings = {unit.id: [each.id for each in unit.bearing] for unit in units}
-        self._live, self._alarms, self._films, self._clock = live, alarms, films, clock
-        self._built: dict[str, tuple[object, int, UnitSnapshot | None]] = {}
+        self._live, self._alarms, self._films = live, alarms, films
+        self._built: dict[str, tuple[int, UnitSnapshot | None]] = {}
 
     def report(self, unit: str) -> UnitReport:
         """Return the present state of a unit, or the alarms of `PLANT` or `SHARED`."""
         bearings, alarms = self._bearings.get(unit, []), self._alarms_of(unit)
-        is_unit = unit in self._bearings
-        own = (self._live.revision(unit), self._alarms.units[unit].is_connected) if is_unit else ()
+        found = {bearing: self._live.assessment(unit, bearing) for bearing in bearings}
         read = {bearing: self._films.newest(unit, bearing) for bearing in bearings}
-        films = {bearing: news for bearing, news in read.items() if news}
         in_force = {bearing: self._films.baseline(unit, bearing) for bearing in bearings}
-        versions = {bearing: found.origin.version for bearing, found in in_force.items() if found}
-        round_ = self._clock.monotonic_s() // REBUILT_EVERY_S
-        key = (own, alarms, films, versions, round_)
-        built_key, revision, snapshot = self._built.get(unit, (None, 0, None))
-        if snapshot is None or built_key != key:
-            found = {bearing: self._live.assessment(unit, bearing) for bearing in bearings}
-            judged, chattering = self._alarms.is_judged, self._alarms.is_chattering
-            newest = UnitSnapshot(
-                bearings={b: bearing_snapshot(result) for b, result in found.items() if result},
-                alarms=tuple(alarms),
-                judged=frozenset(a.identity.id for a in alarms if judged(a)),
-                chattering=frozenset(a.identity.id for a in alarms if chattering(a)),
-                films=films,
-                baselines=versions,
-            )
-            if newest != snapshot:
-                revision, snapshot = revision + 1, newest
-            self._built[unit] = key, revision, snapshot
+        judged, chattering = self._alarms.is_judged, self._alarms.is_chattering
+        snapshot = UnitSnapshot(
+            bearings={bearing: bearing_snapshot(each) for bearing, each in found.items() if each},
+            alarms=tuple(alarms),
+            judged=frozenset(a.identity.id for a in alarms if judged(a)),
+            chattering=frozenset(a.identity.id for a in alarms if chattering(a)),
+            films={bearing: news for bearing, news in read.items() if news},
+            baselines={b: baseline.origin.version for b, baseline in in_force.items() if baseline},
+        )
+        revision, built = self._built.get(unit, (0, None))
+        if snapshot != built:  # fast, because unchanged parts are the same objects
+            revision += 1
+            self._built[unit] = revision, snapshot
         return UnitReport(unit, self._live.link(unit), revision, snapshot)
 
     def _alarms_of(self, unit: str) -> list[Alarm]:

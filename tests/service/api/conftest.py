@@ -193,11 +193,11 @@ async def build(plant: PlantFile, store: SqliteStore, access: AccessStore, folde
     loops: dict[str, str | None] = {}
     executor = CommandExecutor(alarms, films, live, recorder, store, clock)
     integrity = IntegrityMonitor(store, clock, live)
-    exchange = DirectExchange(Questions(executor, live, integrity, no_metrics))
+    exchange = DirectExchange(Questions(executor, integrity, no_metrics))
     serving = LiveClient(plant, store.films, clock, exchange.ask)
     serving.alarms.take_stored(store.alarms())
     operators = Operators(exchange.send, store, serving.alarms)
-    builder = SnapshotBuilder(plant.unit, live, alarms, films, clock)
+    builder = SnapshotBuilder(plant.unit, live, alarms, films)
     ids = [*(unit.id for unit in plant.unit), PLANT]
 
     def plant_now() -> PlantSnapshot:

@@ -47,7 +47,7 @@ def process_of(service: Any, plant: PlantFile, name: str) -> tuple[Reporter, Com
     held = [*(unit.id for unit in plant.unit), PLANT]
     parts = (service.alarms, service.films)
     store, clock = service.store, service.clock
-    builder = SnapshotBuilder(plant.unit, service.live, *parts, clock)
+    builder = SnapshotBuilder(plant.unit, service.live, *parts)
     executor = CommandExecutor(*parts, service.live, service.recorder, store, clock)
     return (
         Reporter(Reports(name, lambda: held, builder), store.unit_states, clock),
