@@ -101,5 +101,5 @@ def readings(window: Window) -> list[FilmReading]:
     newest: list[Assessment] = []
     for _ in range(math.ceil(WINDOW_SAMPLES / CHUNK_SAMPLES)):
         for block in delivery.take([feed.advance(CHUNK_SAMPLES)]):
-            newest = monitor.ingest(block) or newest
+            newest = list(monitor.steps(block)) or newest
     return [film_reading(found, UNKNOWN, Estimator.DYNAMIC) for found in newest]

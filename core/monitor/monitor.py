@@ -135,10 +135,6 @@ class UnitMonitor:
         gaps, self._gaps = self._gaps, []
         return gaps
 
-    def ingest(self, block: SampleBlock) -> list[Assessment]:
-        """Process the next block; return the assessments of all bearings that it completes."""
-        return list(self.steps(block))
-
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
         """Process the next block; yield the assessments that it completes, bearing by bearing."""
         for refresh in self.refreshes(block):

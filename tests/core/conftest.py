@@ -81,7 +81,7 @@ def results(unit: Unit, blocks: BlockMaker) -> Callable[..., list[Assessment]]:
         signals: FloatArray, unit: Unit = unit, settings: AnalysisSettings | None = None, **cut: Any
     ) -> list[Assessment]:
         monitor = UnitMonitor(unit, settings or AnalysisSettings())
-        return [found for block in blocks(signals, **cut) for found in monitor.ingest(block)]
+        return [found for block in blocks(signals, **cut) for found in monitor.steps(block)]
 
     return watch
 

@@ -60,7 +60,7 @@ def watch(
         delayed = np.concatenate([held, block.counts[rows]], axis=1)
         counts = block.counts.copy()
         counts[rows], held = delayed[:, : block.n_samples], delayed[:, block.n_samples :]
-        newest = monitor.ingest(replace(block, counts=counts)) or newest
+        newest = list(monitor.steps(replace(block, counts=counts))) or newest
     return newest
 
 

@@ -117,7 +117,7 @@ def upper(unit: Unit, blocks: list[SampleBlock], min_coherence: float = 0.9) -> 
     """The newest assessment of the upper bearing."""
     settings = AnalysisSettings(min_coherence=min_coherence)
     monitor = UnitMonitor(unit, settings)
-    found = [a for block in blocks for a in monitor.ingest(block) if a.bearing == "UJB"]
+    found = [a for block in blocks for a in monitor.steps(block) if a.bearing == "UJB"]
     return found[-1]
 
 

@@ -65,4 +65,4 @@ def blocks_of(
 
 
 def watch(monitor: UnitMonitor, stream: list[SampleBlock]) -> list[Assessment]:
-    return [assessment for block in stream for assessment in monitor.ingest(block)]
+    return [assessment for block in stream for assessment in monitor.steps(block)]

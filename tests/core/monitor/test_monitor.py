@@ -22,7 +22,7 @@ HOP, SEGMENT = 7168, 8192
 
 
 def watch(monitor: UnitMonitor, stream: Sequence[SampleBlock]) -> list[Assessment]:
-    return [assessment for block in stream for assessment in monitor.ingest(block)]
+    return [assessment for block in stream for assessment in monitor.steps(block)]
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ GAPS_UM = (1950.0, 2060.0)
 def test_results_come_with_each_hop_however_the_samples_are_cut(monitor, blocks, signals, results):
     rows, counts, single = signals(60.0), [], []
     for block in blocks(rows, n_each=1):
-        if found := monitor.ingest(block):
+        if found := list(monitor.steps(block)):
             counts.append(block.stop_index)
             single += found
     assert counts == [SEGMENT + n * HOP for n in range(4)]
@@ -229,9 +229,9 @@ def test_a_gap_voids_the_segment_it_touches_and_counts_it(monitor, blocks, signa
 def test_foreign_blocks_are_refused_naming_both(monitor, blocks, signals):
     block = next(blocks(signals(1.0)))
     with pytest.raises(ValueError, match="unit 'U1', got 'U2'"):
-        monitor.ingest(of_unit(block, unit="U2"))
+        list(monitor.steps(of_unit(block, unit="U2")))
     with pytest.raises(ValueError, match=r"at 600\.0 Hz, got 1000\.0 Hz"):
-        monitor.ingest(of_unit(block, rate_hz=1000.0))
+        list(monitor.steps(of_unit(block, rate_hz=1000.0)))
 
 
 @pytest.mark.parametrize(("reason", "is_estimated"), [("torn", False), (UNCOUNTED_LOSS, True)])
@@ -239,7 +239,7 @@ def test_refused_samples_are_recorded_as_a_gap(monitor, blocks, signals, reason,
     first, *others = list(blocks(signals(14.0)))[:4]
     late = replace(others[-1], rejected=(Rejection(reason, 7),))
     for block in (first, late):
-        monitor.ingest(block)
+        list(monitor.steps(block))
 
     n_missing = late.first_index - first.stop_index
     gap = Gap(late.epoch, first.stop_index, n_missing, late.start_ns, is_estimated=is_estimated)

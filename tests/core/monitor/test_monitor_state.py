@@ -56,7 +56,7 @@ def said(monitor: UnitMonitor, blocks: Sequence[SampleBlock]) -> list[bytes]:
     """All results and gaps, to the last bit."""
     results: list[bytes] = []
     for block in blocks:
-        results += [_bytes(found) for found in monitor.ingest(block)]
+        results += [_bytes(found) for found in monitor.steps(block)]
         results += [pickle.dumps(gap) for gap in monitor.drain_gaps()]
     return results
 
@@ -79,7 +79,7 @@ def rebuilt(blocks: Sequence[SampleBlock], state: MonitorState) -> UnitMonitor:
     monitor.rewind(state)
     for block in blocks:
         if block.epoch == state.epoch and block.stop_index > state.start:
-            monitor.ingest(block)
+            list(monitor.steps(block))
     monitor.settle(state)
     return monitor
 
@@ -137,10 +137,10 @@ def with_reference(unit: Unit, gap_reference_um: tuple[float, float]) -> Unit:
 
 def test_a_new_reference_moves_only_the_shaft_centre_from_the_next_result_on(unit, six_segments):
     monitor = UnitMonitor(unit, AnalysisSettings())
-    before = [a for block in six_segments[:3] for a in monitor.ingest(block)]
+    before = [a for block in six_segments[:3] for a in monitor.steps(block)]
 
     monitor.replace_description(with_reference(unit, (1970.0, 2000.0)))
-    after = [a for block in six_segments[3:] for a in monitor.ingest(block)]
+    after = [a for block in six_segments[3:] for a in monitor.steps(block)]
 
     assert before[-1].readings["eccentricity_ratio"].value == pytest.approx(0.25, abs=0.01)
     assert after[0].readings["shaft_centre_x_um"].value == pytest.approx(0.0, abs=1.0)
@@ -153,7 +153,7 @@ def test_a_new_reference_moves_only_the_shaft_centre_from_the_next_result_on(uni
     for reference in ((2000.0, 2000.0), (1970.0, 2000.0)):
         monitor = UnitMonitor(unit, AnalysisSettings())
         monitor.replace_description(with_reference(unit, reference))
-        results.append([a for block in six_segments for a in monitor.ingest(block)][-1].readings)
+        results.append([a for block in six_segments for a in monitor.steps(block)][-1].readings)
 
     differing = {name for name in results[0] if results[0][name] != results[1][name]}
 
@@ -175,11 +175,11 @@ def test_growth_since_an_older_reference_is_forgotten(unit, blocks, signals):
     ]
     for reference in ((2000.0, 2000.0), (2035.0, 2035.0)):
         monitor = UnitMonitor(unit, AnalysisSettings())
-        found = [a for block in six_segments[:4] for a in monitor.ingest(block)]
+        found = [a for block in six_segments[:4] for a in monitor.steps(block)]
         assert found[-1].readings["gap_growth_um"].value == pytest.approx(35.0, abs=1.0)
         anew = replace(three, gap_reference_um=reference)
         monitor.replace_description(replace(unit, bearings=(anew,)))
-        found = [a for block in six_segments[4:] for a in monitor.ingest(block)]
+        found = [a for block in six_segments[4:] for a in monitor.steps(block)]
         assert found[-1].readings["shaft_centre_y_um"].value == pytest.approx(40.0, abs=1.0)
 
 

@@ -38,7 +38,7 @@ def known_after(
     boards = {delay_s: UnitAlarms(unit, rules(delay_s)) for delay_s in DELAYS_S}
     found: dict[tuple[str, float], float] = {}
     for block in blocks(rows, n_each=600):
-        results = list(monitor.ingest(block))
+        results = list(monitor.steps(block))
         for delay_s, board in boards.items():
             for told in board.take(block, results, block.stop_ns):
                 for event in (e for e in told.events if e.change == "raised"):
@@ -80,7 +80,7 @@ def test_a_bump_that_is_shorter_than_the_delay_is_no_alarm(unit, blocks, signals
 
 def test_the_newest_segment_reads_what_the_average_of_a_steady_shaft_reads(unit, blocks, signals):
     monitor = UnitMonitor(unit, AnalysisSettings())
-    results = [a for block in blocks(signals(40.0)) for a in monitor.ingest(block)]
+    results = [a for block in blocks(signals(40.0)) for a in monitor.steps(block)]
 
     newest = results[-1]
     assert [r.time_ns for r in newest.recent] == pytest.approx(

@@ -50,7 +50,7 @@ def test_a_clipped_sample_costs_its_segment_not_results(unit, blocks, signals, n
     for block in blocks(rows):
         at_end = bool((np.abs(block.samples[2]) > 3276.6).any())
         qualities = (*block.channel_quality[:2], clipped, block.channel_quality[3])
-        found += monitor.ingest(with_quality(block, qualities) if at_end else block)
+        found += monitor.steps(with_quality(block, qualities) if at_end else block)
     newest, expected = found[-1], uncertain(Reason.CLIPPED) if is_few else clipped
     assert newest.clipped_share["bearing_x"] == pytest.approx(n_clipped / 8192)
     for name in ("order1_bearing_x_um_pk", "overall_bearing_x_mm_s_rms", "stiffness_xx_n_per_m"):
@@ -70,7 +70,7 @@ def test_a_cable_that_clips_as_it_breaks_is_lost_at_once(unit, blocks, signals):
         is_clipped = bool((block.samples[0] > 3276.6).any())
         quality = bad(Reason.CLIPPED) if is_clipped else block.channel_quality[0]
         qualities = (quality, *block.channel_quality[1:])
-        found += monitor.ingest(with_quality(block, qualities))
+        found += monitor.steps(with_quality(block, qualities))
     newest = found[-1]
     assert newest.window.stop_index == 29696
     assert newest.clipped_share["shaft_x"] == pytest.approx(10 / 8192)
@@ -107,7 +107,7 @@ def test_a_record_in_which_speed_or_load_moved_is_doubted(unit, blocks, signals,
         rows = signals(60.0, speed_rpm=speed)
         for block in blocks(rows, first_index=half * rows.shape[1], speed_rpm=speed):
             slow = {**block.slow, "power": Reading(power)}
-            found += monitor.ingest(replace(block, elsewhere=slow))
+            found += monitor.steps(replace(block, elsewhere=slow))
     qualities = [a.readings["order1_k_eff_xx_n_per_m"].quality for a in found]
     assert qualities[3].reason is Reason.OK
     assert qualities[-1] == uncertain(Reason.NON_STATIONARY)

@@ -90,11 +90,11 @@ def test_samples_after_an_untold_restart_are_analysed_and_a_repetition_is_not(un
     """A million samples, then from 0 on: results come again with the first whole segment."""
     settings = AnalysisSettings()
     counts, monitor = Counts(), UnitMonitor(unit, settings)
-    monitor.ingest(counts.placed(at(MILLION)))
+    list(monitor.steps(counts.placed(at(MILLION))))
     found = []
     for index in range(0, settings.segment_samples + 60, 60):
         for _ in range(2):
-            found += monitor.ingest(counts.placed(at(index, late_s=1700.0)))
+            found += monitor.steps(counts.placed(at(index, late_s=1700.0)))
     account = monitor.account
     assert len(found) == 1
     assert found[0].window.first_index == 0
@@ -111,10 +111,10 @@ def test_a_count_that_wrapped_is_no_gap_of_months(unit):
     """A reader that began again finds the low bits of a count that was gone on with."""
     counts, monitor = Counts(), UnitMonitor(unit, AnalysisSettings())
     stop = 2**32 + 10 * MILLION
-    monitor.ingest(counts.placed(at(stop)))
+    list(monitor.steps(counts.placed(at(stop))))
     found = at(stop + 6060)
     late = replace(found, first_index=found.first_index - 2**32)
-    monitor.ingest(counts.placed(late))
+    list(monitor.steps(counts.placed(late)))
     [lost] = monitor.drain_gaps()
     assert (lost.n_samples, lost.is_estimated) == (6000, True)
     assert monitor.account.n_gap == 0

@@ -44,7 +44,7 @@ def measure(unit: Unit) -> Measure:
         rows = np.array([s + np.zeros(N) for s in signals], dtype=np.float32)
         slow = {"power": Reading(650.0), "oil": Reading(45.0), "speed": Reading(92.3)}
         block = given_block("U1", 1, 0, 0, RATE_HZ, rows, (GOOD,) * len(signals), slow)
-        return UnitMonitor(there, settings).ingest(block)[-1].readings
+        return list(UnitMonitor(there, settings).steps(block))[-1].readings
 
     return read
 

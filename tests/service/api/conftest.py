@@ -69,7 +69,7 @@ def assessments(plant: PlantFile) -> list[Assessment]:
     settings = analysis_of(plant.analysis)
     monitor = UnitMonitor(machine_of(unit), settings)
     n_samples = settings.segment_samples + (N_RESULTS - 1) * settings.hop_samples
-    return monitor.ingest(feed.advance(n_samples))
+    return list(monitor.steps(feed.advance(n_samples)))
 
 
 @dataclass

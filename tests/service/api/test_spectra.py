@@ -39,20 +39,22 @@ def toned(plant: PlantFile) -> list[Assessment]:
         2.0 * np.pi * LINE * np.arange(n) / settings.segment_samples
     )
     monitor = UnitMonitor(unit, settings)
-    return monitor.ingest(
-        given_block(
-            unit=unit.id,
-            epoch=1,
-            first_index=0,
-            start_ns=T0_S * 1_000_000_000,
-            rate_hz=unit.rate_hz,
-            samples=samples.astype(np.float32),
-            channel_quality=(GOOD,) * len(unit.channels),
-            slow={
-                **{channel.id: Reading(45.0) for channel in plant.unit[0].slow_channel},
-                "speed": Reading(92.3),
-                "active_power": Reading(350.0),
-            },
+    return list(
+        monitor.steps(
+            given_block(
+                unit=unit.id,
+                epoch=1,
+                first_index=0,
+                start_ns=T0_S * 1_000_000_000,
+                rate_hz=unit.rate_hz,
+                samples=samples.astype(np.float32),
+                channel_quality=(GOOD,) * len(unit.channels),
+                slow={
+                    **{channel.id: Reading(45.0) for channel in plant.unit[0].slow_channel},
+                    "speed": Reading(92.3),
+                    "active_power": Reading(350.0),
+                },
+            )
         )
     )
 

@@ -79,7 +79,7 @@ async def test_an_analysed_recording_equals_live_to_the_last_bit(unit, stepped_c
         delivery = BlockAssembler(calibration)
         blocks = [b for raw in rough_ride(unit, stepped_clock) for b in delivery.take([raw])]
         for block in blocks + delivery.flush():
-            live += live_monitor.ingest(block)
+            live += live_monitor.steps(block)
             writer.write(block)
 
     recording = open_recording(tmp_path / "run")

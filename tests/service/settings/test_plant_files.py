@@ -107,7 +107,7 @@ def test_the_shortest_segment_a_file_may_ask_for_gives_results(plant_text):
     feed = simulated_feed(unit, SystemClock())
     monitor = UnitMonitor(machine_of(unit), analysis_of(plant.analysis))
 
-    results = monitor.ingest(feed.advance(3200))
+    results = list(monitor.steps(feed.advance(3200)))
 
     assert {r.bearing for r in results} == {"UJB", "LJB", "TJB"}
     assert all(r.readings["order1_shaft_x_um_pk"].value for r in results)

@@ -95,7 +95,7 @@ def by_waveforms(settings: UnitSettings, unit: Unit, clock) -> Iterator[Assessme
     monitor = UnitMonitor(unit, AnalysisSettings())
     for _ in range(8192 * N_SEGMENTS // 600):
         for block in delivery.take([feed.advance(600)]):
-            yield from monitor.ingest(block)
+            yield from monitor.steps(block)
 
 
 async def test_a_rack_agrees_with_the_waveforms(settings, unit, stepped_clock):
@@ -112,7 +112,7 @@ async def test_a_rack_agrees_with_the_waveforms(settings, unit, stepped_clock):
         monitor = monitor_of(read_by(settings, plan), AnalysisModel())
         async with source.connect() as stream:
             while not found:
-                found = {a.bearing: a.readings for a in monitor.ingest(await anext(stream))}
+                found = {a.bearing: a.readings for a in monitor.steps(await anext(stream))}
 
     compared = 0
     for bearing, readings in found.items():

@@ -64,7 +64,7 @@ def test_the_films_of_a_living_unit_are_read_as_its_past_says(tmp_path, stepped_
     newest: list[Assessment] = []
     for _ in range(300):
         for block in delivery.take([feed.advance(600)]):
-            newest = monitor.ingest(block) or newest
+            newest = list(monitor.steps(block)) or newest
 
     history = simulated_history(unit, now_ns + 300 * NS_PER_S)
     assert history.keys() == {"UJB", "LJB", "TJB"}

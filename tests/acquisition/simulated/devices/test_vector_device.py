@@ -113,7 +113,7 @@ async def test_equation_5_comes_out_of_a_rack_over_the_wire(rack, calibration, s
         found = []
         async with source.connect() as stream:
             while not found:
-                found = monitor.ingest(await anext(stream))
+                found = list(monitor.steps(await anext(stream)))
 
     [assessment] = found
     value = {name: reading.value for name, reading in assessment.readings.items()}

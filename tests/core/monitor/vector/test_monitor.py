@@ -170,11 +170,11 @@ def test_the_vortex_order_is_its_own_line_or_switched_off(rack):
 def test_a_block_of_something_else_is_refused(rack):
     [block] = polls(60.0, 50.0, 20.0, 10.0, n=1)
     with pytest.raises(ValueError, match="block of unit 'U1', got 'U2'"):
-        rack().ingest(of_unit(block, unit="U2"))
+        list(rack().steps(of_unit(block, unit="U2")))
     with pytest.raises(ValueError, match=r"at 0\.2 Hz, got 1\.0 Hz"):
-        rack().ingest(of_unit(block, rate_hz=1.0))
+        list(rack().steps(of_unit(block, rate_hz=1.0)))
     with pytest.raises(ValueError, match="6 channels, got 4"):
-        rack(AMPLITUDES + GAPS).ingest(block)
+        list(rack(AMPLITUDES + GAPS).steps(block))
     with pytest.raises(ValueError, match="has no channel"):
         rack((VectorRow("nowhere", VectorPart.GAP),))
     with pytest.raises(ValueError, match="rows must be unique"):
@@ -192,7 +192,7 @@ def test_a_step_of_vibration_is_an_alarm_in_half_a_minute_and_delay(unit, rack, 
     raised = {
         event.identity.kind: block.stop_ns / 1e9 - n_before / RATE_HZ
         for block in blocks_of(values)
-        for told in board.take(block, monitor.ingest(block), block.stop_ns)
+        for told in board.take(block, list(monitor.steps(block)), block.stop_ns)
         for event in told.events
         if event.change == "raised"
     }
