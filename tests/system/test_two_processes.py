@@ -118,16 +118,17 @@ async def test_a_hanging_serving_process_is_killed_and_restarted(tmp_path, demo_
         end = exchange.MeasuringEnd(lambda _: bytes(1_000_000), refuse, period_s=0.5)
         serving = measuring_process.ServingChild(plant, listener, end, SystemClock())
         running = asyncio.create_task(serving.run(UNHEARD))
-        while serving.process is None:
+        while serving.child is None:
             await asyncio.sleep(0.01)
-        first = serving.process
-        while serving.process is first:
+        first = serving.child.process
+        while serving.child is None or serving.child.process is first:
             await asyncio.sleep(0.01)
         assert first.returncode == -signal.SIGKILL
+        last = serving.child.process
         running.cancel()
         await asyncio.wait([running])
-        serving.process.kill()
-        serving.process.wait()
+        last.kill()
+        last.wait()
 
 
 def test_a_serving_process_of_another_version_is_refused_with_both_named(tmp_path):
