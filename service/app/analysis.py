@@ -33,7 +33,7 @@ from service.measuring.live_view import LiveView
 from service.measuring.metrics import add_disks, add_integrity, add_samples, add_store
 from service.measuring.recorder import Recorder
 from service.measuring.service_alarms import ServiceHealth
-from service.measuring.snapshots import Reports, SnapshotBuilder
+from service.measuring.snapshots import Reports
 from service.measuring.sources import monitor_of
 from service.notifications.message import LiveContext
 from service.notifications.metrics import add_deliveries
@@ -142,7 +142,6 @@ class Analysis:
         await self.references.look()  # before the first result
         self.analyser = Analyser(monitors, live, alarms, films)
         self.executor = CommandExecutor(alarms, films, live, recorder, store, clock)
-        self.snapshots = SnapshotBuilder(plant.unit, live, alarms, films)
 
     def _listen(self, block: SampleBlock, news: Sequence[AlarmNews]) -> None:
         self.captures.take(block, news)
@@ -184,7 +183,8 @@ class Analysis:
         """
         name = f"{socket.gethostname()}:{os.getpid()}:{uuid4().hex[:12]}"
         store, clock = self.store, self.clock
-        reporter = Reporter(Reports(name, held, self.snapshots), store.unit_states, clock)
+        parts = (self.plant.unit, self.live, self.alarms, self.films)
+        reporter = Reporter(Reports(name, held, *parts), store.unit_states, clock)
         commands = CommandWorker(name, held, self.executor, store, clock)
         return {"report": reporter.run, "commands": commands.run}
 

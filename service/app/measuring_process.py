@@ -151,8 +151,7 @@ async def run_service(
         If the service would be reachable from other hosts without TLS or accounts.
     """
     clock = host.clock
-    sources = {unit: watched.source for unit, watched in units.items()}
-    timed = {u: each for u, each in sources.items() if isinstance(each, TimedSource)}
+    timed = {u: its.source for u, its in units.items() if isinstance(its.source, TimedSource)}
     opened = opened_analysis(plant, origin, clock, sources=timed)
     with exclusive_use(database_path(plant)), opened as analysis:
         with closing(open_access(plant, origin)) as access:
@@ -166,8 +165,8 @@ async def run_service(
         await audit.begin()
         held = [*(unit.id for unit in plant.unit), PLANT]
         supervision = Supervision(host, beats, live.status, units)
-        snapshots = (analysis.snapshots, analysis.snapshot)
-        reports = Reports("measuring", lambda: [*held, SHARED], *snapshots)
+        found = (plant.unit, live, analysis.alarms, analysis.films, analysis.snapshot)
+        reports = Reports("measuring", lambda: [*held, SHARED], *found)
         parts = (analysis.executor, analysis.soundness, analysis.metrics)
         questions = Questions(*parts, supervision.announce)
         end = MeasuringEnd(reports.report, questions.answer, REPORT_EVERY_S)

@@ -60,13 +60,10 @@ async def run_daq(servers: Mapping[str, DaqServer], print_line: Print, *, contro
         print_line(json.dumps({unit: dict(server.endpoint) for unit, server in servers.items()}))
         try:
             async with asyncio.TaskGroup() as tasks:
-                running = [
-                    tasks.create_task(_serve(*entry, print_line)) for entry in servers.items()
-                ]
+                jobs = [_serve(*entry, print_line) for entry in servers.items()]
                 if controlled:
-                    running.append(
-                        tasks.create_task(_execute_commands(servers, print_line, stopped))
-                    )
+                    jobs.append(_execute_commands(servers, print_line, stopped))
+                running = [tasks.create_task(job) for job in jobs]
                 await stopped.wait()
                 for task in running:
                     task.cancel()

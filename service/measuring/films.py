@@ -37,13 +37,13 @@ class FilmMonitor:
     """Monitor of the oil films of all units.
 
     Films are evaluated on the event loop; threads read the store and learn baselines. `rules` are
-    the rules for the films of each unit, or the reason why they cannot be monitored, by unit id.
+    the rules for the films of each monitored unit, by unit id.
     """
 
     def __init__(
         self,
         units: Mapping[str, Unit],
-        rules: Mapping[str, FilmRules | str],
+        rules: Mapping[str, FilmRules],
         settings: FilmAlarmSettings,
         store: FilmStore,
         clock: Clock,
@@ -51,8 +51,8 @@ class FilmMonitor:
         self._store, self._clock, self.settings = store, clock, settings
         self.learner = Learner(store, settings)
         self._acting = asyncio.Lock()  # each action depends on the previous one
-        self._rules = {unit: its for unit, its in rules.items() if isinstance(its, FilmRules)}
-        self._watches = {unit: _watch(units[unit], its) for unit, its in self._rules.items()}
+        self._rules = rules
+        self._watches = {unit: _watch(units[unit], its) for unit, its in rules.items()}
         self._newest: dict[tuple[str, str], FilmNews] = {}
 
     async def start(self) -> None:
@@ -255,7 +255,8 @@ async def film_monitor(
     `machines` are the descriptions of the units by unit id. Raises `StoreError` if the readings
     cannot be read.
     """
-    rules = {unit.id: film_rules_of(unit, plant.films) for unit in plant.unit}
+    found = {unit.id: film_rules_of(unit, plant.films) for unit in plant.unit}
+    rules = {unit: its for unit, its in found.items() if isinstance(its, FilmRules)}
     monitor = FilmMonitor(machines, rules, plant.films, store, clock)
     await monitor.start()
     return monitor

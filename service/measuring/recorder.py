@@ -119,7 +119,7 @@ class Recorder:
     live: LiveView
     clock: Clock
     folder: Path
-    capacity: int = 10_000
+    capacity: int = 15_000
     on_stored: Callable[[], None] = lambda: None
     finds_again: bool = field(default=False, kw_only=True)
 

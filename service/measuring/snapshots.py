@@ -1,7 +1,7 @@
 """Snapshots of units, built from the parts of the measuring process, and the reports on them."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import fields
 
 from core.alarms.alarm import Alarm
 from core.monitor.assessment import Assessment, BearingResult
@@ -20,28 +20,58 @@ def bearing_snapshot(assessment: Assessment) -> BearingResult:
     return BearingResult(**{name: getattr(assessment, name) for name in RESULTS})
 
 
-class SnapshotBuilder:
-    """Builder of snapshots of units, with a revision number for each unit."""
+class Reports:
+    """Builder of the reports of a process, with what changed since the previous report.
+
+    `held` returns the ids of the units to report now, also `PLANT` and `SHARED`; `plant` returns
+    the state of the process, None if it is not reported.
+    """
 
     def __init__(
         self,
+        process: str,
+        held: Callable[[], Iterable[str]],
         units: Sequence[UnitSettings],
         live: LiveView,
         alarms: AlarmEngine,
         films: FilmMonitor,
+        plant: Callable[[], PlantSnapshot | None] = lambda: None,
     ) -> None:
+        self._process, self._held, self._plant = process, held, plant
         self._bearings = {unit.id: [each.id for each in unit.bearing] for unit in units}
         self._live, self._alarms, self._films = live, alarms, films
-        self._built: dict[str, tuple[int, UnitSnapshot | None]] = {}
+        self._sent: dict[str, tuple[int, UnitSnapshot]] = {}
+        self._sent_plant: PlantSnapshot | None = None
+        self._n_reports = 0
 
-    def report(self, unit: str) -> UnitReport:
+    def report(self, is_first: bool) -> Report:
+        """Return a report on all units; it has only changed snapshots unless `is_first`.
+
+        The revision of a snapshot is the number of the report in which it was new.
+        """
+        if is_first:
+            self._sent, self._sent_plant = {}, None
+        self._n_reports += 1
+        before, self._sent, units = self._sent, {}, []
+        for unit in self._held():
+            snapshot, sent = self._snapshot(unit), before.get(unit)
+            # fast, because unchanged parts are the same objects
+            is_same = sent is not None and snapshot == sent[1]
+            self._sent[unit] = sent if sent and is_same else (self._n_reports, snapshot)
+            revision, news = self._sent[unit][0], None if is_same else snapshot
+            units.append(UnitReport(unit, self._live.link(unit), revision, news))
+        plant_before, self._sent_plant = self._sent_plant, self._plant()
+        plant = None if self._sent_plant == plant_before else self._sent_plant
+        return Report(self._process, self._n_reports, tuple(units), plant)
+
+    def _snapshot(self, unit: str) -> UnitSnapshot:
         """Return the present state of a unit, or the alarms of `PLANT` or `SHARED`."""
         bearings, alarms = self._bearings.get(unit, []), self._alarms_of(unit)
         found = {bearing: self._live.assessment(unit, bearing) for bearing in bearings}
         read = {bearing: self._films.newest(unit, bearing) for bearing in bearings}
         in_force = {bearing: self._films.baseline(unit, bearing) for bearing in bearings}
         judged, chattering = self._alarms.is_judged, self._alarms.is_chattering
-        snapshot = UnitSnapshot(
+        return UnitSnapshot(
             bearings={bearing: bearing_snapshot(each) for bearing, each in found.items() if each},
             alarms=tuple(alarms),
             judged=frozenset(a.identity.id for a in alarms if judged(a)),
@@ -49,47 +79,9 @@ class SnapshotBuilder:
             films={bearing: news for bearing, news in read.items() if news},
             baselines={b: baseline.origin.version for b, baseline in in_force.items() if baseline},
         )
-        revision, built = self._built.get(unit, (0, None))
-        if snapshot != built:  # fast, because unchanged parts are the same objects
-            revision += 1
-            self._built[unit] = revision, snapshot
-        return UnitReport(unit, self._live.link(unit), revision, snapshot)
 
     def _alarms_of(self, unit: str) -> list[Alarm]:
         """Return the alarms that a report on a unit contains."""
         common = self._alarms.common_alarms
         of_unit = self._alarms.units[unit].alarms if unit in self._bearings else []
         return [*of_unit, *(each for each in common if owner_of(each, self._bearings) == unit)]
-
-
-@dataclass
-class Reports:
-    """Builder of the reports of a process, with what changed since the previous report.
-
-    `units` returns the ids of the units to report now, also `PLANT` and `SHARED`; `plant` returns
-    the state of the process, None if it is not reported.
-    """
-
-    process: str
-    units: Callable[[], Iterable[str]]
-    builder: SnapshotBuilder
-    plant: Callable[[], PlantSnapshot | None] = lambda: None
-    _n_reports: int = field(default=0, init=False)
-    _sent: dict[str, int] = field(default_factory=dict, init=False)
-    _sent_plant: PlantSnapshot | None = field(default=None, init=False)
-
-    def report(self, is_first: bool) -> Report:
-        """Return a report on all units; it has only changed snapshots unless `is_first`."""
-        if is_first:
-            self._sent, self._sent_plant = {}, None
-        found, plant = [self.builder.report(unit) for unit in self.units()], self.plant()
-        units = tuple(
-            replace(each, snapshot=None) if self._sent.get(each.unit) == each.revision else each
-            for each in found
-        )
-        report = Report(self.process, self._n_reports + 1, units, plant)
-        if plant == self._sent_plant:
-            report = replace(report, plant=None)
-        self._sent = {each.unit: each.revision for each in found}
-        self._n_reports, self._sent_plant = report.number, plant
-        return report

@@ -42,7 +42,7 @@ from service.measuring.integrity import IntegrityMonitor
 from service.measuring.live_view import LiveView
 from service.measuring.recorder import Recorder
 from service.measuring.simulated_sources import simulated_feed
-from service.measuring.snapshots import Reports, SnapshotBuilder
+from service.measuring.snapshots import Reports
 from service.notifications.sender import Deliveries
 from service.recordings.segment import CaptureFile
 from service.reports.collector import EvidenceCollector
@@ -197,7 +197,6 @@ async def build(plant: PlantFile, store: SqliteStore, access: AccessStore, folde
     serving = LiveClient(plant, store.films, clock, exchange.ask)
     serving.alarms.take_stored(store.alarms())
     operators = Operators(exchange.send, store, serving.alarms)
-    builder = SnapshotBuilder(plant.unit, live, alarms, films)
     ids = [*(unit.id for unit in plant.unit), PLANT]
 
     def plant_now() -> PlantSnapshot:
@@ -208,7 +207,7 @@ async def build(plant: PlantFile, store: SqliteStore, access: AccessStore, folde
             evidence=evidence.status,
         )
 
-    reports = Reports("measuring", lambda: ids, builder, plant_now)
+    reports = Reports("measuring", lambda: ids, plant.unit, live, alarms, films, plant_now)
     context = Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},

@@ -12,7 +12,7 @@ from core.alarms.alarm import PLANT
 from service.app.replica_process import Replica
 from service.cluster.measuring_side import CommandWorker, Reporter
 from service.measuring.commands import CommandExecutor
-from service.measuring.snapshots import Reports, SnapshotBuilder
+from service.measuring.snapshots import Reports
 from service.runtime.heartbeats import Heartbeats
 from service.settings.plant import PlantFile
 
@@ -47,10 +47,10 @@ def process_of(service: Any, plant: PlantFile, name: str) -> tuple[Reporter, Com
     held = [*(unit.id for unit in plant.unit), PLANT]
     parts = (service.alarms, service.films)
     store, clock = service.store, service.clock
-    builder = SnapshotBuilder(plant.unit, service.live, *parts)
+    reports = Reports(name, lambda: held, plant.unit, service.live, *parts)
     executor = CommandExecutor(*parts, service.live, service.recorder, store, clock)
     return (
-        Reporter(Reports(name, lambda: held, builder), store.unit_states, clock),
+        Reporter(reports, store.unit_states, clock),
         CommandWorker(name, lambda: held, executor, store, clock),
     )
 

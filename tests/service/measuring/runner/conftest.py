@@ -158,13 +158,8 @@ class Plant:
         self.recorder = Recorder(self.store, self.live, self.clock, path.parent, capacity)
         self.capture_folder = path.parent / "captures"
         units = {name: unit_named(name) for name in ("U1", "U2")}
-        self.films = FilmMonitor(
-            units,
-            dict.fromkeys(units, "not here"),
-            FilmAlarmSettings(),
-            self.store.films,
-            self.clock,
-        )
+        settings = FilmAlarmSettings()
+        self.films = FilmMonitor(units, {}, settings, self.store.films, self.clock)
         self.start_alarms()
 
     def start_alarms(self) -> None:
