@@ -13,6 +13,7 @@ from starlette.exceptions import HTTPException
 
 from core.alarms.operation import ActionRefusedError
 from service.api.auth.passwords import PasswordRefusedError
+from service.live.alarm_list import UnknownAlarmError
 from service.live.commands import (
     BaselineRefusedError,
     CommandFailedError,
@@ -72,6 +73,7 @@ REFUSALS: Mapping[type[Exception], tuple[int, str, str | None]] = {
     NotAvailableError: (409, "Not available here", None),
     NameRefusedError: (422, "Wrong parameter", "name"),
     PasswordRefusedError: (422, "Wrong parameter", "password"),
+    UnknownAlarmError: (404, "Unknown alarm", None),
     UnknownAccountError: (404, "Unknown account", None),
     AccessRefusedError: (409, "Conflict", None),
 }

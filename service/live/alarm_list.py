@@ -33,6 +33,10 @@ class AlarmCount:
     """Number of alarms that are neither active nor hidden and whose condition is unknown."""
 
 
+class UnknownAlarmError(LookupError):
+    """Error raised if an alarm does not exist."""
+
+
 SHARED = "shared work"
 """Name used instead of a unit in reports and commands about shared alarms; not a valid unit id."""
 
@@ -128,11 +132,11 @@ class LiveAlarms:
         return [alarm for alarms in list(self._alarms.values()) for alarm in list(alarms.values())]
 
     def alarm(self, id_: str) -> Alarm:
-        """Return the alarm with an id; raise `LookupError` if it does not exist."""
+        """Return the alarm with an id; raise `UnknownAlarmError` if it does not exist."""
         for alarms in self._alarms.values():
             if id_ in alarms:
                 return alarms[id_]
-        raise LookupError(id_)
+        raise UnknownAlarmError(f"unknown alarm {id_!r}")
 
     def is_judged(self, alarm: Alarm) -> bool:
         """Return whether the condition of an alarm is known now according to the latest report."""
@@ -144,7 +148,7 @@ class LiveAlarms:
         return alarm.identity.id in self._chattering.get(owner_of(alarm, self._units), ())
 
     def owner(self, id_: str) -> str:
-        """Return the unit whose process updates an alarm; raise `LookupError` for an unknown id."""
+        """Return the unit whose process updates an alarm; raise `UnknownAlarmError` without it."""
         return owner_of(self.alarm(id_), self._units)
 
     def count(self) -> AlarmCount:

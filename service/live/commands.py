@@ -10,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 from core.alarms.alarm import Alarm
 from core.alarms.operation import Action, ActionRefusedError
 from core.machine.unit import Estimator
-from service.live.alarm_list import LiveAlarms
+from service.live.alarm_list import LiveAlarms, UnknownAlarmError
 from service.live.snapshot import OWN_VERSION, UnreadableError, content_of
 from service.store.notes import Note
 from service.store.references import SetVectorReference
@@ -178,7 +178,7 @@ class Operators:
 
         Raises
         ------
-        LookupError
+        UnknownAlarmError
             If the alarm does not exist.
         ActionRefusedError
             If the action does not fit the state of the alarm.
@@ -233,7 +233,7 @@ class Operators:
         """Send a command, and raise an error if it failed: `refusal` if the command is refused."""
         answer = await self._send(unit, command, actor)
         if answer.state is CommandState.UNKNOWN:
-            raise LookupError(answer.words)
+            raise UnknownAlarmError(answer.words)
         if answer.state is CommandState.REFUSED and refusal is not None:
             raise refusal(answer.words)
         if answer.state in FAILED:

@@ -207,10 +207,7 @@ def alarm_router(context: Context) -> APIRouter:
     @router.get("/{alarm}", responses=problem_responses(own=UNKNOWN))
     async def one_alarm(alarm: AlarmId) -> AlarmModel:
         """Return one alarm, also if it is normal, with its value and limit."""
-        try:
-            return alarm_model(context, context.alarms.alarm(alarm))
-        except LookupError as error:
-            raise _unknown(alarm) from error
+        return alarm_model(context, context.alarms.alarm(alarm))
 
     async def done(
         id_: str, asked: ActorModel, kind: type[operation.Action], **more: object
@@ -218,11 +215,7 @@ def alarm_router(context: Context) -> APIRouter:
         """Execute an operation with the fields of a request; return the alarm once it is stored."""
         given: dict[str, Any] = dict(asked) | {"actor": actor_or(asked.actor)} | more
         action = kind(**{field.name: given[field.name] for field in fields(kind)})
-        try:
-            alarm = await context.operators.operate(id_, action)
-        except LookupError as error:
-            raise _unknown(id_) from error
-        return alarm_model(context, alarm)
+        return alarm_model(context, await context.operators.operate(id_, action))
 
     @router.post("/{alarm}/acknowledge", responses=ACTION_PROBLEMS, dependencies=ACT)
     async def acknowledge(alarm: AlarmId, asked: AcknowledgeModel) -> AlarmModel:
@@ -285,7 +278,3 @@ async def event_query(
         start_ns=max(times[0], 0),
         end_ns=min(max(times[1], 0), AlarmQuery.end_ns),
     )
-
-
-def _unknown(alarm: str) -> ProblemError:
-    return ProblemError(404, "Unknown alarm", f"unknown alarm {alarm!r}")

@@ -280,10 +280,8 @@ def plant_router(context: Context) -> APIRouter:
         """
         if context.configuration is None:
             raise ProblemError(404, "No configuration", "this service has no configuration")
-        found = context.configuration
-        document = json.loads(found.text)
-        shown = {key: document[key] for key in ("padwatch", "commit", "settings")}
-        return ConfigurationModel(version=found.version, **shown)
+        document = json.loads(context.configuration.text)
+        return ConfigurationModel.of(**document | {"version": context.configuration.version})
 
     @router.get(
         "/configuration/schema",
