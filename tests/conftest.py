@@ -28,6 +28,7 @@ from hypothesis import settings as hypothesis_settings
 from rigs.assessments import assessment as build_assessment
 from rigs.blocks import cell_block
 
+import acquisition.can  # noqa: F401 - loads python-can without pandas
 from acquisition.simulated.feed import FeedEndedError
 from core.arrays import FloatArray
 from core.baseline.history import StiffnessHistory

@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import asammdf
 import can
 import h5py
 import nptdms
@@ -40,6 +39,8 @@ def write_hdf5(path: Path) -> None:
 
 
 def write_mdf4(path: Path, compression: int = 0) -> None:
+    import asammdf  # loads pandas, not in each worker
+
     with asammdf.MDF() as mdf:
         signals = [asammdf.Signal(SINCE_S, SINCE_S, name=name) for name in NAMES[1:]]
         mdf.append(signals, common_timebase=True)

@@ -7,12 +7,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import asammdf
 import h5py
 import nptdms
 import numpy as np
 import pytest
-from asammdf.blocks.v4_blocks import ChannelConversion
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ColumnName, CsvLayout, ImportJob, TimeAxis
@@ -71,9 +69,17 @@ def write_tdms(path: Path, run: Any, samples: np.ndarray) -> None:
         )
 
 
+def linear_conversion() -> Any:
+    from asammdf.blocks.v4_blocks import ChannelConversion
+
+    return ChannelConversion(conversion_type=1, a=PER_COUNT, b=0.0)
+
+
 def write_mdf4(path: Path, run: Any, samples: np.ndarray) -> None:
+    import asammdf  # loads pandas, and so do the tests below, not each worker
+
     counts = samples.dtype == np.int16
-    conversion = ChannelConversion(conversion_type=1, a=PER_COUNT, b=0.0) if counts else None
+    conversion = linear_conversion() if counts else None
     with asammdf.MDF() as mdf:
         mdf.header.start_time = START
         signals = [
@@ -201,6 +207,8 @@ def test_tdms_waveform_properties_are_its_time(tmp_path, run, read, job, placed)
 
 
 def test_local_time_in_an_mdf_file_is_read_in_the_zone_of_the_mapping(tmp_path, run, read, job_for):
+    import asammdf
+
     write_mdf4(tmp_path / "run.mf4", run, run.units_um)
     with asammdf.MDF(tmp_path / "run.mf4") as mdf:
         mdf.header.start_time = datetime(2026, 1, 1)
@@ -212,9 +220,10 @@ def test_local_time_in_an_mdf_file_is_read_in_the_zone_of_the_mapping(tmp_path, 
 
 @pytest.mark.parametrize("of", ["counts", "units_um"])
 def test_samples_that_an_mdf_file_calls_invalid_are_none(tmp_path, run, read, job_for, of):
+    import asammdf
+
     invalid = np.isin(run.index, (0, 7, 600))
-    scale = ChannelConversion(conversion_type=1, a=PER_COUNT, b=0.0)
-    values, conversion = getattr(run, of), scale if of == "counts" else None
+    values, conversion = getattr(run, of), linear_conversion() if of == "counts" else None
     with asammdf.MDF() as mdf:
         signals = [
             asammdf.Signal(channel, run.since_start_s, name=f"shaft {axis}", conversion=conversion)
@@ -231,6 +240,8 @@ def test_samples_that_an_mdf_file_calls_invalid_are_none(tmp_path, run, read, jo
 
 
 def test_waveforms_of_different_lengths_or_times_are_refused(tmp_path, run, read, job):
+    import asammdf
+
     with h5py.File(tmp_path / "run.mf4", "w") as file:
         file["time"] = run.since_start_s
         file["shaft x"], file["shaft y"] = run.units_um[0], run.units_um[1, :-1]
