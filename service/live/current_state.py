@@ -22,6 +22,7 @@ from core.units import NS_PER_S, ns_from_s
 from service.live.alarm_list import SHARED
 from service.live.commands import FilmPlace, NotAvailableError
 from service.live.exchange import MeasuringGoneError
+from service.live.references import Key
 from service.live.snapshot import UnitLink, UnitSnapshot
 from service.live.status import (
     CurrentBearing,
@@ -276,10 +277,6 @@ class LiveUnits:
 
     def _why_not_current(self, unit: str, age_s: float | None) -> Reason | None:
         return why_not_current(self.status(unit).state, age_s, self._stale_after_s)
-
-
-Key = tuple[str, str]
-"""Unit id and bearing id."""
 
 
 class LiveFilms:

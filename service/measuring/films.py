@@ -52,7 +52,10 @@ class FilmMonitor:
         self.learner = Learner(store, settings)
         self._acting = asyncio.Lock()  # each action depends on the previous one
         self._rules = rules
-        self._watches = {unit: _watch(units[unit], its) for unit, its in rules.items()}
+        self._watches = {}
+        for unit, its in rules.items():
+            brackets = {each.id: each.bracket_stiffness_n_per_m for each in units[unit].bearings}
+            self._watches[unit] = FilmWatch(its, FilmJudge(its, brackets))
         self._newest: dict[tuple[str, str], FilmNews] = {}
 
     async def start(self) -> None:
@@ -240,11 +243,6 @@ def _require_possible(
             fault = "a later machine event exists; enter a time after it"
     if fault is not None:
         raise BaselineRefusedError(fault)
-
-
-def _watch(unit: Unit, rules: FilmRules) -> FilmWatch:
-    brackets = {bearing.id: bearing.bracket_stiffness_n_per_m for bearing in unit.bearings}
-    return FilmWatch(rules, FilmJudge(rules, brackets))
 
 
 async def film_monitor(
