@@ -108,9 +108,7 @@ class _AveragedSegments:
         Whether each phasor is usable, and whether its phase is known.
     phasors_um_pk : (n, n_channels, 2)
     at_mark_um_pk : (n, n_channels)
-        1× phasors with the phase at the passage of the shaft's mark; zero if unknown.
-    has_mark : (n, 1)
-        Whether `at_mark_um_pk` is known.
+        1× phasors with the phase at the passage of the shaft's mark; NaN if unknown.
     floors_um_pk : (n_channels, 2)
         Amplitudes that noise of the channels gives 1× and vortex.
     slow
@@ -126,10 +124,7 @@ class _AveragedSegments:
         self.usable: BoolArray = np.array([s.order_usable for s in segments])
         self.has_phase: BoolArray = np.array([s.has_phase for s in segments])
         self.phasors_um_pk: ComplexArray = np.array([s.order_phasors_um_pk for s in segments])
-        marked = [s.at_mark_um_pk for s in segments]
-        nothing = np.zeros(len(unit.channels), dtype=np.complex128)
-        self.at_mark_um_pk: ComplexArray = np.array([nothing if m is None else m for m in marked])
-        self.has_mark: BoolArray = np.array([[m is not None] for m in marked])
+        self.at_mark_um_pk: ComplexArray = np.array([s.at_mark_um_pk for s in segments])
         factors = np.abs(displacement_factors(unit.channels, self.order_hz))
         own = factors * np.array([[channel.line_floor] for channel in unit.channels])
         self.floors_um_pk = Resolution(unit).floors(own)
@@ -276,7 +271,6 @@ class BearingAverage:
                     usable=self._usable[:, line],
                     has_phase=has_phase[:, line],
                     at_mark_um_pk=at_mark_um_pk,
-                    has_mark=averaged.has_mark & has_phase[:, ORDER1],
                     floors_um_pk=tuple(floors_um_pk[:, line].tolist()),
                     round_shafts=round_shafts,
                 )

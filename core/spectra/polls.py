@@ -164,7 +164,7 @@ class PollTransform(KeptSegments):
                 order_quality=quality,
                 order_usable=np.array([usable_channels(of_line) for of_line in quality]),
                 has_phase=np.array([has_phase, np.zeros_like(has_phase)]),
-                at_mark_um_pk=phasors[:, ORDER1],
+                at_mark_um_pk=np.where(has_phase, phasors[:, ORDER1], np.nan),
                 runout=self._runout,
                 overall=None,
                 clipped_share=np.zeros(gap_um.size),

@@ -90,7 +90,7 @@ class Segment:
     has_phase : (2, n_channels)
         Whether the phase of each of these phasors is known.
     at_mark_um_pk : (n_channels,)
-        1× phasors with the phase at the passage of the shaft's mark; None without a key-phase.
+        1× phasors with the phase at the passage of the shaft's mark; NaN if unknown.
     runout
         Whether runout was subtracted from 1×, by shaft channel.
     overall
@@ -117,7 +117,7 @@ class Segment:
     order_quality: tuple[tuple[Quality, ...], tuple[Quality, ...]]
     order_usable: BoolArray
     has_phase: BoolArray
-    at_mark_um_pk: ComplexArray | None
+    at_mark_um_pk: ComplexArray
     runout: Mapping[str, RunoutVerdict]
     overall: Overall | None
     clipped_share: FloatArray
@@ -172,12 +172,10 @@ class Segment:
 
     def reading(self, rows: Sequence[int], value: float) -> Reading:
         """Return a reading with the channels' worst quality; without a value if `value` is NaN."""
-        qualities = [self.channel_quality[row] for row in rows]
-        if any(quality.level is Level.BAD for quality in qualities):
-            return missing(worst(qualities).reason)
-        if math.isnan(value):
-            return missing(Reason.NOT_MEASURED)
-        return Reading(value, worst(qualities))
+        quality = worst([self.channel_quality[row] for row in rows])
+        if quality.level is Level.BAD:
+            return missing(quality.reason)
+        return missing(Reason.NOT_MEASURED) if math.isnan(value) else Reading(value, quality)
 
 
 class KeptSegments:
@@ -328,7 +326,7 @@ class SegmentTransform(KeptSegments):
             order_quality=(resolved, resolved),
             order_usable=np.array([usable, usable]),
             has_phase=np.ones((2, usable.size), dtype=np.bool_),
-            at_mark_um_pk=None if angle_rad is None else _turned(orders[:, ORDER1], -angle_rad),
+            at_mark_um_pk=_turned_back(orders[:, ORDER1], angle_rad),
             runout=runout,
             overall=self._overall.of(samples, centred, lines),
             clipped_share=clipped,
@@ -415,6 +413,6 @@ def usable_channels(qualities: Sequence[Quality]) -> BoolArray:
     return np.array([quality.level is not Level.BAD for quality in qualities])
 
 
-def _turned(phasors: ComplexArray, angle_rad: float) -> ComplexArray:
-    factor = cmath.exp(1j * angle_rad)
+def _turned_back(phasors: ComplexArray, angle_rad: float | None) -> ComplexArray:
+    factor = complex(math.nan) if angle_rad is None else cmath.exp(1j * -angle_rad)
     return np.array([phasor * factor for phasor in phasors.tolist()])

@@ -87,9 +87,7 @@ class OrderLine:
     has_phase : (n, 4)
         Whether the phase of each phasor is known.
     at_mark_um_pk : (n, 4)
-        1× phasors with the phase at the passage of the shaft's mark.
-    has_mark : (n, 4)
-        Whether each value of `at_mark_um_pk` is known.
+        1× phasors with the phase at the passage of the shaft's mark; NaN if unknown.
     floors_um_pk
         Amplitude that each transducer's own noise gives the line, for (u_x, u_y, v_x, v_y).
     round_shafts
@@ -107,7 +105,6 @@ class OrderLine:
     usable: BoolArray
     has_phase: BoolArray
     at_mark_um_pk: ComplexArray
-    has_mark: BoolArray
     floors_um_pk: tuple[float, ...]
     round_shafts: frozenset[int] = frozenset()
 
@@ -190,9 +187,10 @@ class OrderLine:
     def _phase(self, place: int, quality: Quality | Reading) -> Budgeted:
         if isinstance(quality, Reading):
             return quality, None
-        if not self.has_mark[-1, place]:
+        is_known = np.isfinite(self.at_mark_um_pk[:, place])
+        if not is_known[-1]:
             return missing(Reason.NOT_MEASURED), None
-        vectors = self.at_mark_um_pk[self.usable[:, place] & self.has_mark[:, place], place]
+        vectors = self.at_mark_um_pk[self.usable[:, place] & is_known, place]
         mean = complex(vectors.mean()) if vectors.size else 0j
         if mean == 0j:
             return missing(Reason.INSUFFICIENT_EXCITATION), None
