@@ -3,6 +3,7 @@
 from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 
@@ -150,13 +151,10 @@ def figures_of(
 
 def stale_alarms(alarms: Iterable[Alarm], now_ns: int) -> list[Alarm]:
     """Return the active, visible alarms raised more than a day before `now_ns`, oldest first."""
-    standing = [
-        (alarm.raised_ns, alarm)
-        for alarm in alarms
-        if alarm.level is not None and alarm.raised_ns is not None and alarm.state not in HIDDEN
-    ]
-    old = [pair for pair in standing if now_ns - pair[0] > STALE_NS]
-    return [alarm for _, alarm in sorted(old, key=lambda pair: pair[0])]
+    active = (alarm for alarm in alarms if alarm.level is not None and alarm.state not in HIDDEN)
+    raised = ((alarm.raised_ns, alarm) for alarm in active if alarm.raised_ns is not None)
+    old = [pair for pair in raised if now_ns - pair[0] > STALE_NS]
+    return [alarm for _, alarm in sorted(old, key=itemgetter(0))]
 
 
 def _n_before(times: TimeArray, window_ns: int) -> IntArray:

@@ -161,8 +161,7 @@ def attribute(
         return Attribution(Cause.UNKNOWN, "stiffness or shaft motion of some bearing is unknown")
     seen = _Residuals(row, response, readings.columns(usable))
     cause, reason = _cause(seen, bracket_n_per_m)
-    unchanged = seen.if_unchanged
-    shaft = float(unchanged[row] * seen.std[row])
+    shaft = float(seen.if_unchanged[row] * seen.std[row])
     bearing = shaft + float(np.mean(seen.change[row]))
     share, share_std = seen.film_share()
     return Attribution(cause, reason, share, share_std, shaft, bearing)

@@ -62,7 +62,6 @@ class ScaleSums:
         scale has fully elapsed, means have a larger scatter.
         """
         offset = self.offset / self.weight
-        # means over a partly elapsed time scale have a larger scatter
         own = time.share * (self.scatter / self.weight) / self.fill
         std = math.sqrt(own * own + offset * offset)
         return Finding(time.time_scale_h, self.deviation / self.weight, std)
