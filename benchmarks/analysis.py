@@ -75,7 +75,6 @@ class Analysis:
         """Take in the newest segment and evaluate all bearings; count the results of `dynamic`."""
         self._transform.add(
             Window(
-                unit=self._unit.id,
                 epoch=1,
                 first_index=index,
                 start_ns=0,

@@ -26,15 +26,13 @@ class SlowRollVector:
     phasor_um_pk
         Displacement phasor along the positive bearing axis. Its phase is that of the signal at the
         moment when the mark on the shaft passes the key-phase pick-up.
-    speed_rpm, taken_ns
-        Speed and time (UTC nanoseconds since 1970) of the measurement.
+    speed_rpm
+        Speed of the measurement.
     """
 
-    channel: str
     probe: str
     phasor_um_pk: complex
     speed_rpm: float
-    taken_ns: int
 
 
 class Measurand(StrEnum):

@@ -30,7 +30,6 @@ class Window:
         Mean of each slow channel, by id.
     """
 
-    unit: str
     epoch: int
     first_index: int
     start_ns: int
@@ -158,7 +157,6 @@ class Ring:
         n_before = first_index - block.first_index - int(block.side.starts[cell])
         verdicts = np.concatenate([p.block.verdicts[:, p.cells] for p in parts], axis=1)
         return Window(
-            unit=block.unit,
             epoch=block.epoch,
             first_index=first_index,
             start_ns=int(block.side.start_ns[cell]) + ns_from_s(n_before / block.rate_hz),

@@ -16,7 +16,7 @@ from core.machine.channel import (
     SlowRollVector,
 )
 from core.monitor.catalogue import BY_NAME
-from core.units import NS_PER_S, STANDARD_GRAVITY_M_S2
+from core.units import STANDARD_GRAVITY_M_S2
 from service.settings.base import Identifier, MisfitError, MissingError, Settings
 from service.settings.limits import SlowLimitSettings
 from service.settings.transducers import ResponseSettings
@@ -47,15 +47,10 @@ class SlowRollSettings(Settings):
     """Serial number or mark of the measured probe; the vector is not used for another probe.
     Example: "SN123"."""
 
-    def vector(self, channel: str) -> SlowRollVector:
+    def vector(self) -> SlowRollVector:
         """Return the settings as the `SlowRollVector` of a channel."""
-        return SlowRollVector(
-            channel=channel,
-            probe=self.probe,
-            phasor_um_pk=cmath.rect(self.um_pk, math.radians(self.phase_deg)),
-            speed_rpm=self.speed_rpm,
-            taken_ns=round(self.taken.timestamp()) * NS_PER_S,
-        )
+        phasor_um_pk = cmath.rect(self.um_pk, math.radians(self.phase_deg))
+        return SlowRollVector(self.probe, phasor_um_pk, self.speed_rpm)
 
 
 class Transducer(StrEnum):

@@ -58,7 +58,7 @@ def _channel(settings: ChannelSettings) -> Channel:
         unit_per_count=calibration.unit_per_count,
         ok_limits=calibration.ok_limits,
         probe=settings.probe or "",
-        slow_roll=settings.slow_roll.vector(settings.id) if settings.slow_roll else None,
+        slow_roll=settings.slow_roll.vector() if settings.slow_roll else None,
         angle_deg=settings.angle_deg,
     )
 

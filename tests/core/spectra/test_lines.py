@@ -118,7 +118,7 @@ def test_samples_in_single_precision_cost_no_more_than_their_own_rounding(sample
     for start in range(0, N_SAMPLES - 8191, SETTINGS.hop_samples):
         piece = travelling[:, start : start + 8192]
         slow = {"speed": Reading(92.3)}
-        transform.add(Window("U1", 1, start, 0, RATE_HZ, piece, (GOOD,) * 4, slow))
+        transform.add(Window(1, start, 0, RATE_HZ, piece, (GOOD,) * 4, slow))
 
     segments = list(transform.segments)
     ours = average(

@@ -132,7 +132,7 @@ def test_a_phase_is_the_same_whenever_a_record_begins(measure, unit, mark_s):
     assert found["order1_bearing_x_phase_deg"].value == pytest.approx(30.0, abs=0.5)
 
 
-VECTOR = SlowRollVector("ujb_shaft_x", "SN 4711", 10.0 * cmath.exp(0.4j), 12.0, 1_790_000_000)
+VECTOR = SlowRollVector("SN 4711", 10.0 * cmath.exp(0.4j), 12.0)
 VIBRATION = 25.0 * cmath.exp(-1.1j)
 """Relative to the mark on the shaft, as the vector is."""
 
@@ -185,7 +185,7 @@ KEY_PHASE = KeyPhase(1.2, 92.3, 1e-5, 20)
 @pytest.fixture
 def rough(unit: Unit) -> Unit:
     """The unit with a vector for its x probe alone."""
-    vector = SlowRollVector("sx", "SN1", complex(SURFACE), 8.0, 0)
+    vector = SlowRollVector("SN1", complex(SURFACE), 8.0)
     first = replace(unit.channels[0], probe="SN1", slow_roll=vector)
     return replace(unit, channels=(first, *unit.channels[1:]))
 

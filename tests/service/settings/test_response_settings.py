@@ -205,13 +205,8 @@ def test_key_phase_and_vector_reach_the_numerics(text, tmp_path):
     assert machine.channels[-1].measurand is Measurand.KEY_PHASE_V
     assert calibration.channels[-1].unit_per_v == 1.0
     assert machine.channels[0].probe == "SN123"
-    assert machine.channels[0].slow_roll == SlowRollVector(
-        "ujb_shaft_x",
-        "SN123",
-        cmath.rect(8.0, math.radians(30.0)),
-        8.0,
-        1_772_359_200_000_000_000,
-    )
+    phasor_um_pk = cmath.rect(8.0, math.radians(30.0))
+    assert machine.channels[0].slow_roll == SlowRollVector("SN123", phasor_um_pk, 8.0)
     assert machine.channels[1].slow_roll is None
     assert machine.channels[0].unit_per_count == calibration.channels[0].unit_per_count != 0.0
 
