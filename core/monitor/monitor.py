@@ -72,7 +72,7 @@ class UnitMonitor:
         self._n_voided = 0
         self._n_results = 0
         self._starts: deque[int] = deque()
-        self._rewound_to = 0
+        self._rewound_to = self._n_held = 0
 
     @property
     def account(self) -> SampleAccount:
@@ -123,12 +123,14 @@ class UnitMonitor:
             self._growth.pop(bearing, None)  # growth is relative to the reference
         self.unit = unit
 
-    def go_on(self, reach: Reach | None) -> None:
+    def go_on(self, reach: Reach | None, n_held: int = 0) -> None:
         """Set the end of the stored samples (None if there are none) before the first block.
 
-        Samples missing between this end and the first block are recorded as gaps.
+        Samples missing between this end and the first block are recorded as gaps. The first segment
+        begins `n_held` samples after the first block, modulo the distance of segments, so that the
+        segments of units that start together do not all end together.
         """
-        self._reach = reach
+        self._reach, self._n_held = reach, n_held % self._transform.hop_samples
 
     def drain_gaps(self) -> list[Gap]:
         """Return and clear the gaps found since the last call."""
@@ -187,7 +189,7 @@ class UnitMonitor:
             self._first_start = self._ring.contiguous_from
             self._n_results = self._first_start // self._transform.result_samples
         if self._next_start is None:
-            self._next_start = max(self._ring.contiguous_from, self._rewound_to)
+            self._next_start = max(self._ring.contiguous_from + self._n_held, self._rewound_to)
         elif restarted or self._next_start < self._ring.contiguous_from:
             self._n_voided += self._next_start < stop_index
             self._next_start = self._ring.contiguous_from

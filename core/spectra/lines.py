@@ -95,9 +95,7 @@ def bin_phasors(tapered_samples: FloatArray, n_lines: int) -> ComplexArray:
     `tapered_samples` (n_channels, n_samples) must already be multiplied by `taper_weights`, which
     make the magnitudes zero-to-peak amplitudes. Line 0 is bin 1.
     """
-    from scipy import fft  # slow import, not needed by a process without spectra
-
-    return np.asarray(fft.rfft(tapered_samples, axis=1)[:, 1 : n_lines + 1])
+    return np.asarray(np.fft.rfft(tapered_samples, axis=1)[:, 1 : n_lines + 1])
 
 
 def turning_factors(n_samples: int, rate_hz: float, frequency_hz: FloatArray) -> ComplexArray:

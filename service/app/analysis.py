@@ -56,6 +56,11 @@ if TYPE_CHECKING:
     from service.cluster.consumer import Consumer  # slow import, only with a stream
 
 
+APART_S = 0.12
+"""Time between the first segments of one unit and the next, s: with 100 units, results are spread
+evenly over the 12 s from one segment to the next."""
+
+
 @dataclass(eq=False)
 class Analysis:
     """Parts of the analysis and the background services of a process.
@@ -123,8 +128,9 @@ class Analysis:
         live, recorder, monitors = self.live, self.recorder, self.monitors
         await self.soundness.look()  # before the first write
         if origin is Origin.LIVE:  # a replay starts without stored results and has no gap
-            for unit, monitor in monitors.items():
-                monitor.go_on(await asyncio.to_thread(store.reach, unit))
+            for number, (unit, monitor) in enumerate(monitors.items()):
+                n_held = round(number * APART_S * monitor.unit.rate_hz)
+                monitor.go_on(await asyncio.to_thread(store.reach, unit), n_held)
         self.alarms = alarms = await alarm_engine(
             *(plant, origin, store, recorder.put, clock, self._listen),
             *(self.health, self.part, {unit: memory.alarms for unit, memory in memories.items()}),
