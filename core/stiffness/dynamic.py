@@ -257,7 +257,7 @@ def late_share(fits: FilmFits) -> FloatArray:
 
     The share is continuous, so that results do not jump between averages.
     """
-    lags, delay = fits.of_lags[2], fits.delay_significance()
+    lags, delay = fits.lag_significance, fits.delay_significance()
     certain = np.clip((delay - DELAY_DOUBTFUL) / (DELAY_CERTAIN - DELAY_DOUBTFUL), 0.0, 1.0)
     is_delay = 1.0 - np.clip((lags / delay - AS_DELAY) / (AS_LAGS - AS_DELAY), 0.0, 1.0)
     return np.nan_to_num(certain * is_delay)

@@ -155,7 +155,7 @@ class FilmFits(FittedFilms):
     def _part_sensitivity(self) -> FloatArray:
         """Residual per unit of each part of a row after a new fit, by its terms, (n, 2, 3, 7)."""
         through = np.empty((len(self.parts), 2, N_PARTS, N_TERMS))
-        through[..., :N_UNKNOWNS] = self.solved[..., 1:].swapaxes(2, 3)
+        through[..., :N_UNKNOWNS] = -self.per_part.swapaxes(2, 3)
         through[..., N_UNKNOWNS:] = -np.eye(N_PARTS)
         return through
 
@@ -163,9 +163,11 @@ class FilmFits(FittedFilms):
     def _information(self) -> FloatArray:
         """Information on the changes and parts in the residual, (n, 10, 10)."""
         _, to_functions, squared, _ = self._changed
-        gram = np.empty((*self.gram.shape[:2], N_TERMS + N_CHANGES, N_TERMS + N_CHANGES))
-        gram[..., :N_TERMS, :N_TERMS], gram[..., CHANGES, CHANGES] = self.gram, squared
-        to_terms = self._of_terms.swapaxes(2, 3) @ to_functions
+        gram = np.empty((*squared.shape[:2], N_TERMS + N_CHANGES, N_TERMS + N_CHANGES))
+        of_terms = self.of_terms.swapaxes(2, 3)
+        gram[..., :N_TERMS, :N_TERMS] = of_terms @ self.weighted.normal @ self.of_terms
+        gram[..., CHANGES, CHANGES] = squared
+        to_terms = of_terms @ to_functions
         gram[..., :N_TERMS, CHANGES] = to_terms
         gram[..., CHANGES, :N_TERMS] = to_terms.swapaxes(2, 3)
         through = self._sensitivity
@@ -174,7 +176,10 @@ class FilmFits(FittedFilms):
     @cached_property
     def _score(self) -> FloatArray:
         """Products of the residual with its changes, (n, 10, 1)."""
-        left = np.concatenate([self.left, self._changed[3]], axis=2)[..., np.newaxis]
+        modelled = self.weighted.normal[..., :6] @ self.coefficients[..., np.newaxis]
+        rest = self.weighted.moments[..., np.newaxis] - modelled
+        of_terms = self.of_terms.swapaxes(2, 3) @ rest
+        left = np.concatenate([of_terms, self._changed[3][..., np.newaxis]], axis=2)
         return np.asarray((self._sensitivity @ left).sum(axis=1))
 
     def follow(self, change: int, fitted: Sequence[int]) -> FloatArray:

@@ -254,6 +254,23 @@ class WeightedTerms:
         """Weighted sums over lines of each term times the bracket's force, (n, 2, 8)."""
         return self.terms.moments(self.weight)
 
+    @cached_property
+    def _right(self) -> FloatArray:
+        """Moments, and normal equations by the lagging terms, (n, 2, 8, 5)."""
+        return np.concatenate([self.moments[..., np.newaxis], self.normal[..., N_UNKNOWNS:]], 3)
+
+    @cached_property
+    def solved(self) -> FloatArray:
+        """Unknowns without lagging terms, and their negative derivatives by these, (n, 2, 4, 5)."""
+        normal = self.normal[..., :N_UNKNOWNS, :N_UNKNOWNS]
+        return np.asarray(np.linalg.solve(normal, self._right[..., :N_UNKNOWNS, :]), np.float64)
+
+    @cached_property
+    def reduced(self) -> FloatArray:
+        """Moments and normal equations of the lagging terms beside the unknowns, (n, 2, 4, 5)."""
+        to_unknowns = self.normal[..., N_UNKNOWNS:, :N_UNKNOWNS]
+        return np.asarray(self._right[..., N_UNKNOWNS:, :] - to_unknowns @ self.solved)
+
 
 def _largest_share(part: FloatArray, whole: FloatArray) -> FloatArray:
     """Return the largest ratio of two quadratic forms; 1 if the second is singular.

@@ -177,32 +177,25 @@ class FittedFilms:
         return self.weighted.weight
 
     @cached_property
-    def _of_terms(self) -> FloatArray:
+    def _of_parts(self) -> FloatArray:
+        """Lagging terms with which each part begins, (n, 2, 4, 3)."""
+        of_parts = np.zeros((len(self.parts), 2, 4, N_PARTS))
+        of_parts[..., :N_LAGS, :N_LAGS] = np.eye(N_LAGS)
+        of_parts[..., N_LAGS:, N_LAGS] = self.kept_parts[..., :N_LAGS]
+        return of_parts
+
+    @cached_property
+    def of_terms(self) -> FloatArray:
         """Functions with which each term begins, (n, 2, 8, 7)."""
         of_terms = np.zeros((len(self.parts), 2, 8, N_TERMS))
-        of_terms[..., : N_TERMS - 1] = np.eye(8)[:, : N_TERMS - 1]
-        of_terms[..., 6:, N_TERMS - 1] = self.kept_parts[..., :N_LAGS]
+        of_terms[..., :N_UNKNOWNS, :N_UNKNOWNS] = np.eye(N_UNKNOWNS)
+        of_terms[..., N_UNKNOWNS:, N_UNKNOWNS:] = self._of_parts
         return of_terms
 
     @cached_property
-    def gram(self) -> FloatArray:
-        """Weighted products of the terms of each row, (n, 2, 7, 7)."""
-        return np.asarray(self._of_terms.swapaxes(2, 3) @ self.weighted.normal @ self._of_terms)
-
-    @cached_property
-    def solved(self) -> FloatArray:
-        """Unknowns without parts, and their negative derivatives by each part, (n, 2, 4, 1 + 3)."""
-        normal, moments = self.weighted.normal, self.weighted.moments
-        right = np.empty((len(normal), 2, N_UNKNOWNS, 1 + N_PARTS))
-        right[..., 0] = moments[..., :N_UNKNOWNS]
-        right[..., 1:] = self.gram[..., :N_UNKNOWNS, N_UNKNOWNS:]
-        solved = np.linalg.solve(normal[..., :N_UNKNOWNS, :N_UNKNOWNS], right)
-        return np.asarray(solved, dtype=np.float64)
-
-    @property
     def per_part(self) -> FloatArray:
         """Derivatives of the unknowns of a row with respect to its parts, (n, 2, 4, 3)."""
-        return -self.solved[..., 1:]
+        return -self.weighted.solved[..., 1:] @ self._of_parts
 
     @property
     def unknowns(self) -> FloatArray:
@@ -212,9 +205,9 @@ class FittedFilms:
     @cached_property
     def coefficients(self) -> FloatArray:
         """Coefficients of the film's six terms: unknowns and lagging parts, (n, 2, 6)."""
-        lags = self.kept_parts[..., :N_LAGS]
-        shift = (self.solved[..., 1 : 1 + N_LAGS] @ lags[..., np.newaxis])[..., 0]
-        return np.concatenate([self.solved[..., 0] - shift, lags], axis=2)
+        lags, solved = self.kept_parts[..., :N_LAGS], self.weighted.solved
+        shift = (solved[..., 1 : 1 + N_LAGS] @ lags[..., np.newaxis])[..., 0]
+        return np.concatenate([solved[..., 0] - shift, lags], axis=2)
 
     @cached_property
     def film(self) -> ComplexArray:
@@ -239,25 +232,11 @@ class FittedFilms:
         return self.inputs.force - self.moved
 
     @cached_property
-    def left(self) -> FloatArray:
-        """Weighted sums over lines of residual force times each term of a row, (n, 2, 7)."""
-        modelled = self.weighted.normal[..., :6] @ self.coefficients[..., np.newaxis]
-        rest = self.weighted.moments[..., np.newaxis] - modelled
-        return np.asarray((self._of_terms.swapaxes(2, 3) @ rest)[..., 0])
-
-    @cached_property
-    def _parts_information(self) -> FloatArray:
-        """Information on the parts of each row in the residual, (n, 2, 3, 3)."""
-        to_parts, own = self.gram[..., N_UNKNOWNS:, :N_UNKNOWNS], self.gram[..., 4:, 4:]
-        information: FloatArray = own - to_parts @ self.solved[..., 1:]
-        return information / self.inputs.size[..., np.newaxis, np.newaxis]
-
-    @cached_property
     def prior(self) -> FloatArray:
         """Reciprocal prior variance of each part, normal with zero mean, (n, 2, 3)."""
         direct = np.hypot(
-            np.einsum("nrr->nr", self.solved[:, :, :2, 0]),
-            np.einsum("nrr->nr", self.solved[:, :, 2:, 0]),
+            np.einsum("nrr->nr", self.weighted.solved[:, :, :2, 0]),
+            np.einsum("nrr->nr", self.weighted.solved[:, :, 2:, 0]),
         )
         prior = np.ones((*direct.shape, N_PARTS))
         prior[..., :N_LAGS] = 1.0 / (LAG_PRIOR * direct[..., np.newaxis]) ** 2
@@ -265,37 +244,44 @@ class FittedFilms:
 
     @cached_property
     def of_lags(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Posterior mean (n, 2, 2), covariance and squared significance (n,) of lagging parts."""
+        """Posterior mean (n, 2, 2), covariance and score of the lagging parts."""
         return self._posterior(N_LAGS)
 
     @cached_property
     def of_parts(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Posterior mean (n, 2, 3), covariance and squared significance (n,) of parts and lag."""
+        """Posterior mean (n, 2, 3), covariance and score of the lagging parts and their lag."""
         return self._posterior(N_PARTS)
+
+    @cached_property
+    def lag_significance(self) -> FloatArray:
+        """Squared significance of lagging parts beside none, (n,), if the film has none.
+
+        It is chi-squared with four degrees of freedom.
+        """
+        _, covariance, score = self.of_lags
+        return np.asarray((score * (covariance @ score)).sum(axis=(1, 2, 3)))
 
     def constant_odds(self) -> FloatArray:
         """Return the likelihood ratio of films without and with lagging parts, (n,)."""
-        _, covariance, significance = self.of_lags
+        covariance = self.of_lags[1]
         shrinkage = np.linalg.slogdet(covariance * self.prior[..., np.newaxis, :N_LAGS])[1]
-        return np.asarray(np.exp(-0.5 * (significance + shrinkage.sum(axis=1))))
+        return np.asarray(np.exp(-0.5 * (self.lag_significance + shrinkage.sum(axis=1))))
 
     def _posterior(self, n_parts: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return mean, covariance and significance of the first parts of each row.
+        """Return mean (n, 2, p), covariance (n, 2, p, p) and score of the first parts of each row.
 
-        Returns
-        -------
-        Mean, (n, 2, p); covariance, (n, 2, p, p); and the squared significance beside none, (n,),
-        if the film has none: chi-squared with four degrees of freedom.
+        The score, (n, 2, p, 1), is the derivative of the logarithm of the likelihood.
         """
-        fitted = slice(N_UNKNOWNS, N_UNKNOWNS + n_parts)
-        score = (self.left[..., fitted] / self.inputs.size[..., np.newaxis])[..., np.newaxis]
-        information = self._parts_information[..., :n_parts, :n_parts]
+        of_parts = self._of_parts[..., :n_parts]
+        reduced = of_parts.swapaxes(2, 3) @ self.weighted.reduced
+        reduced /= self.inputs.size[..., np.newaxis, np.newaxis]
+        information, kept = reduced[..., 1:] @ of_parts, self.kept_parts[..., :n_parts, np.newaxis]
+        score = reduced[..., :1] - information[..., :N_LAGS] @ kept[..., :N_LAGS, :]
         precision = information.copy()
         np.einsum("...ii->...i", precision)[...] += self.prior[..., :n_parts]
         covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
-        mean = covariance @ (score + information @ self.kept_parts[..., :n_parts, np.newaxis])
-        significance = (score * (covariance @ score)).sum(axis=(1, 2, 3))
-        return mean[..., 0], covariance, significance
+        mean = covariance @ (score + information @ kept)
+        return mean[..., 0], covariance, score
 
     def with_parts(self, kept: FloatArray, n_parts: int) -> Self:
         """Return fits that have the first `n_parts` parts with the probability `kept` (n, 1).
