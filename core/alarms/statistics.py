@@ -45,10 +45,9 @@ class ChatterWatch:
         if len(times) == n_wanted and abs(times[-1] - times[0]) <= self._rule.window_ns:
             self._chattered[event.identity.id] = seen_ns
 
-    def is_chattering(self, alarm: str, now_ns: int) -> bool:
-        """Whether the alarm with an id chattered within `SHOWN_NS` before host time `now_ns`."""
-        seen_ns = self._chattered.get(alarm)
-        return seen_ns is not None and now_ns - seen_ns <= SHOWN_NS
+    def chattering(self, now_ns: int) -> set[str]:
+        """Return the ids of alarms that chattered within `SHOWN_NS` before host time `now_ns`."""
+        return {id_ for id_, seen_ns in self._chattered.items() if now_ns - seen_ns <= SHOWN_NS}
 
 
 TEN_MINUTES_NS = 600 * NS_PER_S

@@ -86,7 +86,8 @@ class UnitMonitor:
         The samples to replay begin up to two averaging times back: the vortex frequency of an
         averaged segment depends on the segments before it.
         """
-        start = self._starts[0] if self._starts else self._next_start or 0
+        newest = max(self._ring.stop_index - 1, 0)  # to find a gap after it
+        start = self._starts[0] if self._starts else min(self._next_start or 0, newest)
         return MonitorState(
             self._ring.epoch,
             start,
@@ -130,7 +131,8 @@ class UnitMonitor:
         begins `n_held` samples after the first block, modulo the distance of segments, so that the
         segments of units that start together do not all end together.
         """
-        self._reach, self._n_held = reach, n_held % self._transform.hop_samples
+        self._reach = reach
+        self._n_held = n_held % self._transform.hop_samples
 
     def drain_gaps(self) -> list[Gap]:
         """Return and clear the gaps found since the last call."""

@@ -185,9 +185,10 @@ class AlarmEngine:
         """Return the alarm with an id; raise `LookupError` if it does not exist."""
         return self._board_of(id_).alarm(id_)
 
-    def is_chattering(self, alarm: Alarm) -> bool:
-        """Return whether an alarm is chattering now, that is, changes too often."""
-        return self._chatter.is_chattering(alarm.identity.id, self._clock.now_ns())
+    @property
+    def chattering(self) -> set[str]:
+        """Ids of the alarms that are chattering now, that is, change too often."""
+        return self._chatter.chattering(self._clock.now_ns())
 
     def set_reference(self, reference: VectorReference) -> None:
         """Set the reference of a bearing's 1× vectors; references of unknown units are ignored."""

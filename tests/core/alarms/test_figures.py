@@ -77,7 +77,8 @@ def test_three_in_a_minute_chatter(times_s, n_chattering):
         watch.note(each, each.time_ns)
 
     assert sum(found.chattering.values()) == n_chattering
-    assert watch.is_chattering("U1:UJB:order1_shaft_x", 130 * NS_PER_S) == (n_chattering > 0)
+    chattering = {"U1:UJB:order1_shaft_x"} if n_chattering else set()
+    assert watch.chattering(130 * NS_PER_S) == chattering
 
 
 def test_an_alarm_that_returns_soon_is_fleeting_and_does_not_chatter_for_long():
@@ -85,8 +86,8 @@ def test_an_alarm_that_returns_soon_is_fleeting_and_does_not_chatter_for_long():
     for at_s in (0, 1, 2):
         watch.note(event(at_s), at_s * NS_PER_S)
 
-    assert watch.is_chattering("U1:UJB:order1_shaft_x", 602 * NS_PER_S)
-    assert not watch.is_chattering("U1:UJB:order1_shaft_x", 603 * NS_PER_S)
+    assert watch.chattering(602 * NS_PER_S) == {"U1:UJB:order1_shaft_x"}
+    assert not watch.chattering(603 * NS_PER_S)
 
     back = AlarmChange.RETURNED
     events = [event(0), event(59.9, back), event(100), event(160, back)]
