@@ -1,6 +1,7 @@
 """Snapshots of units, built from the parts of the measuring process, and the reports on them."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import fields
 
 from core.alarms.alarm import Alarm
@@ -52,9 +53,12 @@ class Reports:
         if is_first:
             self._sent, self._sent_plant = {}, None
         self._n_reports += 1
+        chattering, common = self._alarms.chattering, defaultdict[str, list[Alarm]](list)
+        for alarm in self._alarms.common_alarms:
+            common[owner_of(alarm, self._bearings)].append(alarm)
         before, self._sent, units = self._sent, {}, []
         for unit in self._held():
-            snapshot, sent = self._snapshot(unit), before.get(unit)
+            snapshot, sent = self._snapshot(unit, common[unit], chattering), before.get(unit)
             # fast, because unchanged parts are the same objects
             is_same = sent is not None and snapshot == sent[1]
             self._sent[unit] = sent if sent and is_same else (self._n_reports, snapshot)
@@ -64,24 +68,24 @@ class Reports:
         plant = None if self._sent_plant == plant_before else self._sent_plant
         return Report(self._process, self._n_reports, tuple(units), plant)
 
-    def _snapshot(self, unit: str) -> UnitSnapshot:
-        """Return the present state of a unit, or the alarms of `PLANT` or `SHARED`."""
-        bearings, alarms = self._bearings.get(unit, []), self._alarms_of(unit)
+    def _snapshot(
+        self, unit: str, common: Iterable[Alarm], chattering: Container[str]
+    ) -> UnitSnapshot:
+        """Return the present state of a unit, or the alarms of `PLANT` or `SHARED`.
+
+        `common` are the alarms of no unit that the report on this unit contains, `chattering` the
+        ids of all chattering alarms.
+        """
+        bearings, own = self._bearings.get(unit, []), self._alarms.units.get(unit)
+        alarms = (*(own.alarms if own else ()), *common)
         found = {bearing: self._live.assessment(unit, bearing) for bearing in bearings}
         read = {bearing: self._films.newest(unit, bearing) for bearing in bearings}
         in_force = {bearing: self._films.baseline(unit, bearing) for bearing in bearings}
-        judged, chattering = self._alarms.is_judged, self._alarms.is_chattering
         return UnitSnapshot(
             bearings={bearing: bearing_snapshot(each) for bearing, each in found.items() if each},
-            alarms=tuple(alarms),
-            judged=frozenset(a.identity.id for a in alarms if judged(a)),
-            chattering=frozenset(a.identity.id for a in alarms if chattering(a)),
+            alarms=alarms,
+            judged=frozenset(a.identity.id for a in alarms if self._alarms.is_judged(a)),
+            chattering=frozenset(a.identity.id for a in alarms if a.identity.id in chattering),
             films={bearing: news for bearing, news in read.items() if news},
             baselines={b: baseline.origin.version for b, baseline in in_force.items() if baseline},
         )
-
-    def _alarms_of(self, unit: str) -> list[Alarm]:
-        """Return the alarms that a report on a unit contains."""
-        common = self._alarms.common_alarms
-        of_unit = self._alarms.units[unit].alarms if unit in self._bearings else []
-        return [*of_unit, *(each for each in common if owner_of(each, self._bearings) == unit)]
