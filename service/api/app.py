@@ -32,7 +32,7 @@ from service.api.problems import (
     refuse_unknown_parameters,
 )
 from service.api.routes.alarm_rates import alarm_rate_router
-from service.api.routes.alarms import alarm_router
+from service.api.routes.alarms import alarm_router, operation_router
 from service.api.routes.audit import audit_router
 from service.api.routes.baselines import baseline_router
 from service.api.routes.bearings import bearing_router
@@ -224,16 +224,17 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
         overview_router(context),
         alarm_rate_router(context),
         alarm_router(context),
-        bearing_router(context),
         trend_router(context),
-        health_router(context, requests),
+        bearing_router(context),
         plant_router(context),
         channel_router(context),
         spectra_router(context),
         motion_router(context),
+        health_router(context, requests),
         film_router(context),
         film_history_router(context),
         baseline_router(context),
+        operation_router(context),
         recording_router(context),
         audit_router(context),
         session_router(authenticator),

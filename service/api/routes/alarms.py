@@ -126,7 +126,6 @@ async def chosen_alarms(
 
 ChosenAlarms = Annotated[AlarmQuery, Depends(chosen_alarms)]
 
-ACT = [needs(Permission.ACT_ON_ALARMS)]
 OUTAGE = [needs(Permission.CHANGE_MEASURING)]
 """Permission to take an alarm out of service; the alarm then sends no messages."""
 
@@ -135,7 +134,6 @@ ACTION_PROBLEMS = problem_responses(409, own=UNKNOWN)
 COMMENT_LIMIT = problem_responses(
     own={429: "Too many comments; Retry-After gives the time to wait"}
 )
-COMMENT_PROBLEMS = ACTION_PROBLEMS | COMMENT_LIMIT
 
 
 class Allowances(dict[str, TokenBucket]):
@@ -154,8 +152,8 @@ class Allowances(dict[str, TokenBucket]):
 
 
 def alarm_router(context: Context) -> APIRouter:
-    """Return the router for alarms; it must follow other routers for ``/alarms/...``."""
-    router, allowances = subject_router("/alarms", "alarms"), Allowances()
+    """Return the router that reads alarms; it must follow other routers for ``/alarms/...``."""
+    router = subject_router("/alarms", "alarms")
     revision = alarm_list_revision(context)
 
     @router.get("", response_model=AlarmListModel)
@@ -209,6 +207,14 @@ def alarm_router(context: Context) -> APIRouter:
         """Return one alarm, also if it is normal, with its value and limit."""
         return alarm_model(context, context.alarms.alarm(alarm))
 
+    return router
+
+
+def operation_router(context: Context) -> APIRouter:
+    """Return the router for operations on alarms; each operation returns the changed alarm."""
+    router = subject_router("/alarms/{alarm}", "alarms", Permission.ACT_ON_ALARMS)
+    allowances = Allowances()
+
     async def done(
         id_: str, asked: ActorModel, kind: type[operation.Action], **more: object
     ) -> AlarmModel:
@@ -217,12 +223,12 @@ def alarm_router(context: Context) -> APIRouter:
         action = kind(**{field.name: given[field.name] for field in fields(kind)})
         return alarm_model(context, await context.operators.operate(id_, action))
 
-    @router.post("/{alarm}/acknowledge", responses=ACTION_PROBLEMS, dependencies=ACT)
+    @router.post("/acknowledge", responses=ACTION_PROBLEMS)
     async def acknowledge(alarm: AlarmId, asked: AcknowledgeModel) -> AlarmModel:
         """Acknowledge an occurrence of an alarm; repeating the request changes nothing."""
         return await done(alarm, asked, operation.Acknowledge)
 
-    @router.post("/{alarm}/shelve", responses=ACTION_PROBLEMS, dependencies=ACT)
+    @router.post("/shelve", responses=ACTION_PROBLEMS)
     async def shelve(alarm: AlarmId, asked: ShelveModel) -> AlarmModel:
         """Hide an alarm for a limited time; an alarm still active afterwards is announced again."""
         if asked.duration_s > context.max_shelf_s:
@@ -231,27 +237,27 @@ def alarm_router(context: Context) -> APIRouter:
         until_ns = context.clock.now_ns() + ns_from_s(asked.duration_s)
         return await done(alarm, asked, operation.Shelve, until_ns=until_ns)
 
-    @router.post("/{alarm}/unshelve", responses=ACTION_PROBLEMS, dependencies=ACT)
+    @router.post("/unshelve", responses=ACTION_PROBLEMS)
     async def unshelve(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """End the shelving of an alarm early."""
         return await done(alarm, asked, operation.Unshelve)
 
-    @router.post("/{alarm}/out-of-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
+    @router.post("/out-of-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
     async def take_out_of_service(alarm: AlarmId, asked: ReasonModel) -> AlarmModel:
         """Hide an alarm until it is returned to service, for example for maintenance."""
         return await done(alarm, asked, operation.TakeOutOfService)
 
-    @router.post("/{alarm}/return-to-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
+    @router.post("/return-to-service", responses=ACTION_PROBLEMS, dependencies=OUTAGE)
     async def return_to_service(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """Return an alarm to service; an active alarm is announced again."""
         return await done(alarm, asked, operation.ReturnToService)
 
-    @router.post("/{alarm}/reset", responses=ACTION_PROBLEMS, dependencies=ACT)
+    @router.post("/reset", responses=ACTION_PROBLEMS)
     async def reset_latched_alarm(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
         """Release the latch of an acknowledged alarm whose condition has cleared."""
         return await done(alarm, asked, operation.Reset)
 
-    @router.post("/{alarm}/comment", responses=COMMENT_PROBLEMS, dependencies=ACT)
+    @router.post("/comment", responses=ACTION_PROBLEMS | COMMENT_LIMIT)
     async def comment(request: Request, alarm: AlarmId, asked: CommentModel) -> AlarmModel:
         """Add a comment to the events of an alarm; the state of the alarm does not change."""
         allowances.take(request, context.clock.monotonic_s())
