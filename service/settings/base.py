@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import fields
+from functools import cache
 from itertools import pairwise
 from textwrap import dedent
 from typing import Annotated, Any
@@ -59,14 +60,23 @@ def describe_fields(schema: dict[str, Any], model: type[Any]) -> None:
     """
     properties = schema.get("properties", {})
     for kind in model.__mro__:
-        with suppress(OSError, TypeError):  # its source does not exist
-            [definition] = ast.parse(dedent(inspect.getsource(kind))).body
-            for field, text in pairwise(getattr(definition, "body", ())):
-                match field, text:
-                    case ast.AnnAssign(ast.Name(name)), ast.Expr(ast.Constant(str(words))):
-                        served = name if name in properties else name.removesuffix("_ns")
-                        if served in properties:
-                            properties[served].setdefault("description", inspect.cleandoc(words))
+        for name, words in _docstrings_of(kind).items():
+            served = name if name in properties else name.removesuffix("_ns")
+            if served in properties:
+                properties[served].setdefault("description", words)
+
+
+@cache  # most models have the same base classes, whose source is long
+def _docstrings_of(kind: type[Any]) -> dict[str, str]:
+    """Return the docstrings of the fields that a class itself defines, by field."""
+    found = {}
+    with suppress(OSError, TypeError):  # its source does not exist
+        [definition] = ast.parse(dedent(inspect.getsource(kind))).body
+        for field, text in pairwise(getattr(definition, "body", ())):
+            match field, text:
+                case ast.AnnAssign(ast.Name(name)), ast.Expr(ast.Constant(str(words))):
+                    found[name] = inspect.cleandoc(words)
+    return found
 
 
 class Settings(BaseModel):
