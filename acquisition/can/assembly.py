@@ -133,6 +133,8 @@ class FrameAssembler:
                 blocks += self._take(key, data, arrived_ns, passed_ns)
             except FrameError:
                 self.refused[Refusal.UNDECODABLE] += 1
+            if self._senders.found:  # also what is held since before the detection may be mixed
+                blocks, self._held = [], []
         is_timed = not self._plan.counted or (steady_ns is not None and not self._device_waits)
         if self._held and (not is_timed or self._is_confirmed(passed_ns)):
             blocks += self._built(arrived_ns)

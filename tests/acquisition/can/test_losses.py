@@ -93,9 +93,9 @@ def assembler_of(counts_calibration):
         assembler = FrameAssembler(plan)
         gate = FrameGate(plan, assembler.refused)
 
-        def take(frames, arrived_ns):
+        def take(frames, arrived_ns, steady_ns=None):
             admitted = [gate.admit(can_message(frame)) for frame in frames]
-            return assembler.take([f for f in admitted if f is not None], arrived_ns)
+            return assembler.take([f for f in admitted if f is not None], arrived_ns, steady_ns)
 
         assembler.take_wire = take
         return assembler
@@ -132,6 +132,36 @@ def test_thousands_of_losses_are_counted_exactly(
     assert found == bus.expected
     assert blocks[0].first_index + found.total() == feed.n_samples
     assert len({block.epoch for block in blocks}) == 1
+
+
+def test_late_samples_of_two_modules_are_not_released_when_one_is_unplugged(
+    shape_of, assembler_of, counting_feed
+):
+    """They are held, because they are late, when the second module is noticed."""
+    shape, feed = shape_of(), counting_feed(n_channels=4)
+    encoder, assembler = FrameEncoder(shape), assembler_of(shape)
+    other, twin = FrameEncoder(shape), counting_feed(n_channels=4)
+    twin.advance(603)
+    arrived_ns, blocks = START_NS, []
+
+    def take(late_s, *sent):
+        nonlocal arrived_ns
+        arrived_ns += 83_333_333
+        time_ns = arrived_ns + round(late_s * 1e9)
+        return assembler.take_wire([f for frames in sent for f in frames], time_ns, time_ns)
+
+    for _ in range(12):
+        blocks += take(0.0, encoder.frames(feed.advance(BLOCK)))
+    for _ in range(8):
+        raw = twin.advance(BLOCK)
+        mixed = replace(raw, counts=raw.counts + 1000)
+        blocks += take(0.7, encoder.frames(feed.advance(BLOCK)), other.frames(mixed))
+    assert assembler.trouble
+    while assembler.trouble or blocks[-1].stop_index < feed.n_samples:
+        blocks += take(0.0, encoder.frames(feed.advance(BLOCK)))
+    for block in blocks:
+        index = np.arange(block.first_index, block.stop_index)
+        np.testing.assert_array_equal(block.counts[0], index % 2**15)
 
 
 async def test_a_lost_header_never_makes_old_slow_values_new(shape_of, assembler_of, counting_feed):
