@@ -40,6 +40,7 @@ import uvloop
 from ingest import cpu_s, daq, fetch, plant_file, processes
 
 from core.alarms.unit_alarms import UnitAlarms
+from core.monitor.assessment import Assessment
 from service.measuring.recorder import Recorder
 from service.store.store import Store
 
@@ -218,8 +219,9 @@ def launch(log: str, arguments: Sequence[str]) -> None:
 
     def noted_put(self: Any, findings: Any) -> None:
         put(self, findings)
-        for each in findings.assessments:
-            note("result", each.time_ns)
+        for each in findings:
+            if isinstance(each, Assessment):
+                note("result", each.time_ns)
 
     def noted_append(self: Any, assessments: Any, *others: Any, **more: Any) -> None:
         append(self, assessments, *others, **more)
