@@ -26,6 +26,8 @@ import psutil
 import uvloop
 from pymodbus.client import AsyncModbusTcpClient
 
+from service.app.analysis import APART_S
+
 DEMO = Path(__file__).parents[1] / "deploy" / "demo.toml"
 CORE_LIMIT = 0.30
 MEMORY_LIMIT_MIB = 420.0
@@ -38,7 +40,7 @@ UNITS_PER_DAQ = 25
 """A simulated unit takes one percent of a core; an overloaded simulator no longer answers."""
 REGISTERS_PER_READ = 125
 MIB = 2**20
-SEGMENT_SAMPLES, HOP_SAMPLES = 8192, 7168
+SEGMENT_SAMPLES, HOP_SAMPLES, RATE_HZ = 8192, 7168, 600.0
 
 
 def main() -> None:
@@ -201,7 +203,8 @@ def n_stored_results(url: str, unit: dict[str, Any]) -> int:
 
 def n_due_results(unit: dict[str, Any]) -> int:
     """Results that the samples of a unit allow, all bearings together."""
-    n_segments = (unit["source"]["n_stored"] - SEGMENT_SAMPLES) // HOP_SAMPLES + 1
+    n_held = round((int(unit["id"][1:]) - 1) * APART_S * RATE_HZ) % HOP_SAMPLES
+    n_segments = (unit["source"]["n_stored"] - n_held - SEGMENT_SAMPLES) // HOP_SAMPLES + 1
     return n_segments * len(unit["bearing_ids"])
 
 
