@@ -200,8 +200,11 @@ def _check_gaps(case: Case, unit: str, gaps: Sequence[Gap], runs: Sequence[Run])
         found.n_without_result += sum(stop - start for start, stop in left)
         # what was taken since the last result is lost with a process, and kept without a stop
         allowed = {*ends, *([run.stop] if run.life == after.life else [])}
+        # after a start, the first segment begins up to a hop after the first sample
+        stops = begins | ({after.start} if run.life != after.life else set())
         for start, stop in left:
-            least = plant.hop_samples if start == run.stop else plant.segment_samples
-            if start not in allowed or stop not in begins or stop - start >= least:
+            is_short = start == run.stop or stop == after.start
+            least = plant.hop_samples if is_short else plant.segment_samples
+            if start not in allowed or stop not in stops or stop - start >= least:
                 told = f"{start} to {stop} between {run} and {after}"
                 found.gaps.append(f"{unit}: nothing tells of {told}")
