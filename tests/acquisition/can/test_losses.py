@@ -138,27 +138,21 @@ def test_late_samples_of_two_modules_are_not_released_when_one_is_unplugged(
     shape_of, assembler_of, counting_feed
 ):
     """They are held, because they are late, when the second module is noticed."""
-    shape, feed = shape_of(), counting_feed(n_channels=4)
-    encoder, assembler = FrameEncoder(shape), assembler_of(shape)
-    other, twin = FrameEncoder(shape), counting_feed(n_channels=4)
+    shape, feed, twin = shape_of(), counting_feed(n_channels=4), counting_feed(n_channels=4)
+    encoder, other, assembler = FrameEncoder(shape), FrameEncoder(shape), assembler_of(shape)
     twin.advance(603)
-    arrived_ns, blocks = START_NS, []
-
-    def take(late_s, *sent):
-        nonlocal arrived_ns
-        arrived_ns += 83_333_333
-        time_ns = arrived_ns + round(late_s * 1e9)
-        return assembler.take_wire([f for frames in sent for f in frames], time_ns, time_ns)
-
-    for _ in range(12):
-        blocks += take(0.0, encoder.frames(feed.advance(BLOCK)))
+    sent = [(0.0, encoder.frames(feed.advance(BLOCK))) for _ in range(12)]
     for _ in range(8):
         raw = twin.advance(BLOCK)
-        mixed = replace(raw, counts=raw.counts + 1000)
-        blocks += take(0.7, encoder.frames(feed.advance(BLOCK)), other.frames(mixed))
-    assert assembler.trouble
-    while assembler.trouble or blocks[-1].stop_index < feed.n_samples:
-        blocks += take(0.0, encoder.frames(feed.advance(BLOCK)))
+        mixed = other.frames(replace(raw, counts=raw.counts + 1000))
+        sent.append((0.7, encoder.frames(feed.advance(BLOCK)) + mixed))
+    sent += [(0.0, encoder.frames(feed.advance(BLOCK))) for _ in range(12)]
+    blocks = []
+    for number, (late_s, frames) in enumerate(sent):
+        time_ns = START_NS + round((number / 12.0 + late_s) * 1e9)
+        blocks += assembler.take_wire(frames, time_ns, time_ns)
+        assert assembler.trouble or number != 19
+    assert blocks[-1].stop_index == feed.n_samples
     for block in blocks:
         index = np.arange(block.first_index, block.stop_index)
         np.testing.assert_array_equal(block.counts[0], index % 2**15)

@@ -57,9 +57,8 @@ def recording(plant: PlantFile, tmp_path: Path) -> Path:
 
 
 def test_samples_are_not_taken_from_the_queue_that_a_running_service_reads(plant_path, tmp_path):
-    queue = 'kind = "modbus_fifo"\nhost = "127.0.0.1"\nlayout = "per_channel"\naddresses = ' + str(
-        [*range(1, 13)]
-    )
+    queue = 'kind = "modbus_fifo"\nhost = "127.0.0.1"\nlayout = "per_channel"\naddresses = '
+    queue += str([*range(1, 13)])
     text = plant_path.read_text(encoding="utf-8").replace('kind = "simulated"', queue)
     plant_path.write_text(text, encoding="utf-8")
     with exclusive_use(database_path(load_plant_file(plant_path))):
