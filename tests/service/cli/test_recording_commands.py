@@ -64,7 +64,6 @@ def test_samples_are_not_taken_from_the_queue_that_a_running_service_reads(plant
     with exclusive_use(database_path(load_plant_file(plant_path))):
         result = padwatch("record", plant_path, "--unit", "U1", "--out", tmp_path / "run")
     assert (result.exit_code, "another padwatch" in result.output) == (1, True), result.output
-    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.long

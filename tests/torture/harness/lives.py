@@ -113,13 +113,15 @@ class Replay:
         for run in runs:
             if monitor is None or run.life != life:
                 monitor, life = UnitMonitor(self._machine, self._analysis), run.life
+                monitor.go_on(None, run.start % self._plant.slot_samples)
             for raw in self._slots(run, epoch):
                 yield from monitor.steps(replace(raw, calibration=self._calibration))
 
     def _slots(self, run: Run, epoch: int) -> Iterator[SampleBlock]:
         slot = self._plant.slot_samples
-        feed = LedgerFeed(self._plant, self._number, self._t0_ns, epoch, run.start)
-        for _ in range(run.start, run.stop, slot):
+        start = run.start - run.start % slot  # blocks of the device
+        feed = LedgerFeed(self._plant, self._number, self._t0_ns, epoch, start)
+        for _ in range(start, run.stop, slot):
             yield feed.advance(slot)
 
 
@@ -138,12 +140,12 @@ def uncovered(gaps: Sequence[Gap], start: int, stop: int) -> list[tuple[int, int
 
 
 def taken(runs: Sequence[Run], gaps: Sequence[Gap]) -> list[Run]:
-    """All that was taken: runs, and between two gaps what did not suffice for a result."""
+    """Runs, and what did not suffice for a result, without what precedes a first segment."""
     ends = {gap.first_index + gap.n_samples for gap in gaps}
     short = [
         Run(after.life, start, stop)
         for run, after in pairwise(runs)
         for start, stop in uncovered(gaps, run.stop, after.start)
-        if start in ends
+        if start in ends and (run.life == after.life or stop != after.start)
     ]
     return sorted([*runs, *short], key=lambda run: run.start)
