@@ -79,20 +79,20 @@ def recordings_in(root: Path) -> list[Recording]:
     return [open_recording(folder) for folder in sorted(root.iterdir())]
 
 
-def test_a_kill_at_any_moment_loses_nothing_synced_and_tells_the_hole(tmp_path, unit, monkeypatch):
+def test_a_kill_at_any_moment_loses_nothing_synced_and_tells_the_hole(root, unit, monkeypatch):
     blocks = [counted_block(n) for n in range(N_BLOCKS)]
     later = [counted_block(n) for n in range(N_BLOCKS + 5, N_BLOCKS + 15)]
+    root.mkdir()
     with killed_at(10**9, monkeypatch) as done:
-        record(tmp_path / "whole", unit, blocks, [0])
+        record(root / "whole", unit, blocks, [0])
     assert len(done) > 25
     for deed in range(len(done)):
-        root, synced = tmp_path / f"{deed}", [0]
+        place, synced = root / f"{deed}", [0]
         with killed_at(deed, monkeypatch), pytest.raises(Killed):
-            record(root, unit, blocks, synced)
-        recover(root)
-        record(root, unit, later, [0])
-        found, missing = account(recordings_in(root))
-
+            record(place, unit, blocks, synced)
+        recover(place)
+        record(place, unit, later, [0])
+        found, missing = account(recordings_in(place))
         assert found == sorted(set(found)), f"killed at {deed}: twice"
         assert found[: synced[0]] == list(range(synced[0])), f"killed at {deed}: lost"
         n_before = len(found) - len(later) * BLOCK
@@ -101,22 +101,22 @@ def test_a_kill_at_any_moment_loses_nothing_synced_and_tells_the_hole(tmp_path, 
         assert len(found) + missing == told, f"killed at {deed}: not accounted for"
 
 
-def test_a_kill_during_recovery_changes_nothing(tmp_path, unit, monkeypatch):
+def test_a_kill_during_recovery_changes_nothing(root, unit, monkeypatch):
     blocks = [counted_block(n) for n in range(15)]
 
-    def crashed(root: Path) -> None:
-        tape = UnitRecorder(root, unit, SETTINGS)
+    def crashed(place: Path) -> None:
+        tape = UnitRecorder(place, unit, SETTINGS)
         for each in blocks:
             tape.write(each, 0.0)
 
-    crashed(tmp_path / "whole")
+    crashed(root / "whole")
     with killed_at(10**9, monkeypatch) as done:
-        recover(tmp_path / "whole")
+        recover(root / "whole")
     for deed in range(len(done)):
-        root = tmp_path / f"{deed}"
-        crashed(root)
+        place = root / f"{deed}"
+        crashed(place)
         with killed_at(deed, monkeypatch), pytest.raises(Killed):
-            recover(root)
-        recover(root)
+            recover(place)
+        recover(place)
 
-        assert account(recordings_in(root)) == (numbers(0, 10), 0), f"killed at {deed}"
+        assert account(recordings_in(place)) == (numbers(0, 10), 0), f"killed at {deed}"
