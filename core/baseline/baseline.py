@@ -1,11 +1,13 @@
 """`BearingBaseline`: learned film stiffness of a bearing, with its origin."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from core.arrays import BoolArray, FloatArray, IntArray
 from core.baseline.cell_table import NODES, CellTable
+from core.baseline.grouping import ewma_weight
 from core.baseline.history import QUANTITIES, StiffnessHistory
 from core.baseline.surface import ATTITUDE_TERMS, Surface, attitude_terms
 from core.condition.cells import CellGrid, FilmConditions
@@ -142,6 +144,11 @@ class QuantityBaseline:
         if times_h != sorted(set(times_h)):
             found = ", ".join(f"{time_h:g} h" for time_h in times_h)
             raise ValueError(f"time scales of time_scatter must increase, got {found}")
+
+    @cached_property
+    def scale_weights(self) -> tuple[float, ...]:
+        """Weight of a new reading in the sums over each time scale."""
+        return tuple(ewma_weight(time.time_scale_h, self.reading_h) for time in self.time_scatter)
 
     @property
     def direction(self) -> str:

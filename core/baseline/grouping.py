@@ -126,8 +126,3 @@ def ewma(x: FloatArray, alpha: float) -> FloatArray:
     from scipy.signal import lfilter  # slow import, not needed at start-up
 
     return np.asarray(lfilter([alpha], [1.0, alpha - 1.0], x))
-
-
-def ewma_step(total: float, x: float, alpha: float) -> float:
-    """Return the moving average `total` after one more value x: (1 - alpha) total + alpha x."""
-    return total * (1.0 - alpha) + alpha * x

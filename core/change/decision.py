@@ -12,7 +12,7 @@ from core.arrays import BoolArray, FloatArray
 from core.baseline.baseline import QuantityBaseline
 from core.baseline.history import CodeArray, ReadingOutcome
 from core.change.evidence import NO_EVIDENCE, Comparison, Finding, GatheredEvidence
-from core.change.settings import ALERT_MARGIN, DANGER_MARGIN, ChangeLimits
+from core.change.settings import ALERT_MARGIN, DANGER_MARGIN, MIN_SIGNIFICANCE, ChangeLimits
 from core.condition.cells import FilmConditions
 from core.limits import INACTIVE, AlarmLevel, DelayTimer
 from core.units import NS_PER_S
@@ -142,18 +142,24 @@ def step(
     last_ns = decision.last_counted_ns
     half_ns = round(0.5 * baseline.reading_h * 3600.0 * NS_PER_S)
     if last_ns is not None and time_ns - last_ns < half_ns:
-        return replace(decision, verdict=_verdict(decision, baseline, limits), last_ns=time_ns)
+        before = (decision.evidence, decision.finding, decision.alert, decision.danger)
+        return replace(decision, verdict=_verdict(*before, baseline, limits), last_ns=time_ns)
     evidence = decision.evidence.step(outcome, baseline)
     findings = evidence.findings(baseline)
+    finding = max(findings, key=lambda finding: finding.significance, default=None)
+    is_quiet = finding is None or finding.significance < MIN_SIGNIFICANCE  # nearly always
     alert, danger = (
-        _level_step(timer, time_ns, findings, change, margin, baseline, limits)
+        INACTIVE
+        if is_quiet and not timer.is_on
+        else _level_step(timer, time_ns, findings, change, margin, baseline, limits)
         for timer, change, margin in (
             (decision.alert, limits.alert_change, ALERT_MARGIN),
             (decision.danger, limits.danger_change, DANGER_MARGIN),
         )
     )
-    decision = Decision(
-        finding=max(findings, key=lambda finding: finding.significance, default=None),
+    return Decision(
+        verdict=_verdict(evidence, finding, alert, danger, baseline, limits),
+        finding=finding,
         deviation=outcome.deviation,
         deviation_std=_deviation_std(outcome, baseline),
         evidence=evidence,
@@ -162,7 +168,6 @@ def step(
         last_ns=time_ns,
         last_counted_ns=time_ns,
     )
-    return replace(decision, verdict=_verdict(decision, baseline, limits))
 
 
 def _deviation_std(compared: Comparison, baseline: QuantityBaseline) -> float:
@@ -196,7 +201,7 @@ def _is_exceeded(finding: Finding, limit: float, margin: float, limits: ChangeLi
     """Whether a change is significant, and exceeds the limit by `margin` standard uncertainties."""
     significance = finding.significance
     threshold = limits.significance_threshold(finding.time_scale_h)
-    surely = finding.change * (1.0 - margin / max(significance, 1e-9))
+    surely = finding.change * (1.0 - margin / significance)
     return significance >= threshold and abs(math.expm1(surely)) >= limit
 
 
@@ -207,12 +212,19 @@ def _is_held(finding: Finding, limit: float, limits: ChangeLimits) -> bool:
     return finding.significance > threshold and size > limit - limits.deadband
 
 
-def _verdict(decision: Decision, baseline: QuantityBaseline, limits: ChangeLimits) -> Verdict:
+def _verdict(
+    evidence: GatheredEvidence,
+    finding: Finding | None,
+    alert: DelayTimer,
+    danger: DelayTimer,
+    baseline: QuantityBaseline,
+    limits: ChangeLimits,
+) -> Verdict:
     """Return the verdict on a reading that was compared with its baseline."""
-    if decision.level is not None:
-        return Verdict(int(decision.level))
-    counted_h = decision.evidence.n_counted * baseline.reading_h
-    is_enough = decision.finding is not None and counted_h >= limits.min_evidence_h
+    if danger.is_on or alert.is_on:
+        return Verdict.DANGER if danger.is_on else Verdict.ALERT
+    counted_h = evidence.n_counted * baseline.reading_h
+    is_enough = finding is not None and counted_h >= limits.min_evidence_h
     # a change beyond the limit is not normal, even before the on-delay has elapsed
-    is_normal = is_enough and decision.alert.opposed_ns == 0
+    is_normal = is_enough and alert.opposed_ns == 0
     return Verdict.NORMAL if is_normal else Verdict.GATHERING_EVIDENCE

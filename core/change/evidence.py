@@ -3,13 +3,13 @@
 import math
 from dataclasses import dataclass
 from statistics import median
+from typing import NamedTuple
 
 from core.baseline.baseline import QuantityBaseline, TimeScatter
-from core.baseline.grouping import MEDIAN_READINGS, ewma_step, ewma_weight
+from core.baseline.grouping import MEDIAN_READINGS
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
+class Comparison(NamedTuple):
     """Comparison of one reading with its baseline, one row of `Deviations`.
 
     Parameters
@@ -27,8 +27,7 @@ class Comparison:
     u_random: float
 
 
-@dataclass(frozen=True, slots=True)
-class ScaleSums:
+class ScaleSums(NamedTuple):
     """Exponentially weighted sums (moving averages from 0) over one time scale.
 
     `fill` is the sum of ones, which approaches 1 as the time scale elapses; `weight` is the sum of
@@ -46,13 +45,13 @@ class ScaleSums:
 
         `middle`, the running median deviation, is added instead of the reading's own deviation.
         """
-        weight = compared.weight
+        weight, kept = compared.weight, 1.0 - alpha
         return ScaleSums(
-            ewma_step(self.fill, 1.0, alpha),
-            ewma_step(self.weight, weight, alpha),
-            ewma_step(self.deviation, weight * middle, alpha),
-            ewma_step(self.scatter, weight * compared.scatter, alpha),
-            ewma_step(self.offset, weight * compared.offset_std, alpha),
+            self.fill * kept + alpha,
+            self.weight * kept + alpha * weight,
+            self.deviation * kept + alpha * (weight * middle),
+            self.scatter * kept + alpha * (weight * compared.scatter),
+            self.offset * kept + alpha * (weight * compared.offset_std),
         )
 
     def finding(self, time: TimeScatter) -> "Finding":
@@ -67,8 +66,7 @@ class ScaleSums:
         return Finding(time.time_scale_h, self.deviation / self.weight, std)
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
+class Finding(NamedTuple):
     """Mean deviation of ln k from the baseline over a time scale, with its standard uncertainty.
 
     `std` is the standard uncertainty expected for an unchanged film.
@@ -111,8 +109,8 @@ class GatheredEvidence:
             self.n_counted + 1,
             newest,
             tuple(
-                sums.step(compared, middle, ewma_weight(time.time_scale_h, baseline.reading_h))
-                for sums, time in zip(scales, times, strict=True)
+                sums.step(compared, middle, alpha)
+                for sums, alpha in zip(scales, baseline.scale_weights, strict=True)
             ),
         )
 
