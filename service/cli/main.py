@@ -22,6 +22,7 @@ def main() -> NoReturn:
     An internal error is printed as one line, and its traceback is written to a temporary file.
     """
     os.umask(PRIVATE)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: threads only spin
     leave(_exit_code())
 
 

@@ -1,7 +1,11 @@
 """Simulated year before the first start: readings, a baseline learned from them, and trends."""
 
-from collections.abc import Iterator, Mapping
+import signal
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from itertools import groupby
+from multiprocessing import get_context
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -10,13 +14,13 @@ from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
 from core.baseline.history import DIRECTIONS, QUANTITIES, StiffnessHistory
 from core.baseline.learning import learn
+from core.baseline.settings import BaselineSettings
 from core.change.backtest import DecisionHistory, OperationHistory, decide_all, operation_history
 from core.change.settings import FilmRules
 from core.change.shaft_response import learn_response
 from core.machine.unit import Estimator
 from core.stiffness.estimators import ESTIMATORS
 from service.settings.core_values import film_rules_of
-from service.settings.films import FilmAlarmSettings
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
 from service.store.baselines import BaselineStep, StoredStep
@@ -62,43 +66,61 @@ def fill(
     StoreError
         If the store cannot be read or written.
     """
-    for unit, rules in list(_new_units(store, plant)):
-        if past := pasts.get(unit.id):
-            _fill_unit(store, unit, rules, plant.films, past, now_ns)
+    every_ten_minutes = plant.films.baseline.settings(1.0 / 6.0)
+    films = [
+        (
+            *(pasts[unit.id][bearing], rules, every_ten_minutes),
+            Origin(unit.id, bearing, estimator, 1, AUTHOR, now_ns, EVENT),
+        )
+        for unit, rules in _new_units(store, plant)
+        if pasts.get(unit.id)
+        for bearing, estimator in rules.estimators.items()
+    ]
+    ignoring_interrupts = (signal.signal, (signal.SIGINT, signal.SIG_IGN))
+    # two processes, because a user waits for the first page
+    with get_context("spawn").Pool(2, *ignoring_interrupts) as pool:
+        found = pool.imap(_past_of, films)
+        for unit_id, bearings in groupby(found, lambda past: past[1].origin.unit):
+            _fill_unit(store, pasts[unit_id], bearings, now_ns)
+
+
+Past: TypeAlias = tuple[FilmHistory, BearingBaseline, dict[str, FloatArray]]
+"""Readings of a bearing with decisions, the baseline learned from them, and trends."""
+
+
+def _past_of(film: tuple[StiffnessHistory, FilmRules, BaselineSettings, Origin]) -> Past:
+    history, rules, settings, origin = film
+    estimator = Estimator(origin.estimator)
+    if ESTIMATORS[estimator].ck is None:
+        nothing = np.full(history.ln_ck.shape, np.nan)
+        history = replace(history, ln_ck=nothing, u_ck=nothing)
+    operation = operation_history(
+        *(history.time_ns, history.speed_rpm, history.power_mw, rules.operating),
+        history.oil_temperature_c,
+    )
+    learned = learn(history, operation.is_settled, origin, settings)
+    return judged(history, operation, learned, rules), learned, _trends(history, estimator)
 
 
 def _fill_unit(
     store: FilmStore,
-    unit: UnitSettings,
-    rules: FilmRules,
-    settings: FilmAlarmSettings,
     past: Mapping[str, StiffnessHistory],
+    bearings: Iterable[Past],
     now_ns: int,
 ) -> None:
     settled = []
-    for bearing, estimator in rules.estimators.items():
-        history = past[bearing]
-        if ESTIMATORS[estimator].ck is None:
-            nothing = np.full(history.ln_ck.shape, np.nan)
-            history = replace(history, ln_ck=nothing, u_ck=nothing)
-        operation = operation_history(
-            *(history.time_ns, history.speed_rpm, history.power_mw, rules.operating),
-            history.oil_temperature_c,
-        )
-        settled.append(operation.is_settled)
-        origin = Origin(unit.id, bearing, estimator, 1, AUTHOR, now_ns, EVENT)
-        every_ten_minutes = settings.baseline.settings(1.0 / 6.0)
-        learned = learn(history, operation.is_settled, origin, every_ten_minutes)
-        films = judged(history, operation, learned, rules)
-        store.add_past(unit.id, bearing, estimator, films, _trends(history, estimator))
+    for films, learned, trends in bearings:
+        of = learned.origin
+        settled.append(films.is_settled)
+        store.add_past(of.unit, of.bearing, Estimator(of.estimator), films, trends)
         steps = [
-            StoredStep(unit.id, bearing, 1, step, now_ns, AUTHOR, EVENT)
+            StoredStep(of.unit, of.bearing, 1, step, now_ns, AUTHOR, EVENT)
             for step in (BaselineStep.LEARNED, BaselineStep.ACCEPTED)
         ]
         store.add_baseline(learned, steps)
     response = learn_response(past, np.logical_and.reduce(settled))
     if response is not None:
-        store.set_response(unit.id, response, now_ns)
+        store.set_response(of.unit, response, now_ns)
 
 
 def judged(
