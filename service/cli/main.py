@@ -1,5 +1,6 @@
 """Entry point of the `padwatch` command."""
 
+import gc
 import os
 import tempfile
 import traceback
@@ -11,6 +12,7 @@ from service.cli import commands
 from service.runtime.process import leave
 
 EXIT_BUG = 70
+EXIT_INTERRUPTED = 130
 
 PRIVATE = 0o077
 """umask: only the owner reads files; the database holds password hashes."""
@@ -23,7 +25,10 @@ def main() -> NoReturn:
     """
     os.umask(PRIVATE)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: threads only spin
-    leave(_exit_code())
+    code = _exit_code()
+    if code == EXIT_INTERRUPTED:
+        gc.collect()  # frees the semaphores of a pool of processes, which `leave` would leak
+    leave(code)
 
 
 def _exit_code() -> int:
