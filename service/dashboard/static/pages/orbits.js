@@ -25,8 +25,8 @@ const LAG_S = 3.5;
 /** Without new samples for so long, motion is no longer live, s. */
 const STALE_S = 8;
 
-/** Longest step of the picture: a tab that slept does not leap, s. */
-const LONGEST_STEP_S = 0.25;
+/** Steps of the picture: thirty a second are smooth, and a tab that slept does not leap, s. */
+const [SHORTEST_STEP_S, LONGEST_STEP_S] = [0.03, 0.25];
 
 /** Returns `{ draw(view), close() }`. */
 export function orbitsPage(main, unit, bearing) {
@@ -50,7 +50,7 @@ export function orbitsPage(main, unit, bearing) {
   let at = { ...STOPPED, isPlaying: !isStill };
   let trouble = null;
   let reference = null;
-  let shownMs = null;
+  let shownMs = 0;
   let hasSamples = false;
   let staleness = null;
 
@@ -121,7 +121,8 @@ export function orbitsPage(main, unit, bearing) {
 
   function frame(nowMs) {
     timer = requestAnimationFrame(frame);
-    const elapsedS = shownMs === null ? 0 : Math.min((nowMs - shownMs) / 1000, LONGEST_STEP_S);
+    const elapsedS = Math.min((nowMs - shownMs) / 1000, LONGEST_STEP_S);
+    if (elapsedS < SHORTEST_STEP_S) return;
     shownMs = nowMs;
     if (!at.isPlaying || clip === null) return;
     at = advanced(at, elapsedS, clip, source.isLive && !follows());
