@@ -6,8 +6,7 @@ from importlib.metadata import version
 from threading import Lock
 from typing import Any
 
-from fastapi import APIRouter, Depends, FastAPI, Request, Response
-from fastapi.routing import APIRoute
+from fastapi import Depends, FastAPI, Request, Response
 from starlette.types import ASGIApp
 
 from service.api.answers import (
@@ -20,7 +19,15 @@ from service.api.answers import (
 )
 from service.api.auth.accounts import access_router
 from service.api.auth.credentials import COOKIE
-from service.api.auth.gate import OPEN, Declared, Gate, declared, require_declared
+from service.api.auth.gate import (
+    OPEN,
+    Declared,
+    Gate,
+    GuardedRouter,
+    declared,
+    operation_id,
+    require_declared,
+)
 from service.api.auth.sessions import session_router
 from service.api.context import Context
 from service.api.health import RequestMetrics, health_router
@@ -29,7 +36,6 @@ from service.api.problems import (
     WORDS,
     install_problem_handlers,
     problem_schemas,
-    refuse_unknown_parameters,
 )
 from service.api.routes.alarm_rates import alarm_rate_router
 from service.api.routes.alarms import alarm_router, operation_router
@@ -85,13 +91,6 @@ NOT_MODIFIED = {
     "description": "Unchanged since the answer of that `ETag`",
     "headers": {"ETag": ETAG, **HEADERS},
 }
-
-
-def operation_id(route: APIRoute) -> str:
-    """Return the operation id of a route, such as ``get_units_unit_bearings``."""
-    path = route.path_format.removeprefix("/api/v1/").strip("/")
-    [method] = route.methods or {""}
-    return f"{method.lower()}_{path.translate(str.maketrans('/-.', '___', '{}'))}"
 
 
 SCHEMES = {
@@ -175,7 +174,7 @@ Times are UTC, RFC 3339. Errors are problem documents (RFC 9457).
 """
 
 
-def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi:
+def create_app(context: Context, others: Iterable[GuardedRouter] = ()) -> GuardedApi:
     """Return the application of the API; `others` are routers of other packages."""
     app = GuardedApi(
         title="padwatch",
@@ -184,7 +183,7 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
         responses=EVERY_OPERATION,
         generate_unique_id_function=operation_id,
     )
-    app.state.clock = context.clock
+    app.state.clock, app.state.context = context.clock, context
     authenticator, requests = context.access, RequestMetrics()
     app.repeating = partial(
         Repetition,
@@ -210,15 +209,6 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
         """Return the OpenAPI document, which is rendered once, not for each request."""
         return await context.answers.of(request, lambda: 0, app.openapi)
 
-    async def require_known(request: Request) -> None:
-        """Refuse parameters that a route does not have, and unknown units and bearings."""
-        await refuse_unknown_parameters(request)
-        match request.path_params:
-            case {"unit": unit, "bearing": bearing}:
-                context.bearing(unit, bearing)
-            case {"unit": unit}:
-                context.unit(unit)
-
     for router in (
         # routes are tried in this order: first those that every open page polls
         overview_router(context),
@@ -241,6 +231,6 @@ def create_app(context: Context, others: Iterable[APIRouter] = ()) -> GuardedApi
         access_router(context, authenticator),
         *others,
     ):
-        app.include_router(router, dependencies=[Depends(require_known)])
+        app.router.routes += router.routes
     app.declared = declared(app)  # raises an error for a route without a declaration
     return app

@@ -3,13 +3,13 @@
 import time
 from typing import Literal
 
-from fastapi import APIRouter, Response
+from fastapi import Response
 from prometheus_client import CollectorRegistry, Histogram
 from prometheus_client.exposition import generate_latest
 from prometheus_client.process_collector import ProcessCollector
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.auth.gate import OPEN, needs
+from service.api.auth.gate import OPEN, GuardedRouter, needs
 from service.api.context import Context
 from service.api.downloads import file_content
 from service.api.values import ApiModel
@@ -80,12 +80,12 @@ padwatch_link_connected{unit="U1"} 1.0
 WORDS = "Metrics in the Prometheus text format"
 
 
-def health_router(context: Context, requests: RequestMetrics) -> APIRouter:
+def health_router(context: Context, requests: RequestMetrics) -> GuardedRouter:
     """Return the router for liveness and readiness, and for metrics if the context has them.
 
     `requests` are the metrics of this process, appended to those of the measuring process.
     """
-    router = APIRouter(tags=["health"])
+    router = GuardedRouter(tags=["health"])
 
     @router.get("/livez", dependencies=[OPEN])
     async def liveness() -> HealthModel:

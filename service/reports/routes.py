@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 from urllib.parse import quote
 
 import structlog
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import Path, Query, Request, Response
 from fastapi.responses import HTMLResponse, StreamingResponse
 from pydantic import Field
 
 from acquisition.clock import Clock
-from service.api.auth.gate import identity_of, needs
+from service.api.auth.gate import GuardedRouter, identity_of, needs
 from service.api.context import Context
 from service.api.downloads import Downloads, attachment, file_content
 from service.api.problems import ProblemError, problem_responses
@@ -188,9 +188,9 @@ SAFE = {"X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer"}
 log = structlog.get_logger()
 
 
-def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter:
+def evidence_router(context: Context, desk: EvidenceService | None) -> GuardedRouter:
     """Return the read-only routes of evidence; they respond with 404 if `desk` is None."""
-    router = APIRouter(
+    router = GuardedRouter(
         prefix="/api/v1/alarms/{alarm}/evidence",
         tags=["alarms"],
         dependencies=[needs(Permission.READ)],

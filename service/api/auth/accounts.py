@@ -2,11 +2,11 @@
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, Path, Request
+from fastapi import Depends, Path, Request
 from pydantic import FailFast, Field
 
 from service.api.auth.authenticator import Authenticator
-from service.api.auth.gate import Reach, identity_of, name_caller, subject_router
+from service.api.auth.gate import GuardedRouter, Reach, identity_of, name_caller, subject_router
 from service.api.auth.passwords import MAX_LENGTH
 from service.api.context import Context
 from service.api.problems import ProblemError, problem_responses
@@ -131,7 +131,7 @@ KeyId = Annotated[
 ]
 
 
-def access_router(context: Context, authenticator: Authenticator) -> APIRouter:
+def access_router(context: Context, authenticator: Authenticator) -> GuardedRouter:
     """Return the router for accounts and API keys."""
     store, now_ns = authenticator.store, authenticator.clock.now_ns
     change = authenticator.change

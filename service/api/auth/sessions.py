@@ -3,13 +3,13 @@
 from dataclasses import replace
 from typing import Annotated
 
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
 from pydantic import Field
 
 from service.api.auth.accounts import NEW_PROBLEMS, LoginName, Password, RoleName
 from service.api.auth.authenticator import Authenticator, LoggedIn, tidy_name
 from service.api.auth.credentials import COOKIE, PLAIN_COOKIE, Caller
-from service.api.auth.gate import OPEN, Reach, caller_of, identity_of, needs
+from service.api.auth.gate import OPEN, GuardedRouter, Reach, caller_of, identity_of, needs
 from service.api.auth.passwords import PasswordRefusedError
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel
@@ -79,9 +79,9 @@ SET_UP_PROBLEMS = NEW_PROBLEMS | problem_responses(
 )
 
 
-def session_router(authenticator: Authenticator) -> APIRouter:
+def session_router(authenticator: Authenticator) -> GuardedRouter:
     """Return the router for sessions and for the creation of the first account."""
-    router = APIRouter(prefix="/api/v1", tags=["access"])
+    router = GuardedRouter(prefix="/api/v1", tags=["access"])
 
     async def session_model(caller: Caller) -> SessionModel:
         identity = caller.identity

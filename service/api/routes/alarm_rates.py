@@ -5,14 +5,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Annotated
 
-from fastapi import APIRouter
 from pydantic import Field
 
 from core.alarms.alarm import PLANT, AlarmEvent
 from core.alarms.statistics import figures_of, stale_alarms
 from core.limits import AlarmLevel
 from core.units import DAY_NS
-from service.api.auth.gate import Reach, needs, subject_router
+from service.api.auth.gate import GuardedRouter, Reach, needs, subject_router
 from service.api.context import Context
 from service.api.parameters import Moment, OnlyUnit, ns_from_datetime, parameter, require_order
 from service.api.problems import ProblemError, problem_responses
@@ -138,7 +137,7 @@ START = "Start of the range; default: seven days before its end.", "2026-11-14T0
 END = "End of the range; default: now.", "2026-11-21T09:00:00Z"
 
 
-def alarm_rate_router(context: Context) -> APIRouter:
+def alarm_rate_router(context: Context) -> GuardedRouter:
     """Return the router for alarm performance figures, and for the delivery of messages."""
     router = subject_router("", "alarms", reach=Reach.ASKED)
 

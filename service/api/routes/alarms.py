@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 from functools import partial
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Path, Request, Response
+from fastapi import Depends, Path, Request, Response
 from pydantic import Field
 
 from core.alarms import operation
@@ -14,7 +14,7 @@ from core.limits import AlarmLevel
 from core.units import ns_from_s
 from service.api.answers import rendered
 from service.api.auth.backoff import TokenBucket
-from service.api.auth.gate import Reach, actor_or, identity_of, needs, subject_router
+from service.api.auth.gate import GuardedRouter, Reach, actor_or, identity_of, needs, subject_router
 from service.api.context import Context
 from service.api.parameters import (
     Attitude,
@@ -151,7 +151,7 @@ class Allowances(dict[str, TokenBucket]):
             raise ProblemError(429, "Wait", detail, headers=wait)
 
 
-def alarm_router(context: Context) -> APIRouter:
+def alarm_router(context: Context) -> GuardedRouter:
     """Return the router that reads alarms; it must follow other routers for ``/alarms/...``."""
     router = subject_router("/alarms", "alarms")
     revision = alarm_list_revision(context)
@@ -210,7 +210,7 @@ def alarm_router(context: Context) -> APIRouter:
     return router
 
 
-def operation_router(context: Context) -> APIRouter:
+def operation_router(context: Context) -> GuardedRouter:
     """Return the router for operations on alarms; each operation returns the changed alarm."""
     router = subject_router("/alarms/{alarm}", "alarms", Permission.ACT_ON_ALARMS)
     allowances = Allowances()

@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import Depends, Response
 from pydantic import BeforeValidator, Field
 from pydantic_core import from_json
 
 from service.api.answers import rendered
-from service.api.auth.gate import subject_router
+from service.api.auth.gate import GuardedRouter, subject_router
 from service.api.context import Context
 from service.api.parameters import OptionalTimeRange, at_most, only, parameter
 from service.api.tables import Column, Format, table_content, table_response
@@ -140,7 +140,7 @@ def read_page(
     return page, ",".join(f"{name}:{number}" for name, number in numbers.items())
 
 
-def audit_router(context: Context) -> APIRouter:
+def audit_router(context: Context) -> GuardedRouter:
     """Return the router for the audit trail."""
     router = subject_router("/audit", "audit", Permission.READ_AUDIT)
     chains = {each.chain: each for each in (context.store.audit, context.access.store.audit)}

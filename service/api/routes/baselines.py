@@ -4,7 +4,7 @@ import asyncio
 from typing import Annotated, Literal
 
 import numpy as np
-from fastapi import APIRouter, Path, Response
+from fastapi import Path, Response
 from pydantic import Field
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
@@ -13,7 +13,7 @@ from core.baseline.history import absolute_and_ratio
 from core.condition.cells import CellGrid
 from core.machine.unit import Estimator
 from service.api.answers import rendered
-from service.api.auth.gate import actor_or, needs, subject_router
+from service.api.auth.gate import GuardedRouter, actor_or, needs, subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.downloads import file_content
 from service.api.parameters import Moment, ns_from_datetime
@@ -235,7 +235,7 @@ EXPORTED = file_content(
 )
 
 
-def baseline_router(context: Context) -> APIRouter:
+def baseline_router(context: Context) -> GuardedRouter:
     """Return the router for baselines; each action on baselines returns the changed baselines."""
     router = subject_router("/units/{unit}/bearings/{bearing}/baselines", "baselines")
 

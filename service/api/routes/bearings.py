@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
 from pydantic import Field
 
 from core.machine.unit import Estimator
@@ -13,7 +13,7 @@ from core.monitor.catalogue import quantity_named, quantity_of
 from core.spectra.runout import RunoutVerdict
 from core.spectra.speed import SpeedSource
 from core.stiffness.estimators import ESTIMATORS, reported_name
-from service.api.auth.gate import actor_or, needs, subject_router
+from service.api.auth.gate import GuardedRouter, actor_or, needs, subject_router
 from service.api.context import BearingId, Context, QuantityName, UnitId
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import (
@@ -243,7 +243,7 @@ def latest_model(live: LiveUnits, unit: str, bearing: str) -> LatestModel:
 TAKE_PROBLEMS = problem_responses(own={409: "The present condition does not permit a reference"})
 
 
-def bearing_router(context: Context) -> APIRouter:
+def bearing_router(context: Context) -> GuardedRouter:
     """Return the router for bearings."""
     router = subject_router("/units/{unit}/bearings", "bearing")
 

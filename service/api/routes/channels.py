@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Literal
 
 import numpy as np
-from fastapi import APIRouter, Response
+from fastapi import Response
 from pydantic import Field
 
 from acquisition.delivery.units import UNIT_OF
@@ -13,7 +13,7 @@ from core.arrays import SampleArray
 from core.quality import Level, Reason, bad, missing, worst
 from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
-from service.api.auth.gate import subject_router
+from service.api.auth.gate import GuardedRouter, subject_router
 from service.api.context import Context, UnitId
 from service.api.parameters import duration, several
 from service.api.problems import ProblemError, problem_responses
@@ -201,7 +201,7 @@ MAX_NUMBERS = 200_000
 """Maximum number of samples in one answer, summed over all channels."""
 
 
-def channel_router(context: Context) -> APIRouter:
+def channel_router(context: Context) -> GuardedRouter:
     """Return the router for channels."""
     router = subject_router("/units/{unit}", "plant")
 

@@ -7,14 +7,14 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 
 from core.baseline.history import DIRECTIONS, ReadingOutcome, absolute_and_ratio
 from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel
 from core.machine.unit import Estimator
-from service.api.auth.gate import subject_router
+from service.api.auth.gate import GuardedRouter, subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange, at_most
 from service.api.problems import problem_responses
@@ -205,7 +205,7 @@ MAX_READ = 120_000
 """Maximum number of readings that one request reads: two years of readings every ten minutes."""
 
 
-def film_history_router(context: Context) -> APIRouter:
+def film_history_router(context: Context) -> GuardedRouter:
     """Return the router for the stored readings of a film."""
     router = subject_router("/units/{unit}/bearings/{bearing}/film", "film")
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
 from pydantic import Field
 
 from core.baseline.baseline import BearingBaseline
@@ -15,7 +15,7 @@ from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading
 from core.change.settings import ChangeLimits, FilmRules, percent_of
 from core.machine.unit import Estimator
-from service.api.auth.gate import subject_router
+from service.api.auth.gate import GuardedRouter, subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import ProblemError
 from service.api.values import (
@@ -394,7 +394,7 @@ def watched_place(context: Context, unit: str, bearing: str) -> FilmPlace:
     return place
 
 
-def film_router(context: Context) -> APIRouter:
+def film_router(context: Context) -> GuardedRouter:
     """Return the router for the current state of a film."""
     router = subject_router("/units/{unit}/bearings/{bearing}/film", "film")
 

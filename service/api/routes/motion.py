@@ -3,13 +3,13 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from fastapi import APIRouter, Response
+from fastapi import Response
 from pydantic import BeforeValidator, Field
 
 from core.arrays import FloatArray
 from core.machine.unit import Bearing
 from service.api.answers import rendered
-from service.api.auth.gate import subject_router
+from service.api.auth.gate import GuardedRouter, subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import duration
 from service.api.routes.channels import NEWEST, NO_SAMPLES, count_of, held_blocks
@@ -127,7 +127,7 @@ MAX_SAMPLES = 60_000
 """Maximum number of samples per direction in one answer: 100 s at 600 Hz, about 2 MB."""
 
 
-def motion_router(context: Context) -> APIRouter:
+def motion_router(context: Context) -> GuardedRouter:
     """Return the router for the newest motion."""
     router = subject_router("/units/{unit}/bearings", "bearing")
 

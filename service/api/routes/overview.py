@@ -4,12 +4,12 @@ from collections.abc import Hashable
 from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
 from pydantic import Field
 
 from core.quality import Level, Reading
 from core.stiffness.estimators import is_reversed, reported_name
-from service.api.auth.gate import subject_router
+from service.api.auth.gate import GuardedRouter, subject_router
 from service.api.context import Context
 from service.api.parameters import parameter
 from service.api.routes.bearings import ResultModel, result_model
@@ -200,7 +200,7 @@ def _six_digits(value: float | None) -> float | None:
     return None if value is None else float(f"{value:.6g}")
 
 
-def overview_router(context: Context) -> APIRouter:
+def overview_router(context: Context) -> GuardedRouter:
     """Return the router for the overview."""
     router = subject_router("", "plant")
     shown = Overview(context)

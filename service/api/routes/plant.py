@@ -4,14 +4,14 @@ import asyncio
 import json
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
 from pydantic import Field
 
 from core.monitor.catalogue import CATALOGUE, quantity_named
 from core.samples.blocks import StampFault
 from core.samples.gaps import Gap
 from core.units import ns_from_s
-from service.api.auth.gate import Reach, actor_or, needs, subject_router
+from service.api.auth.gate import GuardedRouter, Reach, actor_or, needs, subject_router
 from service.api.context import Context, UnitId
 from service.api.downloads import file_content
 from service.api.parameters import Moment, OptionalTimeRange, TimeRange, ns_from_datetime
@@ -209,7 +209,7 @@ SCHEMA_TYPE = "application/schema+json"
 SCHEMA_OF_SCHEMA = {"type": "object", "examples": [{"title": "PlantFile", "type": "object"}]}
 
 
-def plant_router(context: Context) -> APIRouter:
+def plant_router(context: Context) -> GuardedRouter:
     """Return the router for units, sources, gaps, notes, quantities and the configuration."""
     router, allowances = subject_router("", "plant"), Allowances()
 

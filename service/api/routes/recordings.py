@@ -6,14 +6,14 @@ from contextlib import contextmanager
 from typing import Annotated, Literal
 
 import structlog
-from fastapi import APIRouter, Path, Response
+from fastapi import Path, Response
 from fastapi.responses import StreamingResponse
 from pydantic import Field
 
 from acquisition.delivery.units import UNIT_OF
 from acquisition.errors import ConfigError
 from service.api.answers import rendered
-from service.api.auth.gate import subject_router
+from service.api.auth.gate import GuardedRouter, subject_router
 from service.api.context import Context
 from service.api.downloads import attachment, file_content
 from service.api.parameters import at_most, duration, only, parameter
@@ -188,7 +188,7 @@ Pieces = Generator[bytes, None, None]
 log = structlog.get_logger()
 
 
-def recording_router(context: Context) -> APIRouter:
+def recording_router(context: Context) -> GuardedRouter:
     """Return the router for recordings."""
     router = subject_router("/recordings", "recordings")
 

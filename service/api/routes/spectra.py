@@ -7,13 +7,13 @@ from typing import Annotated, Literal
 
 import numpy as np
 import structlog
-from fastapi import APIRouter, Request, Response
+from fastapi import Request, Response
 from pydantic import Field
 
 from core.monitor.assessment import Assessment
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.stiffness.order_line import marked_hz
-from service.api.auth.gate import subject_router
+from service.api.auth.gate import GuardedRouter, subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import TimeRange, at_most, parameter, several
 from service.api.problems import ProblemError, problem_responses
@@ -177,7 +177,7 @@ MAX_SPECTRA = 1000
 log = structlog.get_logger()
 
 
-def spectra_router(context: Context) -> APIRouter:
+def spectra_router(context: Context) -> GuardedRouter:
     """Return the router for spectra."""
     router = subject_router("/units/{unit}/bearings", "bearing")
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import Query, Request, Response
 from pydantic import Field
 
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingState
 from core.monitor.catalogue import Quantity, quantity_named
 from core.units import NS_PER_S, ns_from_s
-from service.api.auth.gate import subject_router
+from service.api.auth.gate import GuardedRouter, subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange, at_most
 from service.api.problems import ProblemError
@@ -252,7 +252,7 @@ Cursor = Annotated[
 ]
 
 
-def trend_router(context: Context) -> APIRouter:
+def trend_router(context: Context) -> GuardedRouter:
     """Return the router for trends."""
     router = subject_router("/units/{unit}/bearings", "bearing")
 

@@ -169,7 +169,7 @@ def test_a_truncated_or_damaged_file_is_refused(folder, name):
 
 
 DOUBLES = pa.field("c1", pa.float64(), nullable=False), [np.zeros(1000)]
-HOLES = "c1", [pa.array([None] * 1000, pa.int16())]
+HOLES = "c1", [pa.nulls(1000, pa.int16())]
 
 
 @pytest.mark.parametrize(
