@@ -44,14 +44,11 @@ class Reporter:
             self._is_written = True
 
     def _row(self, report: UnitReport, number: int) -> UnitRow:
-        status, snapshot = report.link.status, report.snapshot
+        snapshot = report.snapshot
         return UnitRow(
             unit=report.unit,
             n_beats=number,
             beat_ns=self._clock.now_ns(),
-            link=status.state.value,
-            reason=status.reason,
-            last_sample_ns=status.last_sample_ns,
             signs=link_document(report.link),
             revision=report.revision,
             state=None if snapshot is None else snapshot_document(snapshot),

@@ -18,12 +18,6 @@ class UnitRow:
         Number of the report, unique within a process.
     beat_ns
         Time of the report by the clock of its host; for information only.
-    link
-        State of the connection to the sample source.
-    reason
-        Reason for the state; None if there is no reason.
-    last_sample_ns
-        Time of the newest sample; None without samples.
     signs
         JSON document with the arrival of samples and the age of all data.
     revision
@@ -35,9 +29,6 @@ class UnitRow:
     unit: str
     n_beats: int
     beat_ns: int
-    link: str
-    reason: str | None
-    last_sample_ns: int | None
     signs: str
     revision: int
     state: bytes | None
@@ -73,9 +64,6 @@ UNIT_STATUS_TABLES = """
         process TEXT NOT NULL,
         n_beats INTEGER NOT NULL,
         beat_ns INTEGER NOT NULL,
-        link TEXT NOT NULL,
-        reason TEXT,
-        last_sample_ns INTEGER,
         signs TEXT NOT NULL,
         revision INTEGER NOT NULL,
         state BLOB NOT NULL
@@ -84,8 +72,7 @@ UNIT_STATUS_TABLES = """
 
 REPORT_COLUMNS = [field.name for field in fields(UnitRow)]
 UPDATE_BEAT = """
-    UPDATE unit_status SET n_beats = :n_beats, beat_ns = :beat_ns, link = :link, reason = :reason,
-    last_sample_ns = :last_sample_ns, signs = :signs
+    UPDATE unit_status SET n_beats = :n_beats, beat_ns = :beat_ns, signs = :signs
     WHERE unit = :unit AND process = :process AND revision = :revision
 """
 """Statement that updates a report without its state document, which is large."""

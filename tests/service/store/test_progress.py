@@ -82,7 +82,7 @@ def test_gaps_behind_the_newest_result_are_known_as_they_were_recorded(store):
     assert (set(found_gaps), len(found_gaps)) == ({*behind, *others}, 5)
 
 
-REPORT = UnitRow("U1", 1, 10**18, "connected", None, 10**18, "signs", 7, b"state")
+REPORT = UnitRow("U1", 1, 10**18, "signs", 7, b"state")
 
 
 def test_a_report_is_read_as_it_was_written_and_a_beat_leaves_the_state(store):

@@ -261,7 +261,7 @@ async def test_alarms_of_a_unit_that_is_gone_stay_until_somebody_has_seen_them(s
     store.close()
 
 
-REPORT = UnitRow("U1", 1, 0, "connected", None, None, "signs", 1, b"state")
+REPORT = UnitRow("U1", 1, 0, "signs", 1, b"state")
 GONE = identity_of("U2").id
 NOWHERE = Path("nowhere")
 
