@@ -42,8 +42,6 @@ NS_PER_S = 1_000_000_000
 hypothesis_settings.register_profile("padwatch", deadline=None)
 hypothesis_settings.load_profile("padwatch")
 START_NS = 1_767_225_600 * NS_PER_S
-
-
 SLOW = ("tests/system/", "tests/torture/", "tests/browser/")
 
 
@@ -73,7 +71,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def pytest_collection_finish() -> None:
     """Keep thousands of collected tests out of every later look of the garbage collector."""
-    gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
     gc.enable()

@@ -226,9 +226,9 @@ def folder_in_memory() -> Iterator[Path]:
 
 
 @pytest.fixture
-def sqlite_place(tmp_path: Path) -> SqlitePlace:
-    """A file that is not there yet."""
-    return SqlitePlace(tmp_path / "data" / "padwatch.sqlite3")
+def sqlite_place(database_file: Path, tmp_path: Path) -> SqlitePlace:
+    """A fresh file."""
+    return SqlitePlace(copy_database(database_file, tmp_path / "data"))
 
 
 @pytest.fixture

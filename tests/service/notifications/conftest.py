@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from harness.waiting import at_work
+from rigs.database_copy import copy_database
 from rigs.standing_clock import T0, SetClock
 
 from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmNews, AlarmRule
@@ -237,6 +238,6 @@ class Room:
 
 
 @pytest.fixture
-async def room(folder_in_memory: Path) -> AsyncIterator[Room]:
+async def room(database_file: Path, folder_in_memory: Path) -> AsyncIterator[Room]:
     async with AsyncExitStack() as stack:
-        yield Room(folder_in_memory / "padwatch.sqlite3", stack)
+        yield Room(copy_database(database_file, folder_in_memory), stack)

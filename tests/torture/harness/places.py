@@ -32,6 +32,7 @@ class SqlitePlace:
 
     def open_access(self) -> AccessStore:
         """Open accounts there, in place of a store."""
+        self.path = self.path.with_name("access.sqlite3")
         return open_access_file(self.path)
 
     def execute(self, statement: str, parameters: tuple[Any, ...] = ()) -> list[Any]:

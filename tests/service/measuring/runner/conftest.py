@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rigs.blocks import given_block
+from rigs.database_copy import copy_database
 from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
@@ -199,8 +200,8 @@ def block() -> Callable[..., SampleBlock]:
 
 
 @pytest.fixture
-def plant(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Plant]:
+def plant(request, database_file: Path, tmp_path: Path) -> Iterator[Plant]:
     """A plant; the parameter is how many findings its recorder keeps at most."""
-    built = Plant(tmp_path / "padwatch.sqlite3", getattr(request, "param", 5000))
+    built = Plant(copy_database(database_file, tmp_path), getattr(request, "param", 5000))
     yield built
     built.store.close()
