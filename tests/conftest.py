@@ -110,10 +110,8 @@ class CountingFeed:
         stop_index: int | None = None,
     ) -> None:
         self._n_channels, self._stop_index = n_channels, stop_index
-        self._rate_hz = rate_hz
-        self._start_ns = start_ns
-        self.slow = slow
-        self.ok = (True,) * n_channels
+        self._rate_hz, self._start_ns = rate_hz, start_ns
+        self.slow, self.ok = slow, (True,) * n_channels
         self.n_samples = 0
         self._calibration = calibration_in_counts(n_channels, rate_hz, len(slow))
 
@@ -148,8 +146,7 @@ class SteppedClock:
     """Time that stands still unless somebody sleeps or steps it."""
 
     def __init__(self, start_ns: int = 1_767_225_600 * NS_PER_S) -> None:
-        self._start_ns = start_ns
-        self._elapsed_s = 0.0
+        self._start_ns, self._elapsed_s = start_ns, 0.0
 
     def now_ns(self) -> int:
         return self._start_ns + round(self._elapsed_s * NS_PER_S)

@@ -111,6 +111,7 @@ class CanSource:
             found = self._assembler.take(batch.frames, arrived.host_ns, steady_ns)
             if self._assembler.trouble:
                 found = []
+                self._delivery.discard()  # from before it was noticed, so possibly of two devices
             blocks = self._delivery.take(found, arrived)
         # a suspended process was not listening; its suspension is no silence of the bus
         passed_s = min(self._clock.monotonic_s() - looked_s, 2 * _LOOK_S)

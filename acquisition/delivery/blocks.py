@@ -71,6 +71,10 @@ class BlockJoiner:
         self._parts = [replace(whole.from_sample(n_whole), stamp_fault=None)] if has_rest else []
         return [_in_cells(whole.from_sample(0, n_whole), self._cell)]
 
+    def discard(self) -> None:
+        """Drop all held samples, because they are not to be believed."""
+        self._parts = []
+
     def flush(self) -> list[SampleBlock]:
         """Return all held samples, including an incomplete cell; for the end of the data."""
         parts, self._parts = self._parts, []
