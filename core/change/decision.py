@@ -201,7 +201,7 @@ def _is_exceeded(finding: Finding, limit: float, margin: float, limits: ChangeLi
     """Whether a change is significant, and exceeds the limit by `margin` standard uncertainties."""
     significance = finding.significance
     threshold = limits.significance_threshold(finding.time_scale_h)
-    surely = finding.change * (1.0 - margin / significance)
+    surely = finding.change * (1.0 - margin / max(significance, 1e-9))
     return significance >= threshold and abs(math.expm1(surely)) >= limit
 
 
