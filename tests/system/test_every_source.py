@@ -23,7 +23,6 @@ FAST_LINE = "baudrate = 4_000_000\nparity = 'none'"
 MIN_SAMPLES = 20
 POLLED_EACH_S = 0.05
 SLOW_HZ = 50.0
-"""A queue that a busy machine does not empty in time is a lost link; polls see as much of it."""
 
 POLLED_UP_TO_HZ = 8.0
 
@@ -55,9 +54,10 @@ def sources(folder: Path) -> dict[str, str]:
     polled = f"kind = 'modbus_polled'\npoll_period_s = {POLLED_EACH_S}\n"
     vector = "kind = 'modbus_vector'\npoll_period_s = 0.2\nn_polls = 20\nhop_polls = 10\n"
     vectors = register_map(quantity="order1_amplitude", detector="pp")
-    fifo = "kind = 'modbus_fifo'\naddresses = [1000]\npoll_period_s = 0.01\n"
-    ring = "kind = 'modbus_ring'\n"
-    can = "kind = 'can'\ninterface = 'slcan'\nprofile = 'padwatch_int16'\n"
+    busy = "stale_after_s = 20.0\n"  # the DAQ gets no processor for seconds on a busy machine
+    fifo = f"kind = 'modbus_fifo'\naddresses = [1000]\npoll_period_s = 0.01\n{busy}"
+    ring = f"kind = 'modbus_ring'\n{busy}"
+    can = f"kind = 'can'\ninterface = 'slcan'\nprofile = 'padwatch_int16'\n{busy}"
     on_tcp, on_line = "channel = 'socket://127.0.0.1:0'\n", f"channel = '{folder / 'can'}'\n"
     return {
         "RING_TCP": ring + tcp,
