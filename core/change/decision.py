@@ -147,7 +147,8 @@ def step(
     evidence = decision.evidence.step(outcome, baseline)
     findings = evidence.findings(baseline)
     finding = max(findings, key=lambda finding: finding.significance, default=None)
-    is_quiet = finding is None or finding.significance < MIN_SIGNIFICANCE  # nearly always
+    # nearly always; no limit is exceeded then
+    is_quiet = finding is None or finding.significance < MIN_SIGNIFICANCE
     alert, danger = (
         INACTIVE
         if is_quiet and not timer.is_on

@@ -209,7 +209,7 @@ def create_app(context: Context, others: Iterable[GuardedRouter] = ()) -> Guarde
         """Return the OpenAPI document, which is rendered once, not for each request."""
         return await context.answers.of(request, lambda: 0, app.openapi)
 
-    for router in (
+    routers: tuple[GuardedRouter, ...] = (
         # routes are tried in this order: first those that every open page polls
         overview_router(context),
         alarm_rate_router(context),
@@ -230,7 +230,8 @@ def create_app(context: Context, others: Iterable[GuardedRouter] = ()) -> Guarde
         session_router(authenticator),
         access_router(context, authenticator),
         *others,
-    ):
+    )
+    for router in routers:
         app.router.routes += router.routes
     app.declared = declared(app)  # raises an error for a route without a declaration
     return app
